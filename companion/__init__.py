@@ -1,0 +1,1 @@
+"""MAVLink offboard companion: body rates under which horizontal acceleration answers linearly."""

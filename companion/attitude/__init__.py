@@ -1,0 +1,38 @@
+"""Pure maths of one control step: an attitude and a target in, body rates out.
+
+No I/O, no clock, no configuration, no arrays. The law is that of Xu & Pei, *Attitude Controller for
+UAV First-Order Acceleration Coefficients Tracking*, Sensors 2026, 26(9), 2727; equation numbers in
+this package are that paper's.
+"""
+
+from companion.attitude.errors import AttitudeError, InvalidQuaternionError, InvalidTargetError
+from companion.attitude.limits import Limits
+from companion.attitude.planner import PLANNER_NAMES, Planner, make_planner
+from companion.attitude.representation import (
+    attitude,
+    coefficients,
+    decompose,
+    heading,
+    wrap_angle,
+)
+from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target, TiltYaw
+
+__all__ = [
+    "PLANNER_NAMES",
+    "AttitudeError",
+    "BodyRates",
+    "Coefficients",
+    "InvalidQuaternionError",
+    "InvalidTargetError",
+    "Limits",
+    "Planner",
+    "Quaternion",
+    "Target",
+    "TiltYaw",
+    "attitude",
+    "coefficients",
+    "decompose",
+    "heading",
+    "make_planner",
+    "wrap_angle",
+]

@@ -1,0 +1,79 @@
+"""Attitude as a user sees it: coefficients and heading, and the way back to a quaternion."""
+
+from math import atan2, cos, pi, sin, sqrt
+
+from companion.attitude.errors import InvalidQuaternionError
+from companion.attitude.kinematics import split
+from companion.attitude.types import Coefficients, Quaternion, TiltYaw
+
+NORM_TOLERANCE = 1e-3
+
+
+def normalised(q: Quaternion) -> Quaternion:
+    """Return `q` with unit norm.
+
+    Raises:
+        InvalidQuaternionError: the norm is off by more than 1e-3, or a component is not finite.
+    """
+    w, x, y, z = q
+    norm = sqrt(w * w + x * x + y * y + z * z)
+    if not abs(norm - 1.0) <= NORM_TOLERANCE:  # written so that NaN is refused too
+        raise InvalidQuaternionError(
+            f"attitude quaternion {q} has norm {norm:.6g}; expected 1 within {NORM_TOLERANCE:g}"
+        )
+    return w / norm, x / norm, y / norm, z / norm
+
+
+def wrap_angle(angle: float) -> float:
+    """Wrap an angle in rad to (−π, π]."""
+    wrapped = angle % (2.0 * pi)
+    return wrapped - 2.0 * pi if wrapped > pi else wrapped
+
+
+def decompose(q: Quaternion) -> TiltYaw:
+    """Split an attitude into tilt ⊗ yaw (equation 9).
+
+    Raises:
+        InvalidQuaternionError: as `normalised`.
+    """
+    return TiltYaw(*split(*normalised(q)))
+
+
+def coefficients(q: Quaternion) -> Coefficients:
+    """Acceleration coefficients (−2ay, +2ax) of an attitude (equation 10); |c| = sin(tilt).
+
+    Raises:
+        InvalidQuaternionError: as `normalised`.
+    """
+    w, x, y, z = normalised(q)
+    return Coefficients(-2.0 * (z * x + w * y), 2.0 * (w * x - z * y))
+
+
+def heading(q: Quaternion) -> float:
+    """Tilt-yaw heading 2·atan2(z, b) in rad, in (−π, π].
+
+    It equals the Euler yaw that an autopilot reports only when level.
+
+    Raises:
+        InvalidQuaternionError: as `normalised`.
+    """
+    w, _, _, z = normalised(q)
+    return wrap_angle(2.0 * atan2(z, w))
+
+
+def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
+    """The upright attitude that has these coefficients and this tilt-yaw heading (rad).
+
+    Raises:
+        ValueError: the coefficients are longer than 1 or not finite, so no attitude has them.
+    """
+    north, east = coefficients
+    square = north * north + east * east
+    if not square <= 1.0:
+        raise ValueError(f"no attitude has acceleration coefficients {coefficients}: longer than 1")
+    a = sqrt((1.0 + sqrt(1.0 - square)) / 2.0)
+    x = east / (2.0 * a)
+    y = -north / (2.0 * a)
+    b = cos(heading / 2.0)
+    z = sin(heading / 2.0)
+    return a * b, x * b + y * z, y * b - x * z, a * z

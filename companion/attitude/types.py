@@ -1,0 +1,44 @@
+"""The words of the attitude core: plain tuples of floats, SI units, radians, body → world."""
+
+from typing import NamedTuple
+
+Quaternion = tuple[float, float, float, float]
+"""(w, x, y, z), Hamilton product, rotates body (FRD) into world (NED)."""
+
+
+class TiltYaw(NamedTuple):
+    """Equation 9: an attitude split into tilt ⊗ yaw, [a, x, y, 0] ⊗ [b, 0, 0, z] with a > 0."""
+
+    a: float
+    b: float
+    x: float
+    y: float
+    z: float
+
+
+class Coefficients(NamedTuple):
+    """Equation 10: horizontal acceleration per specific thrust, (a_N, a_E); |c| = sin(tilt)."""
+
+    north: float
+    east: float
+
+
+class BodyRates(NamedTuple):
+    """Angular velocity in rad/s about body x, y, z (FRD)."""
+
+    roll: float
+    pitch: float
+    yaw: float
+
+
+class Target(NamedTuple):
+    """What guidance asks of a planner.
+
+    `north`, `east` are the wanted acceleration coefficients; `heading` is the wanted tilt-yaw
+    heading in rad and `heading_rate` its feed-forward in rad/s.
+    """
+
+    north: float
+    east: float
+    heading: float
+    heading_rate: float = 0.0
