@@ -13,6 +13,7 @@ from companion.attitude.representation import (
     coefficients,
     decompose,
     heading,
+    is_unit,
     wrap_angle,
 )
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target, TiltYaw
@@ -33,6 +34,7 @@ __all__ = [
     "coefficients",
     "decompose",
     "heading",
+    "is_unit",
     "make_planner",
     "wrap_angle",
 ]

@@ -9,6 +9,12 @@ from companion.attitude.types import Coefficients, Quaternion, TiltYaw
 NORM_TOLERANCE = 1e-3
 
 
+def is_unit(q: Quaternion) -> bool:
+    """Whether a planner would take `q`: finite, its norm within 1e-3 of one."""
+    w, x, y, z = q
+    return abs(sqrt(w * w + x * x + y * y + z * z) - 1.0) <= NORM_TOLERANCE
+
+
 def normalised(q: Quaternion) -> Quaternion:
     """Return `q` with unit norm.
 

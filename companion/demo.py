@@ -1,0 +1,83 @@
+"""The bundled vehicle as a process of its own, for `companion demo`."""
+
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from companion.config_file import ConfigError
+
+_LOCAL_PORT_OFFSET = 40
+"""The vehicle sends from this many ports above the one it sends to."""
+
+
+def default_config() -> Path:
+    """The configuration that ships with the program.
+
+    Raises:
+        ConfigError: it is not where the repository has it.
+    """
+    path = Path(__file__).parent.parent / "configs" / "mock-px4.yaml"
+    if not path.is_file():
+        raise ConfigError(f"{path} is missing; name a configuration with --config")
+    return path
+
+
+def free_port() -> int:
+    """A UDP port on which a companion can listen and a mock vehicle can have its own beside it."""
+    for _ in range(100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
+            first.bind(("127.0.0.1", 0))
+            port: int = first.getsockname()[1]
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+                try:
+                    second.bind(("127.0.0.1", port + _LOCAL_PORT_OFFSET))
+                except (OSError, OverflowError):
+                    continue
+                return port
+    raise ConfigError("no free pair of UDP ports on this machine")
+
+
+def check_mock(config: Path) -> None:
+    """Let the vehicle itself check its section of a configuration.
+
+    Raises:
+        ConfigError: with the vehicle's own words.
+    """
+    _run_check([sys.executable, "-m", "sitl_mock", "--check", "--config", str(config)])
+
+
+def _run_check(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise ConfigError(done.stderr.strip() or "the mock vehicle refused its configuration")
+
+
+@contextmanager
+def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> Iterator[None]:
+    """Run the mock vehicle while the block runs; its own words go to `log`.
+
+    It has a session of its own, so that Ctrl-C reaches us alone and the vehicle can still be
+    handed back to its autopilot.
+
+    Raises:
+        ConfigError: at the end, if the vehicle had stopped by itself; with its last words.
+    """
+    command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
+    command += ["--port", str(port), *(["--lockstep"] if lockstep else [])]
+    with log.open("wb") as words:
+        process = subprocess.Popen(command, stdout=words, stderr=words, start_new_session=True)
+        try:
+            yield
+            if process.poll() is not None:
+                last = log.read_text(errors="replace").strip().rpartition("\n")[2]
+                raise ConfigError(f"the bundled vehicle stopped by itself, see {log}: {last}")
+        finally:
+            process.terminate()
+            try:
+                process.wait(timeout=5.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

@@ -1,0 +1,155 @@
+"""The way of one sample: attitude in, body rates out, or a stated reason why not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from time import perf_counter_ns
+from typing import NamedTuple
+
+from companion.attitude import AttitudeError, BodyRates, Planner, Target
+from companion.attitude.kinematics import cos_tilt
+from companion.flight.freshness import SampleClock
+from companion.guidance import HoverThrust, specific_thrust
+from companion.mavlink.errors import InvalidSetpoint
+from companion.mavlink.samples import AttitudeSample
+from companion.recording.trace import FlightTrace
+
+SendSetpoint = Callable[[int, BodyRates, float], None]
+
+_LONGEST_STEP = 0.1
+"""A planner never integrates over more than this, s."""
+
+
+class Command(NamedTuple):
+    """What guidance left behind for the loop.
+
+    Attributes:
+        target: for the planner.
+        acceleration_down: wanted vertical acceleration, m/s².
+        made_at: when, s on our clock.
+        idle: on the ground: no rates, no thrust.
+        is_step: an open-loop step, whose response is measured.
+    """
+
+    target: Target
+    acceleration_down: float
+    made_at: float
+    idle: bool = False
+    is_step: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Deadlines:
+    """When data is too old, and when an answer is too late; all in s."""
+
+    telemetry_stale: float
+    target_stale: float
+    deadline: float
+
+
+class ControlLoop:
+    """Answers each fresh attitude sample with one setpoint; there is no other way to send one.
+
+    While `guarded` (the autopilot obeys us), a gap in the answers is not silently closed: the
+    autopilot may have left offboard meanwhile, and PX4 would enter it again on our next setpoint.
+    So the loop asks for the mode and waits for `resume`.
+
+    Attributes:
+        command: the newest command; guidance writes it, None means none yet.
+        on: whether samples are answered at all.
+        guarded: whether a gap needs the autopilot's mode confirmed.
+        held_back: a gap happened and `resume` has not come yet.
+        ask_mode: called once a gap, when telemetry is back.
+        last_answer, last_sample, last_newer, last_fresh: when a setpoint last left; when a sample
+            last came; one that was newer than those before; and one that was fresh. s on our clock.
+        samples, setpoints, missed_deadlines, stale, refused: counts since the loop was made.
+    """
+
+    def __init__(
+        self,
+        planner: Planner,
+        hover_thrust: HoverThrust,
+        send: SendSetpoint,
+        deadlines: Deadlines,
+        trace: FlightTrace,
+    ) -> None:
+        self.command: Command | None = None
+        self.on = False
+        self.guarded = False
+        self.held_back = False
+        self.ask_mode: Callable[[], None] = lambda: None
+        self.last_answer = self.last_sample = self.last_newer = self.last_fresh = -inf
+        self.samples = self.setpoints = self.missed_deadlines = self.stale = self.refused = 0
+        self._planner = planner
+        self._hover_thrust = hover_thrust
+        self._send = send
+        self._deadlines = deadlines
+        self._trace = trace
+        self._clock = SampleClock()
+        self._last_time = -inf
+        self._gap_from = inf
+
+    def resume(self) -> None:
+        """The autopilot still is in offboard: go on after a gap."""
+        self.held_back = False
+        self._gap_from = inf
+
+    def on_sample(self, sample: AttitudeSample) -> None:
+        """Answer `sample`, or count why not. Called by the link as the datagram arrives."""
+        age = self._clock.age(sample.vehicle_time, sample.received)
+        fresh = age is not None and age <= self._deadlines.telemetry_stale
+        dt = self._note_arrival(sample, newer=age is not None, fresh=fresh)
+        if not self.on:
+            return
+        self.samples += 1
+        command = self.command
+        if (
+            not fresh
+            or command is None
+            or sample.received - command.made_at > self._deadlines.target_stale
+            or self._after_gap(sample.received)
+        ):
+            self.stale += 1
+            return
+        try:
+            if command.idle:
+                rates, thrust = BodyRates(0.0, 0.0, 0.0), 0.0
+            else:
+                rates = self._planner.rates(sample.q, command.target, dt, sample.body_rates)
+                cosine = cos_tilt(sample.q[1], sample.q[2])
+                thrust = self._hover_thrust.normalised(
+                    specific_thrust(command.acceleration_down, cosine)
+                )
+                self._hover_thrust.sent(thrust, cosine)
+            self._send(sample.time_boot_ms, rates, thrust)
+        except (AttitudeError, InvalidSetpoint):
+            self.refused += 1
+            return
+        self._account(sample, command)
+
+    def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
+        """Keep what the watch asks for; returns the sample period in s."""
+        dt = min(sample.vehicle_time - self._last_time, _LONGEST_STEP)
+        self.last_sample = sample.received
+        if newer:
+            self._last_time, self.last_newer = sample.vehicle_time, sample.received
+        if fresh:
+            self.last_fresh = sample.received
+        return dt
+
+    def _after_gap(self, now: float) -> bool:
+        if not self.guarded:
+            return False
+        if now - self._gap_from > self._deadlines.telemetry_stale and not self.held_back:
+            self.held_back = True
+            self.ask_mode()
+        return self.held_back
+
+    def _account(self, sample: AttitudeSample, command: Command) -> None:
+        self.setpoints += 1
+        self.last_answer = self._gap_from = sample.received
+        latency = perf_counter_ns() - sample.received_ns
+        self.missed_deadlines += latency > self._deadlines.deadline * 1e9
+        self._trace.add_latency(latency)
+        if command.is_step:
+            self._trace.add_response(sample.vehicle_time, sample.q, command.target)

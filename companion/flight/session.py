@@ -1,0 +1,119 @@
+"""A flight with everything about it: its folder, its recording, its link, its summary."""
+
+import asyncio
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from companion.config import Config
+from companion.flight.assembly import Assembled, assemble, link_settings
+from companion.flight.chronicle import Chronicle
+from companion.flight.ending import FlightEnded
+from companion.flight.flight import AskLanding
+from companion.flight.observer import Observer
+from companion.mavlink.link import Link
+from companion.mavlink.samples import AttitudeSample
+from companion.recording.summary import Summary
+from companion.recording.tlog import TlogWriter
+
+
+class Session:
+    """Flies once. `interrupt` may be called from a signal handler of the event loop.
+
+    Args:
+        config: what to fly.
+        config_text: the YAML as it was read, kept beside the recording.
+        folder: an existing folder for this flight's files.
+        observer: is told what happens.
+        ask_landing: asked after an interrupt, when the vehicle holds.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        config_text: str,
+        folder: Path,
+        observer: Observer,
+        ask_landing: AskLanding,
+    ) -> None:
+        self._config = config
+        self._config_text = config_text
+        self._folder = folder
+        self._observer = observer
+        self._ask_landing = ask_landing
+        self._assembled: Assembled | None = None
+
+    def interrupt(self, reason: str) -> bool:
+        """Hand the vehicle back; False if there is no flight to interrupt yet."""
+        if self._assembled is None:
+            return False
+        self._assembled.flight.interrupt(reason)
+        return True
+
+    async def fly(self) -> Summary:
+        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`.
+
+        Raises:
+            LinkError: the link could not be opened; nothing was sent.
+            OSError: the folder cannot be written; nothing was sent.
+        """
+        settings = link_settings(self._config)
+        (self._folder / "config.yaml").write_text(self._config_text, encoding="utf-8")
+        loop = asyncio.get_running_loop()
+        epoch = 0.0 if settings.lockstep else time.time() - loop.time()
+        failures: list[str] = []
+        with TlogWriter(self._folder / "flight.tlog", epoch, failures.append) as tlog:
+            async with Link(settings, tap=tlog) as link:
+                self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
+                result = await self._run(link, self._assembled)
+        for failure in failures:
+            self._assembled.flight.note(failure)
+        return self._finish(link, self._assembled, result, tlog.dropped)
+
+    async def _run(self, link: Link, assembled: Assembled) -> str:
+        """Connect the link's callbacks to the flight, and fly it."""
+        flight, loop, guide = assembled.flight, assembled.loop, assembled.guide
+
+        def on_attitude(sample: AttitudeSample) -> None:
+            loop.on_sample(sample)
+            guide.note_attitude(sample)
+
+        link.on_attitude = on_attitude
+        link.on_error = lambda error: flight.end(FlightEnded(f"internal error: {error!r}"))
+        chronicle = Chronicle(link.state, flight.note)
+
+        def on_heartbeat(_: object) -> None:
+            chronicle.look()
+            flight.on_heartbeat()
+
+        link.subscribe("HEARTBEAT", on_heartbeat)
+        try:
+            return await flight.run()
+        except asyncio.CancelledError:
+            # The second Ctrl-C: nothing more is sent, but what was recorded is kept.
+            flight.failed_in = flight.failed_in or flight.phase
+            return "left at once by the user"
+        finally:
+            link.on_attitude = None
+            chronicle.look()
+
+    def _finish(self, link: Link, assembled: Assembled, result: str, tlog_dropped: int) -> Summary:
+        counts = {
+            name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
+        }
+        flight = assembled.flight
+        summary = Summary(
+            result=result,
+            phase=(flight.failed_in or flight.phase).name,
+            gain=self._config.planner.gain_per_s,
+            counts=assembled.counts(),
+            link={**counts, "not_recorded": tlog_dropped},
+            trace=assembled.trace,
+            events=flight.events,
+            log=self._folder,
+        )
+        try:
+            (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
+        except OSError as error:
+            flight.note(f"{self._folder}: summary not written: {error.strerror}")
+        return summary

@@ -1,0 +1,178 @@
+"""What can be flown: programmes give the reference as a function of the time since they began."""
+
+import math
+from collections.abc import Sequence as Programmes
+from dataclasses import dataclass
+from typing import Protocol
+
+from companion.attitude import Coefficients
+from companion.guidance.reference import Pose, Reference
+
+_RAMP_ACCELERATION = 1.0
+"""Mean acceleration along the path while a circle gathers or loses speed, m/s²."""
+
+
+class Programme(Protocol):
+    """A reference over time; anchored to the pose at which it was told to begin."""
+
+    @property
+    def name(self) -> str:
+        """What the user calls it."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        ...
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference `time` seconds after the beginning at `start`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Hover:
+    """Stay at the pose where it began, for `duration` seconds."""
+
+    duration: float
+    name: str = "hover"
+
+    def at(self, time: float, start: Pose) -> Reference:  # noqa: ARG002
+        """The reference: the starting pose at rest."""
+        return Reference(start.position_ned, heading=start.heading)
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
+
+    A doublet leaves the vehicle, on an ideal response, where it was and at rest; what remains is
+    taken out by position hold for `settle` seconds after each.
+
+    Attributes:
+        coefficient: length of c, the sine of the tilt.
+        step: T in s.
+        settle: s.
+    """
+
+    coefficient: float
+    step: float
+    settle: float
+    name: str = "steps"
+
+    DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (math.sqrt(0.5), -math.sqrt(0.5)))
+
+    @property
+    def duration(self) -> float:
+        """Three doublets, each followed by its settling, s."""
+        return len(self.DIRECTIONS) * self._period
+
+    @property
+    def _period(self) -> float:
+        return 4.0 * self.step + self.settle
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference: open-loop coefficients in a doublet, position hold between them."""
+        which = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
+        within = time - which * self._period
+        rest = Reference(start.position_ned, heading=start.heading)
+        if within >= 4.0 * self.step:
+            return rest
+        sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
+        north, east = self.DIRECTIONS[which]
+        c = sign * self.coefficient
+        return rest._replace(coefficients=Coefficients(c * north, c * east))
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """Laps of a circle that begins and ends, at rest, where the vehicle is; heading held.
+
+    The centre lies `radius` north of the start, and the vehicle sets off eastwards. Speed rises and
+    falls as a raised cosine.
+
+    Attributes:
+        radius: m.
+        speed: m/s, once gathered.
+        laps: how often round, the gathering and the braking included.
+    """
+
+    radius: float
+    speed: float
+    laps: float
+    name: str = "circle"
+
+    @property
+    def _length(self) -> float:
+        return math.tau * self.radius * self.laps
+
+    @property
+    def _ramp(self) -> float:
+        return min(self.speed / _RAMP_ACCELERATION, self._length / self.speed)
+
+    @property
+    def duration(self) -> float:
+        """The way at full speed, and half of each ramp more, s."""
+        return self._length / self.speed + self._ramp
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference on the circle, with its velocity and acceleration."""
+        way, speed, gain = self._along(min(max(time, 0.0), self.duration))
+        angle = way / self.radius
+        sine, cosine = math.sin(angle), math.cos(angle)
+        north, east, down = start.position_ned
+        inward = speed * speed / self.radius
+        return Reference(
+            (north + self.radius * (1.0 - cosine), east + self.radius * sine, down),
+            (speed * sine, speed * cosine, 0.0),
+            (gain * sine + inward * cosine, gain * cosine - inward * sine, 0.0),
+            start.heading,
+        )
+
+    def _along(self, time: float) -> tuple[float, float, float]:
+        """Way (m), speed (m/s) and acceleration (m/s²) along the circle."""
+        ramp, left = self._ramp, self.duration - time
+        if time < ramp:
+            return self._gathered(time)
+        if left < ramp:
+            way, speed, gain = self._gathered(left)
+            return self._length - way, speed, -gain
+        return self.speed * (time - 0.5 * ramp), self.speed, 0.0
+
+    def _gathered(self, time: float) -> tuple[float, float, float]:
+        phase = math.pi * time / self._ramp
+        return (
+            0.5 * self.speed * (time - self._ramp / math.pi * math.sin(phase)),
+            0.5 * self.speed * (1.0 - math.cos(phase)),
+            0.5 * self.speed * math.pi / self._ramp * math.sin(phase),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """Programmes one after the other, all from the same starting pose."""
+
+    parts: Programmes[Programme]
+
+    @property
+    def name(self) -> str:
+        """The names of the parts."""
+        return ", ".join(part.name for part in self.parts)
+
+    @property
+    def duration(self) -> float:
+        """Sum of the parts, s."""
+        return sum(part.duration for part in self.parts)
+
+    def part_at(self, time: float) -> tuple[Programme, float]:
+        """The part that is flown at `time`, and the time since that part began."""
+        for part in self.parts[:-1]:
+            if time < part.duration:
+                return part, time
+            time -= part.duration
+        return self.parts[-1], time
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference of the part that is flown at `time`."""
+        part, within = self.part_at(time)
+        return part.at(within, start)

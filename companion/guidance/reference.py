@@ -1,0 +1,40 @@
+"""The words of guidance. World NED, SI units, radians; headings are tilt-yaw headings."""
+
+from typing import NamedTuple
+
+from companion.attitude import Coefficients
+
+Vector = tuple[float, float, float]
+"""(north, east, down)."""
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s²."""
+
+
+class Pose(NamedTuple):
+    """Where a programme begins."""
+
+    position_ned: Vector
+    heading: float
+
+
+class VehicleMotion(NamedTuple):
+    """What guidance knows of the vehicle: position in m and velocity in m/s."""
+
+    position_ned: Vector
+    velocity_ned: Vector
+
+
+class Reference(NamedTuple):
+    """Where the vehicle ought to be at one instant.
+
+    With `coefficients` given, the horizontal acceleration is commanded open loop, and position and
+    velocity count for the height only.
+    """
+
+    position_ned: Vector
+    velocity_ned: Vector = (0.0, 0.0, 0.0)
+    acceleration_ned: Vector = (0.0, 0.0, 0.0)
+    heading: float = 0.0
+    heading_rate: float = 0.0
+    coefficients: Coefficients | None = None

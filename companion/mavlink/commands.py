@@ -1,0 +1,122 @@
+"""COMMAND_LONG with its COMMAND_ACK. Source: the MAVLink command protocol."""
+
+import asyncio
+
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.mavlink.codec import Message
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.outbox import Outbox
+from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.router import Router
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.texts import TextAssembler
+
+_ACCEPTED = 0
+_IN_PROGRESS = 5
+_IN_PROGRESS_TIMEOUT_S = 30.0  # for the next word of a command that the vehicle is working on
+_WORDS_WINDOW_S = 0.3  # the reason comes as a text shortly before or after the ACK
+
+
+def command_name(command: int) -> str:
+    """Name of a MAV_CMD, or its number if the dialect does not have it."""
+    entry = dialect.enums["MAV_CMD"].get(command)
+    return entry.name if entry is not None else f"MAV_CMD {command}"
+
+
+def result_name(result: int) -> str:
+    """Name of a MAV_RESULT without its prefix."""
+    entry = dialect.enums["MAV_RESULT"].get(result)
+    return entry.name.removeprefix("MAV_RESULT_") if entry is not None else f"RESULT {result}"
+
+
+class CommandClient:
+    """Sends commands and waits for their ACKs; one at a time of each kind.
+
+    An ACK names only its command, so two of one kind under way could not be told apart.
+    """
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        outbox: Outbox,
+        router: Router,
+        registry: PendingRegistry,
+        texts: TextAssembler,
+    ) -> None:
+        self._settings, self._outbox, self._registry = settings, outbox, registry
+        self._texts = texts
+        self._locks: dict[int, asyncio.Lock] = {}
+        self._waiting: dict[int, Pending[int]] = {}
+        self.last_acks: dict[int, int] = {}
+        router.subscribe("COMMAND_ACK", self._on_ack)
+
+    async def send(
+        self, command: int, params: tuple[float, ...], timeout_s: float, retries: int
+    ) -> None:
+        """Send and wait until the autopilot accepts.
+
+        Raises:
+            CommandRefused: It answered anything but ACCEPTED.
+            CommandTimeout: It did not answer, after `retries` repetitions.
+            LinkLost: The connection dropped meanwhile.
+        """
+        lock = self._locks.setdefault(command, asyncio.Lock())
+        async with lock:
+            began = asyncio.get_running_loop().time()
+            with Pending[int](self._registry) as answers:
+                self._waiting[command] = answers
+                try:
+                    result = await self._exchange(command, params, timeout_s, retries, answers)
+                finally:
+                    del self._waiting[command]
+            if result != _ACCEPTED:
+                await asyncio.sleep(_WORDS_WINDOW_S)
+                words = self._texts.since(began)
+                raise CommandRefused(command_name(command), result, result_name(result), words)
+
+    async def _exchange(
+        self,
+        command: int,
+        params: tuple[float, ...],
+        timeout_s: float,
+        retries: int,
+        answers: Pending[int],
+    ) -> int:
+        for confirmation in range(retries + 1):
+            self._send_once(command, params, confirmation)
+            try:
+                result = await answers.next(timeout_s)
+                while result == _IN_PROGRESS:
+                    result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
+            except TimeoutError:
+                continue
+            return result
+        raise CommandTimeout(
+            f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
+            f"is system {self._settings.target_system} still there?"
+        )
+
+    def _send_once(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
+        padded = (*params, *(0.0,) * 7)[:7]
+        self._outbox.message(
+            dialect.MAVLink_command_long_message(
+                self._settings.target_system,
+                self._settings.target_component,
+                command,
+                confirmation,
+                *padded,
+            )
+        )
+
+    def _on_ack(self, message: Message) -> None:
+        # The extension fields name whom the ACK is for; zeros mean an autopilot that leaves
+        # them out. Another station's ACKs are not ours.
+        if message.target_system not in (0, self._settings.source_system):
+            return
+        if message.target_component not in (0, self._settings.source_component):
+            return
+        self.last_acks[message.command] = message.result
+        answers = self._waiting.get(message.command)
+        if answers is not None:
+            answers.put(message.result)

@@ -1,0 +1,76 @@
+"""Everything that can go wrong between us and the vehicle, as types with one clear message."""
+
+
+class LinkError(Exception):
+    """The root of all errors of this package."""
+
+
+class EndpointError(LinkError):
+    """The endpoint cannot be understood or opened; the message says how to mend it."""
+
+
+class LinkTimeout(LinkError):  # noqa: N818 - "timeout" is the field's word, and says it is one
+    """The vehicle said nothing, or not what was waited for, in the given time."""
+
+
+class LinkLost(LinkError):  # noqa: N818
+    """The connection dropped while something was waiting for an answer over it."""
+
+
+class NotConnected(LinkError):  # noqa: N818
+    """The vehicle has not been heard yet, so the question has no answer."""
+
+
+class UnsupportedAutopilot(LinkError):  # noqa: N818
+    """The vehicle's autopilot is none that this program knows how to fly."""
+
+
+class UnknownMessage(LinkError):  # noqa: N818
+    """The dialect has no message of that name."""
+
+
+class SigningError(LinkError):
+    """The signing key cannot be used."""
+
+
+class InvalidSetpoint(LinkError, ValueError):  # noqa: N818
+    """A setpoint that must not reach the vehicle; nothing was sent."""
+
+
+class NonFiniteSetpoint(InvalidSetpoint):
+    """A rate or thrust is NaN, infinite or too large for the wire; nothing was sent."""
+
+
+class CommandTimeout(LinkTimeout):
+    """No COMMAND_ACK came for a command after all retries."""
+
+
+class CommandRefused(LinkError):  # noqa: N818
+    """The autopilot answered a command with anything but ACCEPTED.
+
+    Attributes:
+        command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
+        result: MAV_RESULT number of the ACK.
+        result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
+        words: The autopilot's own STATUSTEXTs around the refusal, oldest first; may be empty.
+    """
+
+    def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:
+        self.command = command
+        self.result = result
+        self.result_name = result_name
+        self.words = words
+        said = "; ".join(words) if words else "the autopilot gave no reason"
+        super().__init__(f"{command} was refused ({result_name}): {said}")
+
+
+class ParameterError(LinkError):
+    """The root of parameter errors."""
+
+
+class UnknownParameter(ParameterError):  # noqa: N818
+    """The autopilot has no parameter of that name, or never answered for it."""
+
+
+class ParameterRefused(ParameterError):  # noqa: N818
+    """The autopilot kept another value than the one written."""

@@ -1,0 +1,183 @@
+"""MAVLink framing: bytes to checked frames and back, for version 2 and (inwards) version 1.
+
+Source: the MAVLink serialization guide. A frame that is not intact is never delivered; the
+checksum covers a message's CRC_EXTRA, so a frame of a message the dialect does not know cannot
+be checked and is skipped.
+"""
+
+import struct
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from fastcrc import crc16
+
+from companion.mavlink.stats import LinkStats
+
+V2 = 0xFD
+V1 = 0xFE
+SIGNED = 0x01
+SIGNATURE_LENGTH = 13
+
+_V2_HEADER = struct.Struct("<BBBBBBBHB")
+_V1_HEADER_LENGTH = 6
+_V2_HEADER_LENGTH = 10
+_INCOMPLETE = -1
+_NOT_A_FRAME = 0
+
+
+class Frame(NamedTuple):
+    """One intact frame.
+
+    Attributes:
+        message_id: Number of the message.
+        system: Source system id.
+        component: Source component id.
+        sequence: The sender's running number, 0..255.
+        payload: As sent, trailing zeros cut; pad it before unpacking.
+        raw: The whole frame with header, checksum and signature.
+        signed: Whether it carries a signature (not whether that is right).
+    """
+
+    message_id: int
+    system: int
+    component: int
+    sequence: int
+    payload: bytes
+    raw: bytes
+    signed: bool
+
+
+class FrameScanner:
+    """Finds the intact frames in what arrives.
+
+    Args:
+        crc_extra: The dialect's CRC_EXTRA as one byte for each known message id.
+        streaming: True if a frame may go on in the next call (TCP, serial); false for datagrams,
+            where an unfinished frame is dropped.
+        stats: Where wrong checksums and unknown messages are counted.
+    """
+
+    def __init__(
+        self,
+        crc_extra: Mapping[int, bytes],
+        *,
+        streaming: bool = False,
+        stats: LinkStats | None = None,
+    ) -> None:
+        self._crc_extra = crc_extra
+        self._streaming = streaming
+        self._stats = stats or LinkStats()
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Take bytes as they come; return the frames that they completed, in order."""
+        if self._rest:
+            data = self._rest + data
+            self._rest = b""
+        frames: list[Frame] = []
+        at, end = 0, len(data)
+        while at < end:
+            magic = data[at]
+            if magic == V2:
+                length = self._version_2(data, at, frames)
+            elif magic == V1:
+                length = self._version_1(data, at, frames)
+            else:
+                length = _NOT_A_FRAME
+            if length == _INCOMPLETE:
+                if self._streaming:
+                    self._rest = data[at:]
+                    break
+                length = _NOT_A_FRAME
+            at += length or 1
+        return frames
+
+    def _version_2(self, data: bytes, at: int, frames: list[Frame]) -> int:
+        if len(data) - at < _V2_HEADER_LENGTH:
+            return _INCOMPLETE
+        fields: tuple[int, ...] = _V2_HEADER.unpack_from(data, at)
+        _, size, incompatible, _, sequence, system, component, low, high = fields
+        if incompatible & ~SIGNED:
+            return _NOT_A_FRAME
+        message_id = low | high << 16
+        check_at = at + _V2_HEADER_LENGTH + size
+        end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
+        extra = self._crc_extra.get(message_id)
+        if extra is None:
+            return self._unknown_frame(data, at, end)
+        if end > len(data):
+            return _INCOMPLETE
+        if not self._intact(data, at, check_at, extra):
+            return _NOT_A_FRAME
+        payload = data[at + _V2_HEADER_LENGTH : check_at]
+        raw = data[at:end]
+        frames.append(
+            Frame(message_id, system, component, sequence, payload, raw, bool(incompatible))
+        )
+        return end - at
+
+    def _version_1(self, data: bytes, at: int, frames: list[Frame]) -> int:
+        if len(data) - at < _V1_HEADER_LENGTH:
+            return _INCOMPLETE
+        _, size, sequence, system, component, message_id = data[at : at + _V1_HEADER_LENGTH]
+        check_at = at + _V1_HEADER_LENGTH + size
+        end = check_at + 2
+        extra = self._crc_extra.get(message_id)
+        if extra is None:
+            return self._unknown_frame(data, at, end)
+        if end > len(data):
+            return _INCOMPLETE
+        if not self._intact(data, at, check_at, extra):
+            return _NOT_A_FRAME
+        payload = data[at + _V1_HEADER_LENGTH : check_at]
+        frames.append(
+            Frame(message_id, system, component, sequence, payload, data[at:end], signed=False)
+        )
+        return end - at
+
+    def _intact(self, data: bytes, at: int, check_at: int, extra: bytes) -> bool:
+        stated = data[check_at] | data[check_at + 1] << 8
+        if crc16.mcrf4xx(data[at + 1 : check_at] + extra) == stated:
+            return True
+        self._stats.bad_crc += 1
+        return False
+
+    def _unknown_frame(self, data: bytes, at: int, end: int) -> int:
+        # Without a checksum only what follows can tell a frame from garbage: another frame, or
+        # the end of what came.
+        if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
+            self._stats.unknown += 1
+            return end - at
+        return _NOT_A_FRAME
+
+
+def build_frame(
+    message_id: int,
+    payload: bytes,
+    crc_extra: bytes,
+    *,
+    sequence: int,
+    system: int,
+    component: int,
+    signed: bool = False,
+) -> bytes:
+    """Build a version 2 frame; with `signed`, all of it but the signature, which is then due.
+
+    Trailing zeros of the payload are cut, all but the first byte, as the standard asks.
+    """
+    trimmed = payload.rstrip(b"\0") or payload[:1]
+    body = (
+        _V2_HEADER.pack(
+            V2,
+            len(trimmed),
+            SIGNED if signed else 0,
+            0,
+            sequence,
+            system,
+            component,
+            message_id & 0xFFFF,
+            message_id >> 16,
+        )
+        + trimmed
+    )
+    return body + crc16.mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")

@@ -1,0 +1,128 @@
+"""What arrives: checked, and passed on to the control loop and to the router."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from companion.mavlink.codec import (
+    ATTITUDE_QUATERNION,
+    CRC_EXTRA,
+    SYSTEM_TIME,
+    decode_attitude,
+    decode_system_time,
+)
+from companion.mavlink.framing import Frame, FrameScanner
+from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.router import Router
+from companion.mavlink.samples import AttitudeSample
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.stats import LinkStats, SequenceTracker
+from companion.mavlink.transport import Tap
+
+_LOG = logging.getLogger(__name__)
+
+
+class Inbox:
+    """Checks what arrives and passes it on: samples to the control loop, the rest to the router.
+
+    Attributes:
+        on_attitude: Called with each attitude sample, synchronously.
+        lockstep: Set when vehicle time drives the loop.
+    """
+
+    def __init__(
+        self, settings: LinkSettings, stats: LinkStats, router: Router, tap: Tap | None
+    ) -> None:
+        self._source = (settings.target_system, settings.target_component)
+        self._signing = settings.signing
+        self._stats, self._router, self._tap = stats, router, tap
+        self._loop = asyncio.get_running_loop()
+        self._sequence = SequenceTracker()
+        self._signature_said = False
+        self._held: list[tuple[Frame, int]] = []
+        self._samples: list[AttitudeSample] = []
+        self.on_attitude: Callable[[AttitudeSample], None] | None = None
+        self.lockstep: LockstepClient | None = None
+        self.connect(streaming=False)
+
+    def connect(self, *, streaming: bool) -> None:
+        """Begin with a fresh connection."""
+        self._scanner = FrameScanner(CRC_EXTRA, streaming=streaming, stats=self._stats)
+        self._sequence.reset()
+
+    def follow_vehicle_time(
+        self, loop: LockstepEventLoop, answer: Callable[[int], None]
+    ) -> LockstepClient:
+        """From now on hold what arrives until the vehicle closes its step."""
+        self.lockstep = LockstepClient(loop, self._process, self._deliver, answer)
+        return self.lockstep
+
+    def receive(self, data: bytes, received_ns: int) -> bool:
+        """Take bytes from the transport; true if a frame in them was accepted."""
+        accepted = False
+        for frame in self._scanner.feed(data):
+            if not self._admit(frame):
+                continue
+            accepted = True
+            if self.lockstep is None:
+                sample = self._pass_on(frame, received_ns)
+                if sample is not None:
+                    self._control(sample)
+            elif frame.message_id == SYSTEM_TIME:
+                self.lockstep.beacon(decode_system_time(frame.payload))
+            else:
+                self._held.append((frame, received_ns))
+        return accepted
+
+    def _admit(self, frame: Frame) -> bool:
+        stats = self._stats
+        if (frame.system, frame.component) != self._source:
+            stats.ignored_foreign += 1
+            return False
+        if self._signing is not None and not self._signing.accepts(frame):
+            stats.bad_signature += 1
+            if not self._signature_said:
+                self._signature_said = True
+                _LOG.warning(
+                    "the vehicle's frames are not signed with our key and are refused; give both "
+                    "sides the same key, or leave signing out on both"
+                )
+            return False
+        missing = self._sequence.missing(frame.sequence)
+        if missing < 0:
+            stats.repeated += 1
+        else:
+            stats.lost += missing
+        stats.frames += 1
+        stats.by_message[frame.message_id] = stats.by_message.get(frame.message_id, 0) + 1
+        return True
+
+    def _pass_on(self, frame: Frame, received_ns: int) -> AttitudeSample | None:
+        now = self._loop.time()
+        if self._tap is not None:
+            self._tap(now, frame.raw)
+        self._router.route(frame.message_id, frame.payload)
+        if frame.message_id != ATTITUDE_QUATERNION:
+            return None
+        decoded = decode_attitude(frame.payload)
+        if decoded is None:
+            self._stats.non_finite += 1
+            return None
+        time_boot_ms, q, rates = decoded
+        return AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
+
+    def _control(self, sample: AttitudeSample) -> None:
+        if self.on_attitude is not None:
+            self._router.guard(self.on_attitude, sample)
+
+    def _process(self) -> None:
+        held, self._held = self._held, []
+        for frame, received_ns in held:
+            sample = self._pass_on(frame, received_ns)
+            if sample is not None:
+                self._samples.append(sample)
+
+    def _deliver(self) -> None:
+        samples, self._samples = self._samples, []
+        for sample in samples:
+            self._control(sample)

@@ -1,0 +1,365 @@
+"""One vehicle, one connection: everything the rest of the program says and hears goes here."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from typing import Any
+
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.attitude.types import BodyRates
+from companion.mavlink.codec import Message, message_id
+from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
+from companion.mavlink.commands import CommandClient
+from companion.mavlink.endpoint import parse_endpoint
+from companion.mavlink.errors import EndpointError, LinkError, LinkTimeout, NotConnected
+from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.inbox import Inbox
+from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.opening import open_transport
+from companion.mavlink.outbox import Outbox
+from companion.mavlink.parameters import ParameterClient
+from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.router import Router, Unsubscribe
+from companion.mavlink.samples import AttitudeSample
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.state import Heartbeat, VehicleState
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.streams import StreamRate, measure, set_rates
+from companion.mavlink.texts import TextAssembler
+from companion.mavlink.timesync import TimeSync
+from companion.mavlink.transport import Tap
+
+_LOG = logging.getLogger(__name__)
+
+_MAV_AUTOPILOT_INVALID = 8
+_MAV_STATE_ACTIVE = 4
+_TIMESYNC_FIRST = 10  # requests at ten a second, for a good offset within the first second
+_BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
+
+
+class Link:
+    """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
+
+    It sends a heartbeat, keeps the clocks compared and opens a dropped connection again. It never
+    repeats a setpoint: each one leaves because `send_setpoint` was called.
+
+    Args:
+        settings: Where the vehicle is and who we are.
+        tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+
+    Attributes:
+        stats: Counters.
+        state: What is known of the vehicle.
+        timesync: Clock offset, round trip, age of a sample.
+
+    Raises:
+        EndpointError: The endpoint's notation is wrong.
+        LinkError: Lockstep is asked for on another event loop than its own.
+    """
+
+    def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
+        self._endpoint = parse_endpoint(settings.endpoint)
+        self._loop = asyncio.get_running_loop()
+        self._registry = PendingRegistry()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._closing = False
+        self.settings = settings
+        self.stats = LinkStats()
+        texts = TextAssembler()
+        self._router = router = Router(self.stats)
+        self._inbox = Inbox(settings, self.stats, router, tap)
+        self._outbox = outbox = Outbox(settings, self.stats, tap)
+        self.state = VehicleState(router, self.stats, texts, self._loop.time)
+        self.timesync = TimeSync(outbox, router, self._loop.time)
+        self._commands = CommandClient(settings, outbox, router, self._registry, texts)
+        self._parameters = ParameterClient(settings, outbox, router, self._registry)
+        self._lockstep: LockstepClient | None = None
+        if settings.lockstep:
+            if not isinstance(self._loop, LockstepEventLoop):
+                raise LinkError("lockstep needs the event loop of companion.mavlink.lockstep.run")
+            self._lockstep = self._inbox.follow_vehicle_time(self._loop, outbox.close_step)
+
+    # --- lifetime
+
+    async def __aenter__(self) -> "Link":
+        await self._open()
+        try:
+            if self._lockstep is not None:
+                await self._first_beacon(self._lockstep)
+        except BaseException:
+            await self.__aexit__()
+            raise
+        self._start(self._send_heartbeats())
+        self._start(self._synchronise())
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._closing = True
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks.clear()
+        self._registry.fail("closed by us")
+        if self._outbox.transport is not None:
+            self._outbox.transport.close()
+            self._outbox.transport = None
+
+    async def wait_connected(self, timeout_s: float) -> Heartbeat:
+        """Wait for the autopilot's heartbeat; return the newest at once if there was one.
+
+        Raises:
+            LinkTimeout: None came; the message says what did come.
+            UnsupportedAutopilot: It is none that we can fly.
+        """
+        with Pending[None](self._registry) as heard:
+            unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
+            try:
+                async with asyncio.timeout(timeout_s):
+                    while self.state.heartbeat is None:
+                        await heard.next(timeout_s)
+            except TimeoutError:
+                raise LinkTimeout(self._why_silent(timeout_s)) from None
+            finally:
+                unsubscribe()
+        if self.state.unsupported is not None:
+            raise self.state.unsupported
+        assert self.state.heartbeat is not None
+        self._parameters.bytewise = self.family.bytewise_parameters
+        return self.state.heartbeat
+
+    @property
+    def family(self) -> AutopilotFamily:
+        """How to speak to this autopilot. Raises `NotConnected` before its first heartbeat."""
+        if self.state.family is None:
+            raise NotConnected("no heartbeat yet; wait_connected() comes first")
+        return self.state.family
+
+    @property
+    def local_address(self) -> tuple[str, int] | None:
+        """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
+        return getattr(self._outbox.transport, "local", None)
+
+    # --- control
+
+    @property
+    def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
+        """Called with each attitude sample inside the read callback; what it raises is reported."""
+        return self._inbox.on_attitude
+
+    @on_attitude.setter
+    def on_attitude(self, callback: Callable[[AttitudeSample], None] | None) -> None:
+        self._inbox.on_attitude = callback
+
+    @property
+    def on_error(self) -> Callable[[Exception], None] | None:
+        """Called with what a callback raised; without it such errors go to the log."""
+        return self._router.on_error
+
+    @on_error.setter
+    def on_error(self, callback: Callable[[Exception], None] | None) -> None:
+        self._router.on_error = callback
+
+    def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
+        """Send body rates and thrust, once and now. It never blocks.
+
+        In lockstep a setpoint that answers the open step closes it, and so leaves last.
+
+        Args:
+            time_boot_ms: The stamp of the sample it answers, ms.
+            rates: rad/s about body x, y, z (FRD).
+            thrust: Collective thrust, 0..1.
+
+        Raises:
+            InvalidSetpoint: Not finite or out of range (`NonFiniteSetpoint`); nothing was sent.
+        """
+        if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
+            self._outbox.latch(time_boot_ms, rates, thrust)
+        else:
+            self._outbox.setpoint(time_boot_ms, rates, thrust)
+
+    # --- conversation
+
+    def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
+        """Call `callback` with each message of that name; call the result to end it.
+
+        Raises:
+            UnknownMessage: MAVLink common has no such message.
+        """
+        return self._router.subscribe(name, callback)
+
+    def send(self, message: Message) -> bool:
+        """Send any pymavlink message now; false if it could not leave."""
+        return self._outbox.message(message)
+
+    async def command(
+        self,
+        command: int,
+        *params: float,
+        timeout_s: float = 1.0,
+        retries: int = 3,
+    ) -> None:
+        """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
+
+        Raises:
+            CommandRefused: With the result and the autopilot's own words.
+            CommandTimeout: No answer after `retries` repetitions.
+            LinkLost: The connection dropped meanwhile.
+        """
+        await self._commands.send(command, params, timeout_s, retries)
+
+    async def request_message(self, name: str, *, timeout_s: float = 1.0) -> Message:
+        """Ask once for a message and return it.
+
+        Raises:
+            UnknownMessage: MAVLink common has no such message.
+            CommandRefused: The autopilot does not give it.
+            LinkTimeout: It was promised but did not come.
+            LinkLost: The connection dropped meanwhile.
+        """
+        with Pending[Message](self._registry) as answers:
+            unsubscribe = self._router.subscribe(name, answers.put)
+            try:
+                await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
+                return await answers.next(timeout_s)
+            except TimeoutError:
+                raise LinkTimeout(f"{name} was promised but did not come") from None
+            finally:
+                unsubscribe()
+
+    async def read_parameter(
+        self, name: str, *, timeout_s: float = 1.0, retries: int = 3
+    ) -> float | int:
+        """Read a parameter of the autopilot.
+
+        Raises:
+            UnknownParameter: It has none of that name.
+            LinkLost: The connection dropped meanwhile.
+        """
+        return await self._parameters.read(name, timeout_s, retries)
+
+    async def write_parameter(
+        self, name: str, value: float, *, timeout_s: float = 1.0, retries: int = 3
+    ) -> float | int:
+        """Write a parameter, in its own type, and return what the autopilot then holds.
+
+        Raises:
+            UnknownParameter: It has none of that name.
+            ParameterRefused: It cannot hold that value, or keeps another.
+            LinkLost: The connection dropped meanwhile.
+        """
+        return await self._parameters.write(name, value, timeout_s, retries)
+
+    async def set_rates(
+        self, rates: Mapping[str, float], *, window_s: float = 1.0
+    ) -> dict[str, StreamRate]:
+        """Ask for message rates in Hz (0 stops one) and count what comes for `window_s`.
+
+        Raises:
+            UnknownMessage: A name is not in MAVLink common; nothing was sent then.
+            CommandTimeout: The autopilot did not answer a request.
+            LinkLost: The connection dropped meanwhile.
+        """
+        return await set_rates(self._commands, self.stats, rates, window_s)
+
+    async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:
+        """Rates in Hz at which messages arrive, counted over `window_s`."""
+        return await measure(self.stats, names, window_s)
+
+    # --- inside
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(work)
+        self._tasks.append(task)
+        task.add_done_callback(self._tasks_done)
+
+    def _tasks_done(self, task: asyncio.Task[None]) -> None:
+        if task in self._tasks:
+            self._tasks.remove(task)
+        if not task.cancelled() and task.exception() is not None:
+            _LOG.error("a task of the link failed", exc_info=task.exception())
+
+    async def _open(self) -> None:
+        transport = await open_transport(self._endpoint, self._inbox.receive, self._on_lost)
+        self._inbox.connect(streaming=transport.streaming)
+        self._outbox.transport = transport
+
+    def _on_lost(self, reason: str) -> None:
+        _LOG.warning("link lost: %s", reason)
+        transport = self._outbox.transport
+        self._registry.fail(reason)
+        self.timesync.reset()
+        self._inbox.connect(streaming=True)
+        if transport is not None and transport.reconnects and not self._closing:
+            transport.close()
+            self._outbox.transport = None
+            self._start(self._reopen())
+        else:
+            self.stats.reconnects += 1
+
+    async def _reopen(self) -> None:
+        pause = _BACKOFF_FIRST_S
+        while True:
+            await asyncio.sleep(pause)
+            try:
+                await self._open()
+            except EndpointError as error:
+                _LOG.info("not yet back: %s", error)
+                pause = min(2.0 * pause, _BACKOFF_MAX_S)
+            else:
+                self.stats.reconnects += 1
+                _LOG.info("link is back")
+                return
+
+    async def _first_beacon(self, lockstep: LockstepClient) -> None:
+        timeout_s = self.settings.first_beacon_timeout_s
+        self._heartbeat()  # a vehicle that waits to be spoken to hears us by this
+        try:
+            async with asyncio.timeout(timeout_s):
+                await lockstep.first_beacon
+        except TimeoutError:
+            raise LinkTimeout(
+                f"no lockstep beacon within {timeout_s:g} s on {self.settings.endpoint}; is the "
+                "vehicle running, in lockstep, and sending to this port?"
+            ) from None
+
+    def _why_silent(self, timeout_s: float) -> str:
+        start = f"no heartbeat from system {self.settings.target_system} within {timeout_s:g} s"
+        if self.stats.ignored_foreign:
+            return (
+                f"{start}, but {self.stats.ignored_foreign} frames from other systems or "
+                "components; is the target's system id right?"
+            )
+        if self.stats.bad_signature:
+            return f"{start}, but {self.stats.bad_signature} frames not signed with our key"
+        if self.stats.bad_crc:
+            return f"{start}, but {self.stats.bad_crc} damaged frames; is the baud rate right?"
+        return (
+            f"{start} on {self.settings.endpoint}; is the vehicle running and sending to this "
+            "address?"
+        )
+
+    def _heartbeat(self) -> None:
+        self.send(
+            dialect.MAVLink_heartbeat_message(
+                type=self.settings.heartbeat_type,
+                autopilot=_MAV_AUTOPILOT_INVALID,
+                base_mode=0,
+                custom_mode=0,
+                system_status=_MAV_STATE_ACTIVE,
+                mavlink_version=3,
+            )
+        )
+
+    async def _send_heartbeats(self) -> None:
+        while True:
+            self._heartbeat()
+            await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
+
+    async def _synchronise(self) -> None:
+        for _ in range(_TIMESYNC_FIRST):
+            self.timesync.ask()
+            await asyncio.sleep(0.1)
+        while True:
+            self.timesync.ask()
+            await asyncio.sleep(1.0)

@@ -1,0 +1,174 @@
+"""Flying on vehicle time: an event loop whose clock the vehicle moves, step by step.
+
+The vehicle ends each of its steps with a beacon, SYSTEM_TIME(time_boot_ms = t), and waits for our
+answer. Between beacon and answer everything that is due on our side runs, in vehicle time; then
+the answer goes out as the last datagram of the step. Nothing depends on how fast either side is,
+so a flight is the same to the bit each time, and as fast as both can compute.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any, TypeVar
+
+from companion.mavlink.loop import HotSelector, LinkEventLoop, Ready
+
+T = TypeVar("T")
+
+PATIENCE_S = 2.0
+"""Wall time without any I/O after which the vehicle counts as gone and time goes on without it."""
+
+_MAX_ITERATIONS = 200  # of the loop in one settling; a task that never rests may not stop the world
+
+
+class _VehicleClock:
+    """Wall time until the vehicle speaks, vehicle time from then on."""
+
+    def __init__(self) -> None:
+        self._wall_start = time.monotonic()
+        self._waiting_since = self._wall_start
+        self._vehicle: float | None = None
+        self._offset = 0.0  # stays 0 unless the vehicle went away or started anew in between
+
+    def read(self) -> float:
+        if self._vehicle is None:
+            return time.monotonic() - self._wall_start
+        return self._vehicle + self._offset
+
+    def advance(self, vehicle_time: float) -> bool:
+        """Set vehicle time; false for a repeated beacon."""
+        if self._vehicle is not None and vehicle_time <= self._vehicle:
+            if self._vehicle - vehicle_time < 1.0:
+                return False
+            # The vehicle started anew. Our time does not go back; its time counts from here.
+            self._offset += self._vehicle - vehicle_time
+        self._vehicle = vehicle_time
+        return True
+
+    def start_waiting(self) -> None:
+        """The vehicle's turn begins now."""
+        self._waiting_since = time.monotonic()
+
+    def patience(self) -> float | None:
+        """Wall time in s that is left to the vehicle; `None` before its first beacon."""
+        if self._vehicle is None:
+            return None
+        return max(0.0, self._waiting_since + PATIENCE_S - time.monotonic())
+
+    def go_on_alone(self) -> None:
+        """The vehicle let its time pass: timeouts on our side must still end."""
+        self._offset += PATIENCE_S
+        self.start_waiting()
+
+
+class _SteppingSelector(HotSelector):
+    """Tells when the loop has nothing left to do, and never lets a timer wait on the wall clock."""
+
+    def __init__(self, clock: _VehicleClock) -> None:
+        super().__init__()
+        self._clock = clock
+        self._when_idle: Callable[[], None] | None = None
+        self._iterations = 0
+
+    def settle(self, then: Callable[[], None]) -> None:
+        """Call `then` once nothing on the loop is ready any more; no I/O happens before."""
+        self._when_idle, self._iterations = then, 0
+
+    def select(self, timeout: float | None = None) -> Ready:
+        if self._when_idle is not None:
+            # The loop polls with timeout 0 exactly when callbacks or timers are ready.
+            self._iterations += 1
+            if timeout != 0 or self._iterations > _MAX_ITERATIONS:
+                then, self._when_idle = self._when_idle, None
+                then()
+                self._clock.start_waiting()
+            return []
+        left = None if timeout == 0 else self._clock.patience()
+        if left is None:
+            return super().select(timeout)
+        ready = super().select(left)
+        if self._when_idle is None and self._clock.patience() == 0.0:
+            self._clock.go_on_alone()
+        return ready
+
+
+class LockstepEventLoop(LinkEventLoop):
+    """An event loop in vehicle time: `time()` moves only by `advance`.
+
+    Before the first beacon, and when nothing has been heard for 2 s of wall time, it runs on wall
+    time, so that waiting for a vehicle that is not there ends by the usual timeouts.
+    """
+
+    def __init__(self) -> None:
+        self._clock = _VehicleClock()
+        self._stepping = _SteppingSelector(self._clock)
+        super().__init__(self._stepping)
+
+    def time(self) -> float:
+        """Vehicle time in s."""
+        return self._clock.read()
+
+    def advance(self, vehicle_time: float) -> bool:
+        """Move the clock to a beacon's time; false if that beacon was seen before."""
+        return self._clock.advance(vehicle_time)
+
+    def settle(self, then: Callable[[], None]) -> None:
+        """Run all that is ready and due, without any I/O, and then `then`."""
+        self._stepping.settle(then)
+
+
+def run(main: Coroutine[Any, Any, T]) -> T:
+    """Like `asyncio.run`, in vehicle time."""
+    with asyncio.Runner(loop_factory=LockstepEventLoop) as runner:
+        return runner.run(main)
+
+
+class LockstepClient:
+    """Our half of the strict alternation.
+
+    Args:
+        loop: The loop to drive.
+        process: Handles one step's frames, in order, after the clock was moved.
+        deliver: Hands the step's attitude sample, if any, to whoever controls.
+        answer: Sends what closes the step `time_boot_ms`.
+    """
+
+    def __init__(
+        self,
+        loop: LockstepEventLoop,
+        process: Callable[[], None],
+        deliver: Callable[[], None],
+        answer: Callable[[int], None],
+    ) -> None:
+        self._loop = loop
+        self._process, self._deliver, self._answer = process, deliver, answer
+        self._step_ms: int | None = None
+        self.first_beacon: asyncio.Future[None] = loop.create_future()
+
+    @property
+    def step_ms(self) -> int | None:
+        """Vehicle time in ms of the step that is open, `None` while the vehicle has its turn."""
+        return self._step_ms
+
+    def beacon(self, time_boot_ms: int) -> None:
+        """Take a beacon: start the step, or answer again if that answer got lost."""
+        if self._step_ms is not None:
+            return  # repeated while we are still at it; the answer is on its way
+        if not self._loop.advance(time_boot_ms / 1000.0):
+            self._answer(time_boot_ms)
+            return
+        self._step_ms = time_boot_ms
+        if not self.first_beacon.done():
+            self.first_beacon.set_result(None)
+        self._process()
+        self._loop.settle(self._after_tasks)
+
+    def _after_tasks(self) -> None:
+        self._deliver()
+        # Once more, so that what the control loop set off is sent before the step is closed.
+        self._loop.settle(self._close)
+
+    def _close(self) -> None:
+        step, self._step_ms = self._step_ms, None
+        if step is not None:
+            self._answer(step)

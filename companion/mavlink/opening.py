@@ -1,0 +1,38 @@
+"""From an endpoint's notation to an open transport."""
+
+from companion.mavlink.endpoint import (
+    Endpoint,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpIn,
+    UdpOut,
+    parse_endpoint,
+)
+from companion.mavlink.serial_port import SerialTransport
+from companion.mavlink.tcp import open_tcp_client, open_tcp_server
+from companion.mavlink.transport import Lost, Receive, Transport
+from companion.mavlink.udp import open_udp
+
+
+async def open_transport(endpoint: str | Endpoint, receive: Receive, lost: Lost) -> Transport:
+    """Open what the endpoint describes.
+
+    Args:
+        endpoint: A parsed endpoint or its notation.
+        receive: Called for all bytes that arrive.
+        lost: Called once if an open connection drops; never for UDP, nor after `close`.
+
+    Raises:
+        EndpointError: With the reason and how to mend it.
+    """
+    where = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
+    match where:
+        case UdpIn() | UdpOut():
+            return await open_udp(where, receive)
+        case TcpClient():
+            return await open_tcp_client(where, receive, lost)
+        case TcpServer():
+            return await open_tcp_server(where, receive, lost)
+        case SerialPort():
+            return SerialTransport(where, receive, lost)

@@ -1,0 +1,85 @@
+"""What leaves: numbered, signed, sent at once or not at all."""
+
+import asyncio
+
+from companion.attitude.types import BodyRates
+from companion.mavlink.codec import (
+    CRC_EXTRA,
+    SYSTEM_TIME,
+    Message,
+    SetpointEncoder,
+    encode,
+    encode_system_time,
+)
+from companion.mavlink.framing import build_frame
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.transport import Tap, Transport
+
+
+class Outbox:
+    """Numbers, signs and sends frames. It keeps nothing: what cannot leave now is dropped."""
+
+    def __init__(self, settings: LinkSettings, stats: LinkStats, tap: Tap | None) -> None:
+        self._settings, self._stats, self._tap = settings, stats, tap
+        self._signing = settings.signing
+        self._loop = asyncio.get_running_loop()
+        self._sequence = 0
+        self._setpoints = SetpointEncoder(
+            settings.source_system,
+            settings.source_component,
+            settings.target_system,
+            settings.target_component,
+            signed=settings.signing is not None,
+        )
+        self._latched: tuple[int, BodyRates, float] | None = None
+        self.transport: Transport | None = None
+
+    def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
+        """Send SET_ATTITUDE_TARGET now. Raises `InvalidSetpoint` before anything is sent."""
+        frame = self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust)
+        self._send(frame)
+
+    def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
+        """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""
+        self._setpoints.check(time_boot_ms, rates, thrust)
+        self._latched = (time_boot_ms, rates, thrust)
+
+    def close_step(self, time_boot_ms: int) -> None:
+        """End a lockstep step by its setpoint, or by a SYSTEM_TIME that is not recorded."""
+        latched, self._latched = self._latched, None
+        if latched is not None:
+            self.setpoint(*latched)
+        else:
+            self._send(self._frame(SYSTEM_TIME, encode_system_time(time_boot_ms)), record=False)
+
+    def message(self, message: Message) -> bool:
+        """Send a pymavlink message; false if it could not leave."""
+        return self.payload(message.id, encode(message))
+
+    def payload(self, message_id: int, payload: bytes) -> bool:
+        """Send a message given by its payload; false if it could not leave."""
+        return self._send(self._frame(message_id, payload))
+
+    def _frame(self, message_id: int, payload: bytes) -> bytes:
+        return build_frame(
+            message_id,
+            payload,
+            CRC_EXTRA[message_id],
+            sequence=self._sequence,
+            system=self._settings.source_system,
+            component=self._settings.source_component,
+            signed=self._signing is not None,
+        )
+
+    def _send(self, frame: bytes, *, record: bool = True) -> bool:
+        if self._signing is not None:
+            frame = self._signing.sign(frame)
+        self._sequence = (self._sequence + 1) & 0xFF
+        if self.transport is None or not self.transport.send(frame):
+            self._stats.not_sent += 1
+            return False
+        self._stats.sent += 1
+        if self._tap is not None and record:
+            self._tap(self._loop.time(), frame)
+        return True

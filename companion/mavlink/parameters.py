@@ -1,0 +1,174 @@
+"""The PARAM protocol. Source: the MAVLink parameter protocol.
+
+PX4 sends integers bytewise: the four bytes of the float field hold the integer itself. Many such
+patterns are NaNs that a float would not carry faithfully, so the field is handled as bytes here.
+"""
+
+import asyncio
+import struct
+from math import isfinite
+from typing import NamedTuple
+
+from companion.mavlink.codec import MESSAGE_IDS, Message
+from companion.mavlink.errors import ParameterRefused, UnknownParameter
+from companion.mavlink.outbox import Outbox
+from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.router import Router
+from companion.mavlink.settings import LinkSettings
+
+_VALUE = struct.Struct("<4sHH16sB")
+_SET = struct.Struct("<4sBB16sB")
+_READ = struct.Struct("<hBB16s")
+_BY_NAME = -1
+_MAX_NAME = 16
+
+_REAL32 = 9
+_INTEGERS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
+_ERRORS = {
+    1: "the autopilot has no such parameter",
+    2: "the value is out of range",
+    3: "the parameter is read-only or may not be changed now",
+    4: "the autopilot has no such component",
+    5: "the parameter is read-only",
+}
+
+
+class _Value(NamedTuple):
+    raw: bytes
+    kind: int
+
+
+class _Refusal(NamedTuple):
+    code: int
+
+
+class ParameterClient:
+    """Reads and writes single parameters.
+
+    Attributes:
+        bytewise: Integers travel as bytes (PX4) rather than as a number in a float (ArduPilot).
+    """
+
+    def __init__(
+        self, settings: LinkSettings, outbox: Outbox, router: Router, registry: PendingRegistry
+    ) -> None:
+        self._settings, self._outbox, self._registry = settings, outbox, registry
+        self._waiting: dict[str, Pending[_Value | _Refusal]] = {}
+        self._locks: dict[str, asyncio.Lock] = {}
+        self.bytewise = True
+        router.subscribe_raw("PARAM_VALUE", self._on_value)
+        router.subscribe("PARAM_ERROR", self._on_error)
+
+    async def read(self, name: str, timeout_s: float, retries: int) -> float | int:
+        """Read one.
+
+        Raises:
+            UnknownParameter: The autopilot says so, or never answers.
+            LinkLost: The connection dropped meanwhile.
+        """
+        self._check(name)
+        async with self._locks.setdefault(name, asyncio.Lock()):
+            return self._number(await self._ask(name, timeout_s, retries))
+
+    async def write(self, name: str, value: float, timeout_s: float, retries: int) -> float | int:
+        """Write one, in the type that the autopilot has for it; return what it then holds.
+
+        Raises:
+            UnknownParameter: As for `read`.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another.
+            LinkLost: The connection dropped meanwhile.
+        """
+        self._check(name)
+        async with self._locks.setdefault(name, asyncio.Lock()):
+            kind = (await self._ask(name, timeout_s, retries)).kind
+            wanted = _Value(self._bytes(name, value, kind), kind)
+            payload = _SET.pack(
+                wanted.raw,
+                self._settings.target_system,
+                self._settings.target_component,
+                name.encode(),
+                kind,
+            )
+            held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
+            if held != wanted:
+                raise ParameterRefused(
+                    f"{name}: the autopilot keeps {self._number(held)} instead of {value}"
+                )
+            return self._number(held)
+
+    async def _ask(self, name: str, timeout_s: float, retries: int) -> _Value:
+        payload = _READ.pack(
+            _BY_NAME,
+            self._settings.target_system,
+            self._settings.target_component,
+            name.encode(),
+        )
+        return await self._exchange("PARAM_REQUEST_READ", payload, name, timeout_s, retries)
+
+    async def _exchange(
+        self, message: str, payload: bytes, name: str, timeout_s: float, retries: int
+    ) -> _Value:
+        with Pending[_Value | _Refusal](self._registry) as answers:
+            self._waiting[name] = answers
+            try:
+                for _ in range(retries + 1):
+                    self._outbox.payload(MESSAGE_IDS[message], payload)
+                    try:
+                        answer = await answers.next(timeout_s)
+                    except TimeoutError:
+                        continue
+                    if isinstance(answer, _Refusal):
+                        raise _refused(name, answer.code)
+                    return answer
+            finally:
+                del self._waiting[name]
+        raise UnknownParameter(
+            f"{name}: no answer after {retries + 1} tries of {timeout_s:g} s; the autopilot "
+            "probably has no parameter of that name (names change between versions)"
+        )
+
+    def _check(self, name: str) -> None:
+        if not (0 < len(name) <= _MAX_NAME and name.isascii()):
+            raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
+
+    def _number(self, value: _Value) -> float | int:
+        if self.bytewise and value.kind in _INTEGERS:
+            integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
+            return integer
+        number: float = struct.unpack("<f", value.raw)[0]
+        return int(number) if value.kind in _INTEGERS else number
+
+    def _bytes(self, name: str, value: float, kind: int) -> bytes:
+        if not isfinite(value):
+            raise ParameterRefused(f"{name} cannot hold {value}")
+        try:
+            if kind not in _INTEGERS:
+                return struct.pack("<f", value)
+            if value != int(value):
+                raise ParameterRefused(f"{name} is an integer and cannot hold {value}")
+            # Packed either way, so that the range of the integer type is checked either way.
+            packed = struct.pack(_INTEGERS[kind], int(value))
+            return packed if self.bytewise else struct.pack("<f", value)
+        except (struct.error, OverflowError, ValueError) as error:
+            raise ParameterRefused(f"{name} cannot hold {value}: {error}") from error
+
+    def _on_value(self, payload: bytes) -> None:
+        raw, _, _, name, kind = _VALUE.unpack_from(payload.ljust(_VALUE.size, b"\0"))
+        answers = self._waiting.get(_text(name))
+        if answers is not None:
+            answers.put(_Value(raw, kind))
+
+    def _on_error(self, message: Message) -> None:
+        answers = self._waiting.get(message.param_id)
+        if answers is not None:
+            answers.put(_Refusal(message.error))
+
+
+def _refused(name: str, code: int) -> UnknownParameter | ParameterRefused:
+    reason = _ERRORS.get(code, f"error {code}")
+    kind = UnknownParameter if code == 1 else ParameterRefused
+    return kind(f"{name}: {reason}")
+
+
+def _text(raw: bytes) -> str:
+    return raw.split(b"\0", 1)[0].decode("ascii", errors="replace")

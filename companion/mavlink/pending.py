@@ -1,0 +1,68 @@
+"""Answers that are waited for; all of them end at once when the connection drops."""
+
+import asyncio
+from typing import Generic, TypeVar
+
+from companion.mavlink.errors import LinkLost
+
+T = TypeVar("T")
+
+
+class Pending(Generic[T]):
+    """A mailbox between a callback of the link and the task that waits for it.
+
+    Use as a context manager; answers that come before they are asked for are kept in order.
+    """
+
+    def __init__(self, registry: "PendingRegistry") -> None:
+        self._registry = registry
+        self._queue: asyncio.Queue[T | LinkLost] = asyncio.Queue()
+
+    def put(self, answer: T) -> None:
+        """Leave an answer."""
+        self._queue.put_nowait(answer)
+
+    def fail(self, error: LinkLost) -> None:
+        """End the waiting."""
+        self._queue.put_nowait(error)
+
+    async def next(self, timeout_s: float) -> T:
+        """Wait for the next answer.
+
+        Raises:
+            TimeoutError: None came in time.
+            LinkLost: The connection dropped.
+        """
+        async with asyncio.timeout(timeout_s):
+            answer = await self._queue.get()
+        if isinstance(answer, LinkLost):
+            raise answer
+        return answer
+
+    def __enter__(self) -> "Pending[T]":
+        self._registry.add(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._registry.discard(self)
+
+
+class PendingRegistry:
+    """All mailboxes of a link that somebody waits at."""
+
+    def __init__(self) -> None:
+        # A dict, not a set: failing in a fixed order keeps flights repeatable.
+        self._waiting: dict[int, Pending[object]] = {}
+
+    def add(self, pending: Pending[T]) -> None:
+        """Register one."""
+        self._waiting[id(pending)] = pending  # type: ignore[assignment]
+
+    def discard(self, pending: Pending[T]) -> None:
+        """Forget one."""
+        self._waiting.pop(id(pending), None)
+
+    def fail(self, reason: str) -> None:
+        """End all waiting with `LinkLost`."""
+        for pending in tuple(self._waiting.values()):
+            pending.fail(LinkLost(f"the link dropped while waiting for an answer ({reason})"))

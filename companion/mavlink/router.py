@@ -1,0 +1,84 @@
+"""Who wants to hear what: decoded messages or bare payloads, by message."""
+
+import logging
+from collections.abc import Callable
+from typing import TypeVar
+
+from companion.mavlink.codec import Message, decode, message_id
+from companion.mavlink.stats import LinkStats
+
+_LOG = logging.getLogger(__name__)
+
+T = TypeVar("T")
+C = TypeVar("C")
+
+Unsubscribe = Callable[[], None]
+
+
+class Router:
+    """Calls the subscribers of a message, synchronously, in the order of their subscription.
+
+    A message nobody subscribed to is never decoded. An exception in a subscriber is reported to
+    `on_error` (the log, if that is not set) and goes no further.
+    """
+
+    def __init__(self, stats: LinkStats) -> None:
+        self._stats = stats
+        self._decoded: dict[int, list[Callable[[Message], None]]] = {}
+        self._raw: dict[int, list[Callable[[bytes], None]]] = {}
+        self.on_error: Callable[[Exception], None] | None = None
+
+    def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
+        """Call `callback` with each decoded message of that name.
+
+        Raises:
+            UnknownMessage: MAVLink common has no such message.
+        """
+        return _add(self._decoded, message_id(name), callback)
+
+    def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
+        """Call `callback` with each payload of that message, trailing zeros cut."""
+        return _add(self._raw, message_id(name), callback)
+
+    def route(self, number: int, payload: bytes) -> None:
+        """Pass one message on."""
+        for raw_callback in tuple(self._raw.get(number, ())):
+            self.guard(raw_callback, payload)
+        callbacks = self._decoded.get(number)
+        if not callbacks:
+            return
+        try:
+            message = decode(number, payload)
+        except (ValueError, TypeError, UnicodeError):
+            self._stats.malformed += 1
+            return
+        for callback in tuple(callbacks):
+            self.guard(callback, message)
+
+    def guard(self, callback: Callable[[T], None], argument: T) -> None:
+        """Call back and report what it raises."""
+        try:
+            callback(argument)
+        except Exception as error:
+            self.report(error)
+
+    def report(self, error: Exception) -> None:
+        """Report an error in a callback."""
+        if self.on_error is None:
+            _LOG.error("a callback of the link failed", exc_info=error)
+            return
+        try:
+            self.on_error(error)
+        except Exception:
+            _LOG.exception("on_error of the link failed itself")
+
+
+def _add(table: dict[int, list[C]], number: int, callback: C) -> Unsubscribe:
+    callbacks = table.setdefault(number, [])
+    callbacks.append(callback)
+
+    def unsubscribe() -> None:
+        if callback in callbacks:
+            callbacks.remove(callback)
+
+    return unsubscribe

@@ -1,0 +1,112 @@
+"""MAVLink over a UART or USB device."""
+
+import asyncio
+import errno
+import os
+import time
+
+import serial
+
+from companion.mavlink.endpoint import SerialPort
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.loop import unwatch, watch
+from companion.mavlink.transport import Lost, Receive
+
+_READ_BYTES = 4096
+
+
+class SerialTransport:
+    """A serial port, read and written without blocking.
+
+    A frame is never cut short on the wire: when the driver takes only part of one, the rest
+    follows as soon as there is room, and frames that come meanwhile are dropped.
+
+    Raises:
+        EndpointError: The device is missing, in use, or not permitted.
+    """
+
+    streaming = True
+    reconnects = True
+
+    def __init__(self, endpoint: SerialPort, receive: Receive, lost: Lost) -> None:
+        self._receive, self._lost = receive, lost
+        self._loop = asyncio.get_running_loop()
+        self._unsent = b""
+        try:
+            self._port = serial.Serial(
+                endpoint.device, endpoint.baud, timeout=0, write_timeout=0, exclusive=True
+            )
+        except (OSError, ValueError) as error:  # SerialException is an OSError
+            raise EndpointError(_why(endpoint, error)) from error
+        self._fd: int = self._port.fileno()
+        watch(self._loop, self._fd, self._read)
+
+    def _read(self) -> None:
+        try:
+            data = os.read(self._fd, _READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._drop(f"serial device failed: {error.strerror}")
+            return
+        if not data:
+            self._drop("serial device is gone")
+            return
+        self._receive(data, time.perf_counter_ns())
+
+    def send(self, frame: bytes) -> bool:
+        """Write one frame; false if the device is gone or the last frame is not out yet."""
+        if self._fd < 0 or self._unsent:
+            return False
+        return self._write(frame)
+
+    def _write(self, data: bytes) -> bool:
+        try:
+            written = os.write(self._fd, data)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            # Not from inside send(): its caller may be in the middle of anything.
+            self._loop.call_soon(self._drop, f"serial device failed: {error.strerror}")
+            return False
+        if written < len(data):
+            self._unsent = data[written:]
+            self._loop.add_writer(self._fd, self._finish)
+        return True
+
+    def _finish(self) -> None:
+        try:
+            self._unsent = self._unsent[os.write(self._fd, self._unsent) :]
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._drop(f"serial device failed: {error.strerror}")
+            return
+        if not self._unsent:
+            self._loop.remove_writer(self._fd)
+
+    def _drop(self, reason: str) -> None:
+        if self._fd >= 0:
+            self.close()
+            self._lost(reason)
+
+    def close(self) -> None:
+        """Close the device; a frame cut short is discarded."""
+        if self._fd < 0:
+            return
+        unwatch(self._loop, self._fd)
+        self._loop.remove_writer(self._fd)
+        self._fd, self._unsent = -1, b""
+        self._port.close()
+
+
+def _why(endpoint: SerialPort, error: OSError | ValueError) -> str:
+    where = f"serial {endpoint.device}"
+    number = getattr(error, "errno", None)
+    if number == errno.ENOENT:
+        return f"{where}: there is no such device; is it plugged in? `ls /dev/serial/by-id` helps"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"{where}: not permitted; add yourself to its group: sudo adduser $USER dialout"
+    if number in (errno.EBUSY, errno.EAGAIN):
+        return f"{where}: in use by another program (a ground station?); end that first"
+    return f"{where} at {endpoint.baud} baud cannot be opened: {error}"

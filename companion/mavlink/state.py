@@ -1,0 +1,302 @@
+"""What is known of the vehicle, from its telemetry. Values that are not finite are never kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
+
+from companion.mavlink.codec import Message
+from companion.mavlink.errors import UnsupportedAutopilot
+from companion.mavlink.family import AutopilotFamily, family_for
+from companion.mavlink.readiness import Readiness
+from companion.mavlink.router import Router
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.texts import TextAssembler
+
+_ARMED = 128
+_UNKNOWN_U16 = 65535
+_AUTOPILOT_INVALID = 8
+_STATE_CRITICAL = 5
+_PREARM_CHECK = 0x10000000
+LANDED_ON_GROUND = 1
+LANDED_IN_AIR = 2
+LANDED_TAKEOFF = 3
+LANDED_LANDING = 4
+
+Vector = tuple[float, float, float]
+
+
+class Heartbeat(NamedTuple):
+    """HEARTBEAT of the autopilot.
+
+    Attributes:
+        received: Event-loop time, s.
+        autopilot: MAV_AUTOPILOT.
+        vehicle_type: MAV_TYPE.
+        mode: The mode's name in the words of its family.
+        custom_mode: The same as a number.
+        armed: Motors may turn.
+        system_status: MAV_STATE: 3 standby, 4 active, 5 critical (failsafe).
+    """
+
+    received: float
+    autopilot: int
+    vehicle_type: int
+    mode: str
+    custom_mode: int
+    armed: bool
+    system_status: int
+
+
+class LocalPosition(NamedTuple):
+    """LOCAL_POSITION_NED.
+
+    Attributes:
+        received: Event-loop time, s.
+        vehicle_time: The vehicle's time stamp, s since boot.
+        position_ned: m.
+        velocity_ned: m/s.
+    """
+
+    received: float
+    vehicle_time: float
+    position_ned: Vector
+    velocity_ned: Vector
+
+
+class Battery(NamedTuple):
+    """SYS_STATUS and BATTERY_STATUS; `None` where the vehicle does not know.
+
+    Attributes:
+        received: Event-loop time, s.
+        voltage_v: Of the whole battery, V.
+        remaining: 0..1.
+    """
+
+    received: float
+    voltage_v: float | None
+    remaining: float | None
+
+
+class Gps(NamedTuple):
+    """GPS_RAW_INT.
+
+    Attributes:
+        received: Event-loop time, s.
+        fix_type: GPS_FIX_TYPE; 3 or more is a 3D fix.
+        satellites: Number in use, `None` if not known.
+        altitude_m: Above mean sea level, m.
+    """
+
+    received: float
+    fix_type: int
+    satellites: int | None
+    altitude_m: float
+
+
+class Home(NamedTuple):
+    """HOME_POSITION.
+
+    Attributes:
+        received: Event-loop time, s.
+        latitude_deg: WGS84.
+        longitude_deg: WGS84.
+        altitude_m: Above mean sea level, m.
+        down: In the local frame of LOCAL_POSITION_NED, m.
+    """
+
+    received: float
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    down: float
+
+
+class Estimator(NamedTuple):
+    """ESTIMATOR_STATUS.
+
+    Attributes:
+        received: Event-loop time, s.
+        flags: ESTIMATOR_STATUS_FLAGS.
+    """
+
+    received: float
+    flags: int
+
+
+@dataclass
+class _Values:
+    heartbeat: Heartbeat | None = None
+    landed_state: int | None = None
+    position: LocalPosition | None = None
+    battery: Battery | None = None
+    gps: Gps | None = None
+    home: Home | None = None
+    estimator: Estimator | None = None
+    prearm_good: bool | None = None
+    reset_counter: int | None = None
+
+
+class VehicleState(_Values):
+    """The newest of each, `None` until it came; stamped with the time of arrival.
+
+    Attributes:
+        heartbeat: See `Heartbeat`.
+        landed_state: MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing.
+        position: See `LocalPosition`.
+        battery: See `Battery`.
+        gps: See `Gps`.
+        home: See `Home`.
+        estimator: See `Estimator`.
+        prearm_good: SYS_STATUS: whether the autopilot's own pre-arm checks pass.
+        reset_counter: ODOMETRY: rises whenever the estimator jumps.
+        family: The autopilot's family, once its first heartbeat was heard.
+        unsupported: The error to raise if it has none.
+        texts: What it said, newest last.
+    """
+
+    def __init__(
+        self, router: Router, stats: LinkStats, texts: TextAssembler, clock: Callable[[], float]
+    ) -> None:
+        super().__init__()
+        self._stats, self._assembler, self._clock = stats, texts, clock
+        self.texts = texts.texts
+        self.family: AutopilotFamily | None = None
+        self.unsupported: UnsupportedAutopilot | None = None
+        for name, callback in {
+            "HEARTBEAT": self._on_heartbeat,
+            "EXTENDED_SYS_STATE": self._on_extended_sys_state,
+            "LOCAL_POSITION_NED": self._on_local_position,
+            "SYS_STATUS": self._on_sys_status,
+            "BATTERY_STATUS": self._on_battery,
+            "GPS_RAW_INT": self._on_gps,
+            "HOME_POSITION": self._on_home,
+            "ESTIMATOR_STATUS": self._on_estimator,
+            "ODOMETRY": self._on_odometry,
+            "STATUSTEXT": self._on_text,
+        }.items():
+            router.subscribe(name, callback)
+
+    @property
+    def mode(self) -> str | None:
+        """Name of the present mode."""
+        return self.heartbeat.mode if self.heartbeat else None
+
+    @property
+    def armed(self) -> bool | None:
+        """Whether the motors may turn."""
+        return self.heartbeat.armed if self.heartbeat else None
+
+    @property
+    def failsafe(self) -> bool:
+        """Whether the autopilot says that it is in a failsafe."""
+        return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
+
+    @property
+    def landed(self) -> bool:
+        """Whether the autopilot says that it stands on the ground; unknown is not landed."""
+        return self.landed_state == LANDED_ON_GROUND
+
+    @property
+    def height(self) -> float | None:
+        """Height above home, m."""
+        if self.position is None or self.home is None:
+            return None
+        return self.home.down - self.position.position_ned[2]
+
+    @property
+    def readiness(self) -> Readiness:
+        """What the family judges before arming."""
+        return Readiness(
+            self.prearm_good,
+            self.estimator.flags if self.estimator else None,
+            self.position is not None,
+            self.home is not None,
+        )
+
+    @property
+    def position_ned(self) -> Vector | None:
+        """Newest position, m."""
+        return self.position.position_ned if self.position else None
+
+    @property
+    def velocity_ned(self) -> Vector | None:
+        """Newest velocity, m/s."""
+        return self.position.velocity_ned if self.position else None
+
+    def _on_heartbeat(self, message: Message) -> None:
+        if message.autopilot == _AUTOPILOT_INVALID:
+            return  # some other part of the vehicle, under the autopilot's own id
+        if self.family is None or self.family.autopilot != message.autopilot:
+            try:
+                self.family, self.unsupported = family_for(message.autopilot), None
+            except UnsupportedAutopilot as error:
+                self.family, self.unsupported = None, error
+        mode = str(message.custom_mode)
+        if self.family is not None:
+            mode = self.family.mode_name(message.custom_mode)
+        self.heartbeat = Heartbeat(
+            self._clock(),
+            message.autopilot,
+            message.type,
+            mode,
+            message.custom_mode,
+            bool(message.base_mode & _ARMED),
+            message.system_status,
+        )
+
+    def _on_extended_sys_state(self, message: Message) -> None:
+        self.landed_state = message.landed_state
+
+    def _on_local_position(self, message: Message) -> None:
+        values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
+        if not all(map(isfinite, values)):
+            self._stats.non_finite += 1
+            return
+        stamp = message.time_boot_ms / 1000.0
+        self.position = LocalPosition(self._clock(), stamp, values[:3], values[3:])
+
+    def _on_sys_status(self, message: Message) -> None:
+        millivolts = message.voltage_battery
+        self._take_battery(
+            None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
+        )
+
+        self.prearm_good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
+
+    def _on_odometry(self, message: Message) -> None:
+        self.reset_counter = message.reset_counter
+
+    def _on_battery(self, message: Message) -> None:
+        if message.id != 0:
+            return
+        # A battery without known cells reports its whole voltage in parts of 65534 mV.
+        cells = [cell for cell in message.voltages if cell != _UNKNOWN_U16]
+        self._take_battery(sum(cells) / 1000.0 if cells else None, message.battery_remaining)
+
+    def _take_battery(self, voltage_v: float | None, percent: int) -> None:
+        remaining = None if percent < 0 else percent / 100.0
+        self.battery = Battery(self._clock(), voltage_v, remaining)
+
+    def _on_gps(self, message: Message) -> None:
+        seen = message.satellites_visible
+        satellites = None if seen == 255 else seen
+        self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
+
+    def _on_home(self, message: Message) -> None:
+        if not isfinite(message.z):
+            self._stats.non_finite += 1
+            return
+        self.home = Home(
+            self._clock(),
+            message.latitude / 1e7,
+            message.longitude / 1e7,
+            message.altitude / 1000.0,
+            message.z,
+        )
+
+    def _on_estimator(self, message: Message) -> None:
+        self.estimator = Estimator(self._clock(), message.flags)
+
+    def _on_text(self, message: Message) -> None:
+        self._assembler.take(message, self._clock())

@@ -1,0 +1,60 @@
+"""Counters of a link, and the bookkeeping of sequence numbers."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass
+class LinkStats:
+    """What a link has seen so far. All but the last count frames.
+
+    Attributes:
+        frames: Accepted from the vehicle.
+        lost: Missing in the vehicle's running numbers.
+        repeated: Came twice or late.
+        bad_crc: Candidates with a wrong checksum.
+        unknown: Of messages the dialect does not know.
+        bad_signature: Unsigned, wrongly signed or replayed while signing is on.
+        ignored_foreign: From systems or components we do not listen to.
+        non_finite: Messages refused for a NaN or infinity.
+        malformed: Messages whose fields make no sense.
+        sent: Handed to the kernel.
+        not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
+        reconnects: How often the connection was opened again.
+        by_message: Accepted frames for each message id.
+    """
+
+    frames: int = 0
+    lost: int = 0
+    repeated: int = 0
+    bad_crc: int = 0
+    unknown: int = 0
+    bad_signature: int = 0
+    ignored_foreign: int = 0
+    non_finite: int = 0
+    malformed: int = 0
+    sent: int = 0
+    not_sent: int = 0
+    reconnects: int = 0
+    by_message: dict[int, int] = field(default_factory=dict)
+
+
+class SequenceTracker:
+    """Counts the gaps in one sender's running numbers (0..255, wrapping)."""
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+
+    def missing(self, sequence: int) -> int:
+        """Frames missing before this one; -1 if it came twice or late (by up to 127)."""
+        if self._last is None:
+            self._last = sequence
+            return 0
+        step = (sequence - self._last) & 0xFF
+        if step == 0 or step > 128:
+            return -1
+        self._last = sequence
+        return step - 1
+
+    def reset(self) -> None:
+        """Start anew, after a reconnect."""
+        self._last = None

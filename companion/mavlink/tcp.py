@@ -1,0 +1,154 @@
+"""MAVLink over TCP, as client or as a server for one vehicle."""
+
+import asyncio
+import errno
+import socket
+import time
+
+from companion.mavlink.endpoint import TcpClient, TcpServer
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport import OPEN_TIMEOUT_S, Lost, Receive
+
+_MAX_UNSENT_BYTES = 2048  # some 40 setpoints; a vehicle that far behind must not get older ones
+
+
+async def open_tcp_client(endpoint: TcpClient, receive: Receive, lost: Lost) -> "TcpTransport":
+    """Connect to a listening vehicle.
+
+    Raises:
+        EndpointError: Nobody listens there, host unknown, no answer within 5 s.
+    """
+    transport = TcpTransport(receive, lost)
+    where = f"TCP {endpoint.host}:{endpoint.port}"
+    try:
+        async with asyncio.timeout(OPEN_TIMEOUT_S):
+            await asyncio.get_running_loop().create_connection(
+                lambda: _Connection(transport), endpoint.host, endpoint.port
+            )
+    except TimeoutError as error:
+        raise EndpointError(
+            f"{where}: no answer within {OPEN_TIMEOUT_S:g} s; check address and network"
+        ) from error
+    except socket.gaierror as error:
+        raise EndpointError(
+            f"{where}: host unknown ({error.strerror}); check the name or use its IP address"
+        ) from error
+    except OSError as error:
+        raise EndpointError(
+            f"{where}: cannot connect ({error.strerror or error}); is the vehicle or router "
+            "running and listening there?"
+        ) from error
+    return transport
+
+
+async def open_tcp_server(endpoint: TcpServer, receive: Receive, lost: Lost) -> "TcpTransport":
+    """Listen for one vehicle.
+
+    Raises:
+        EndpointError: The port is in use or not permitted.
+    """
+    transport = TcpTransport(receive, lost)
+    where = f"TCP {endpoint.host}:{endpoint.port}"
+    try:
+        server = await asyncio.get_running_loop().create_server(
+            lambda: _Connection(transport), endpoint.host, endpoint.port
+        )
+    except OSError as error:
+        hint = {
+            errno.EADDRINUSE: "the port is in use by another program; end it or choose another",
+            errno.EACCES: "not permitted; use a port of 1024 or above",
+            errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
+        }.get(error.errno or 0, error.strerror or str(error))
+        raise EndpointError(f"{where}: {hint}") from error
+    transport.listen(server)
+    return transport
+
+
+class TcpTransport:
+    """At most one TCP connection at a time.
+
+    As a server it goes on listening when the vehicle drops, so it is never opened again from
+    outside; a second vehicle that connects meanwhile is turned away.
+
+    Attributes:
+        local: (host, port) listened on, or `None` for a client.
+    """
+
+    streaming = True
+
+    def __init__(self, receive: Receive, lost: Lost) -> None:
+        self._receive, self._lost = receive, lost
+        self._server: asyncio.Server | None = None
+        self._connection: asyncio.Transport | None = None
+        self._closed = False
+        self.local: tuple[str, int] | None = None
+
+    @property
+    def reconnects(self) -> bool:
+        """A server waits by itself, a client must be opened again."""
+        return self._server is None
+
+    def listen(self, server: asyncio.Server) -> None:
+        """Make this a server."""
+        self._server = server
+        self.local = server.sockets[0].getsockname()[:2]
+
+    def accept(self, connection: asyncio.Transport) -> bool:
+        """Take a new connection; false if there is one already."""
+        if self._connection is not None or self._closed:
+            return False
+        opened = connection.get_extra_info("socket")
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._connection = connection
+        return True
+
+    def data(self, data: bytes) -> None:
+        """Pass on what arrived."""
+        self._receive(data, time.perf_counter_ns())
+
+    def dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
+        """The connection is gone."""
+        if self._connection is None or connection is not self._connection:
+            return
+        self._connection = None
+        if not self._closed:
+            self._lost(reason)
+
+    def send(self, frame: bytes) -> bool:
+        """Write one frame; false while nobody is connected or too much is unsent already."""
+        connection = self._connection
+        if connection is None or connection.is_closing():
+            return False
+        if connection.get_write_buffer_size() > _MAX_UNSENT_BYTES:
+            return False
+        connection.write(frame)
+        return True
+
+    def close(self) -> None:
+        """Abort: what was not written yet never will be."""
+        self._closed = True
+        if self._server is not None:
+            self._server.close()
+        if self._connection is not None:
+            self._connection.abort()
+
+
+class _Connection(asyncio.Protocol):
+    def __init__(self, owner: TcpTransport) -> None:
+        self._owner = owner
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        if self._owner.accept(transport):
+            self._transport = transport
+        else:
+            transport.abort()
+
+    def data_received(self, data: bytes) -> None:
+        if self._transport is not None:
+            self._owner.data(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        reason = f"connection broken: {exc}" if exc else "closed by the other side"
+        self._owner.dropped(self._transport, reason)

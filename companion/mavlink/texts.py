@@ -1,0 +1,66 @@
+"""STATUSTEXT: pieces joined, PX4's trailing tab cut."""
+
+from collections import deque
+from typing import NamedTuple
+
+from companion.mavlink.codec import Message
+
+_CHUNK_CHARACTERS = 50
+_KEPT = 100
+
+
+class StatusText(NamedTuple):
+    """What the autopilot said.
+
+    Attributes:
+        time: Event-loop time of arrival (of the last piece), s.
+        severity: MAV_SEVERITY, 0 emergency to 7 debug.
+        text: The words.
+    """
+
+    time: float
+    severity: int
+    text: str
+
+
+class TextAssembler:
+    """Joins the pieces of long texts. The newest 100 texts are kept in `texts`.
+
+    A text whose end or middle never comes is given as far as it is known when the next one
+    begins.
+    """
+
+    def __init__(self) -> None:
+        self.texts: deque[StatusText] = deque(maxlen=_KEPT)
+        self._id = 0
+        self._parts: list[str] = []
+        self._severity = 6
+
+    def take(self, message: Message, now: float) -> None:
+        """Take one STATUSTEXT."""
+        text: str = message.text
+        if message.id == 0:
+            self._finish(now)
+            self._keep(now, message.severity, text)
+            return
+        if message.id != self._id:
+            self._finish(now)
+            self._id = message.id
+        self._severity = message.severity
+        self._parts.append(text)
+        if len(text) < _CHUNK_CHARACTERS:  # a zero byte ended it, so this was the last piece
+            self._finish(now)
+
+    def since(self, start: float) -> tuple[str, ...]:
+        """The words of all texts that came at `start` or later."""
+        return tuple(entry.text for entry in self.texts if entry.time >= start)
+
+    def _finish(self, now: float) -> None:
+        if self._parts:
+            self._keep(now, self._severity, "".join(self._parts))
+        self._id, self._parts = 0, []
+
+    def _keep(self, now: float, severity: int, text: str) -> None:
+        words = text.rstrip("\t ").strip()
+        if words:
+            self.texts.append(StatusText(now, severity, words))

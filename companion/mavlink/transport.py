@@ -1,0 +1,38 @@
+"""What the link asks of a transport: bytes in, whole frames out, and no queue in between."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+Receive = Callable[[bytes, int], bool]
+"""Takes bytes and the `perf_counter_ns` of their reading; true if a frame in them was accepted."""
+
+Lost = Callable[[str], None]
+"""Takes the reason why the connection is gone."""
+
+Tap = Callable[[float, bytes], None]
+"""Takes the loop's time in s and one whole frame, received or sent. It must be quick."""
+
+OPEN_TIMEOUT_S = 5.0
+"""How long a TCP connection may take to come up."""
+
+
+class Transport(Protocol):
+    """One open connection. A dropped one is never reused: the link opens a fresh one."""
+
+    streaming: bool
+    """True when frames may be cut anywhere (TCP, serial); false for datagrams."""
+
+    @property
+    def reconnects(self) -> bool:
+        """True when a lost connection is to be opened again."""
+
+    def send(self, frame: bytes) -> bool:
+        """Hand one whole frame to the kernel now, or not at all.
+
+        Returns:
+            False if it could not leave: no peer yet, the kernel's buffer full, no route. Such a
+            frame is gone; an old setpoint is worse than none.
+        """
+
+    def close(self) -> None:
+        """Close at once; what the kernel has not taken is discarded."""

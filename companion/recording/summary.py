@@ -1,0 +1,130 @@
+"""The one record of a finished flight: what `--json` prints and what the log folder keeps."""
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from companion.recording.response import StepResponse, measure_response
+from companion.recording.trace import FlightTrace
+
+
+@dataclass(frozen=True, slots=True)
+class LoopCounts:
+    """What the control loop counted.
+
+    Attributes:
+        samples: attitude samples received while control was switched on.
+        setpoints: setpoints sent.
+        missed_deadlines: answers that took longer than `deadman.deadline_ms`.
+        stale: samples not answered because they or the target were too old, or out of order.
+        refused: samples not answered because they could not be used.
+        rate_hz: setpoints a second of vehicle time, over the programme.
+    """
+
+    samples: int = 0
+    setpoints: int = 0
+    missed_deadlines: int = 0
+    stale: int = 0
+    refused: int = 0
+    rate_hz: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A finished flight.
+
+    Attributes:
+        result: "ok", or the reason for which it ended.
+        phase: the last phase it reached.
+        gain: p of the planner, 1/s.
+        counts: what the control loop counted.
+        link: frames received, lost, damaged and so on, by name.
+        trace: rows to measure from.
+        events: what happened, each with its time in s.
+        log: the flight's folder.
+    """
+
+    result: str
+    phase: str
+    gain: float
+    counts: LoopCounts
+    link: dict[str, int]
+    trace: FlightTrace
+    events: list[tuple[float, str]] = field(default_factory=list)
+    log: Path | None = None
+
+    def response(self) -> StepResponse | None:
+        """The measured step response, or None where no step was flown."""
+        return measure_response(self.trace.response_rows(), self.gain)
+
+    def latency_us(self) -> dict[str, float]:
+        """p50, p99 and max of sample in → setpoint out inside this process, µs."""
+        latencies = np.array(self.trace.latencies_ns, dtype=np.float64) / 1e3
+        if len(latencies) == 0:
+            return {"p50": math.nan, "p99": math.nan, "max": math.nan}
+        p50, p99 = np.percentile(latencies, (50, 99))
+        return {"p50": float(p50), "p99": float(p99), "max": float(latencies.max())}
+
+    def tracking(self) -> dict[str, float]:
+        """Position error on the closed-loop parts, and height error over all of control, m."""
+        rows = self.trace.tracking_rows()
+        if len(rows) == 0:
+            return dict.fromkeys(("position_rms_m", "position_max_m", "height_rms_m"), math.nan)
+        error = rows[:, 4:7] - rows[:, 1:4]
+        distance = np.linalg.norm(error[~np.isnan(rows[:, 1])], axis=1)
+        return {
+            "position_rms_m": _rms(distance),
+            "position_max_m": float(distance.max()) if len(distance) else math.nan,
+            "height_rms_m": _rms(error[:, 2]),
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """What `--json` prints; values that were not measured are null."""
+        response = self.response()
+        return {
+            "result": self.result,
+            "phase": self.phase,
+            "samples": self.counts.samples,
+            "setpoints": self.counts.setpoints,
+            "missed_deadlines": self.counts.missed_deadlines,
+            "stale": self.counts.stale,
+            "refused": self.counts.refused,
+            "rate_hz": self.counts.rate_hz,
+            "latency_us": _without_nan(self.latency_us()),
+            "response": {
+                "time_constant_s": _without_nan(
+                    {
+                        "north": response.time_constant_north_s if response else math.nan,
+                        "east": response.time_constant_east_s if response else math.nan,
+                    }
+                ),
+                **_without_nan(
+                    {
+                        "cross_axis_max": response.cross_axis_max if response else math.nan,
+                        "model_deviation_max": (
+                            response.model_deviation_max if response else math.nan
+                        ),
+                    }
+                ),
+            },
+            "tracking": _without_nan(self.tracking()),
+            "link": self.link,
+            "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
+            "log": None if self.log is None else str(self.log),
+        }
+
+    def as_json(self) -> str:
+        """`as_dict` on one line."""
+        return json.dumps(self.as_dict(), ensure_ascii=False, allow_nan=False)
+
+
+def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else math.nan
+
+
+def _without_nan(values: dict[str, float]) -> dict[str, float | None]:
+    return {key: None if math.isnan(value) else value for key, value in values.items()}

@@ -1,0 +1,58 @@
+"""What control did, sample by sample, kept in memory for the measurements after the flight."""
+
+from array import array
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.attitude import Quaternion, Target
+
+_MAX_SAMPLES = 500_000
+"""Half an hour at 250 Hz; later samples are not measured, only recorded in the tlog."""
+
+_RESPONSE_WIDTH = 7
+_TRACKING_WIDTH = 7
+
+
+@dataclass(slots=True)
+class FlightTrace:
+    """Rows of plain numbers, appended in flight without making objects.
+
+    Attributes:
+        response: rows (vehicle time s, w, x, y, z, target north, target east), of steps only.
+        tracking: rows (time s, reference north, east, down, measured north, east, down).
+        latencies_ns: sample in → setpoint out inside this process, ns.
+    """
+
+    response: "array[float]" = field(default_factory=lambda: array("d"))
+    tracking: "array[float]" = field(default_factory=lambda: array("d"))
+    latencies_ns: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
+        """Note an attitude sample that was answered during a step."""
+        if len(self.response) < _RESPONSE_WIDTH * _MAX_SAMPLES:
+            self.response.extend((vehicle_time, *q, target.north, target.east))
+
+    def add_tracking(
+        self,
+        time: float,
+        reference: tuple[float, float, float],
+        measured: tuple[float, float, float],
+    ) -> None:
+        """Note where the vehicle ought to be and where it is (NED, m)."""
+        if len(self.tracking) < _TRACKING_WIDTH * _MAX_SAMPLES:
+            self.tracking.extend((time, *reference, *measured))
+
+    def add_latency(self, nanoseconds: int) -> None:
+        """Note how long one answer took."""
+        if len(self.latencies_ns) < _MAX_SAMPLES:
+            self.latencies_ns.append(nanoseconds)
+
+    def response_rows(self) -> NDArray[np.float64]:
+        """(N, 7), as `response`."""
+        return np.array(self.response).reshape(-1, _RESPONSE_WIDTH)
+
+    def tracking_rows(self) -> NDArray[np.float64]:
+        """(N, 7), as `tracking`."""
+        return np.array(self.tracking).reshape(-1, _TRACKING_WIDTH)

@@ -1,0 +1,112 @@
+"""``python -m sitl_mock``: start one or several mock vehicles."""
+
+import argparse
+import multiprocessing
+import signal
+import sys
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+from sitl_mock.config_errors import ConfigError
+from sitl_mock.server import Server
+from sitl_mock.settings import MockSettings, load_settings
+from sitl_mock.status import StatusLine
+
+EXIT_OK = 0
+EXIT_USAGE = 2
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line and return the exit code: 0 ended by a signal, 2 cannot start."""
+    options = _parser().parse_args(arguments)
+    try:
+        settings = load_settings(options.config, _overrides(options))
+        if options.check:
+            sys.stdout.write("configuration is valid\n")
+            return EXIT_OK
+        servers = _servers(settings, options)
+    except ConfigError as error:
+        sys.stderr.write(f"sitl_mock: {error}\n")
+        return EXIT_USAGE
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        if len(servers) == 1:
+            servers[0].run()
+        else:
+            _run_all(servers)
+    except KeyboardInterrupt:
+        pass
+    if not options.headless:
+        sys.stderr.write("\n")
+    return EXIT_OK
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m sitl_mock", description="A multirotor with an autopilot, on UDP."
+    )
+    parser.add_argument("--config", type=Path, help="YAML file; its `mock` section is read")
+    parser.add_argument("--port", type=int, help="where the companion listens (default 14540)")
+    parser.add_argument("--gcs-port", type=int, help="where a ground station listens, 0 = none")
+    parser.add_argument("--control-port", type=int, help="JSON control channel, 0 = none")
+    parser.add_argument("--seed", type=int, help="of all noise and faults")
+    parser.add_argument("--speed", type=float, help="vehicle seconds per wall second")
+    parser.add_argument("--lockstep", action="store_true", help="wait for an answer to each step")
+    parser.add_argument("--count", type=int, default=1, help="how many vehicles (1..100)")
+    parser.add_argument("--headless", action="store_true", help="no live line on the terminal")
+    parser.add_argument("--check", action="store_true", help="check the configuration and exit")
+    return parser
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, Any]:
+    keys = ("port", "gcs_port", "control_port", "seed", "speed")
+    overrides = {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
+    if options.lockstep:
+        overrides["lockstep"] = {"enabled": True}
+    return overrides
+
+
+def _servers(settings: MockSettings, options: argparse.Namespace) -> list[Server]:
+    if not 1 <= options.count <= 100:
+        raise ConfigError(f"--count must be 1 to 100, not {options.count}")
+    shown = not options.headless and options.count == 1 and sys.stderr.isatty()
+    return [
+        Server(settings.for_vehicle(index), 1 + index, StatusLine() if shown else None)
+        for index in range(options.count)
+    ]
+
+
+def _run_all(servers: list[Server]) -> None:
+    """Run each vehicle in a process of its own; the sockets are bound already and inherited."""
+    context = multiprocessing.get_context("fork")
+    processes: list[BaseProcess] = [
+        context.Process(target=_run_one, args=(server,), daemon=True) for server in servers
+    ]
+    for process in processes:
+        process.start()
+    for server in servers:
+        server.close()
+    try:
+        for process in processes:
+            process.join()
+    finally:
+        for process in processes:
+            process.terminate()
+            process.join()
+
+
+def _run_one(server: Server) -> None:
+    try:
+        server.run()
+    except KeyboardInterrupt:
+        sys.exit(EXIT_OK)
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    sys.exit(main())

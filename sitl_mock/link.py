@@ -1,0 +1,39 @@
+"""One MAVLink link of the vehicle: its streams, what was heard on it, what waits to be sent."""
+
+from collections.abc import Callable
+
+from sitl_mock.streams import StreamSchedule
+from sitl_mock.wire import Framer, Message
+
+
+class Link:
+    """One link. The server empties ``outbox`` and owns the socket; here are only frames.
+
+    Args:
+        name: for logs and faults, e.g. ``companion`` or ``gcs``.
+        framer: packs this link's frames.
+        streams: this link's telemetry.
+    """
+
+    def __init__(self, name: str, framer: Framer, streams: StreamSchedule) -> None:
+        self.name = name
+        self.streams = streams
+        self.outbox: list[bytes] = []
+        self.gcs_heard = False
+        self.tamper: Callable[[Message], None] | None = None
+        self._framer = framer
+
+    def send(self, message: Message) -> None:
+        """Queue a message."""
+        if self.tamper is not None:
+            self.tamper(message)
+        self.outbox.append(self._framer.frame(message))
+
+    def send_raw(self, message_id: int, crc_extra: int, payload: bytes) -> None:
+        """Queue a message that the dialect module lacks, by its wire payload."""
+        self.outbox.append(self._framer.frame_raw(message_id, crc_extra, payload))
+
+    def take(self) -> list[bytes]:
+        """Return the frames that wait, in order, and forget them."""
+        frames, self.outbox = self.outbox, []
+        return frames

@@ -1,0 +1,111 @@
+"""The PARAM protocol on one vehicle: list, read, set, and PX4's hash."""
+
+import struct
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.link import Link
+from sitl_mock.parameters import (
+    UINT32,
+    ParameterRefusedError,
+    ParameterTable,
+    from_wire,
+    to_wire,
+)
+from sitl_mock.wire import Message
+
+HASH_NAME = "_HASH_CHECK"
+_NO_INDEX = -1
+_NO_INDEX_UNSIGNED = 65535
+_SENT_PER_TICK = 4
+
+
+class ParameterProtocol:
+    """Answers parameter messages.
+
+    Args:
+        parameters: the table that is read and changed.
+    """
+
+    def __init__(self, parameters: ParameterTable) -> None:
+        self._parameters = parameters
+        self._listing: dict[str, tuple[Link, int]] = {}
+
+    def request_list(self, _: Message, link: Link) -> None:
+        """PARAM_REQUEST_LIST: the hash, then every parameter, a few each tick."""
+        self._send_hash(link)
+        self._listing[link.name] = (link, 0)
+
+    def request_read(self, message: Message, link: Link) -> None:
+        """PARAM_REQUEST_READ, by index or, with index -1, by name."""
+        index = message.param_index
+        if index == _NO_INDEX:
+            name = message.param_id
+            if name == HASH_NAME:
+                self._send_hash(link)
+            elif name in self._parameters:
+                self._send(name, link)
+            else:
+                self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        try:
+            self._send(self._parameters.name_of(index), link)
+        except IndexError:
+            self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+
+    def set(self, message: Message, link: Link) -> None:
+        """PARAM_SET: change it and answer with the value now in force."""
+        name = message.param_id
+        if name == HASH_NAME:
+            return
+        if name not in self._parameters:
+            self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        try:
+            self._parameters.set(name, from_wire(message.param_value, message.param_type))
+        except ParameterRefusedError:
+            self._refuse(message, link, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            return
+        self._send(name, link)
+
+    def step(self) -> None:
+        """Send the next few parameters of every list asked for."""
+        for key, (link, index) in list(self._listing.items()):
+            end = min(index + _SENT_PER_TICK, len(self._parameters))
+            for position in range(index, end):
+                self._send(self._parameters.name_of(position), link)
+            if end == len(self._parameters):
+                del self._listing[key]
+            else:
+                self._listing[key] = (link, end)
+
+    def _send(self, name: str, link: Link) -> None:
+        value, kind = to_wire(self._parameters[name])
+        link.send(
+            dialect.MAVLink_param_value_message(
+                name.encode(),
+                value,
+                kind,
+                len(self._parameters),
+                self._parameters.index_of(name),
+            )
+        )
+
+    def _send_hash(self, link: Link) -> None:
+        value = struct.unpack("<f", struct.pack("<I", self._parameters.hash()))[0]
+        link.send(
+            dialect.MAVLink_param_value_message(
+                HASH_NAME.encode(), value, UINT32, len(self._parameters), _NO_INDEX_UNSIGNED
+            )
+        )
+
+    def _refuse(self, message: Message, link: Link, code: int) -> None:
+        link.send(
+            dialect.MAVLink_param_error_message(
+                message.get_srcSystem(),
+                message.get_srcComponent(),
+                message.param_id.encode(),
+                getattr(message, "param_index", _NO_INDEX),
+                code,
+            )
+        )

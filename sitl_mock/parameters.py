@@ -1,0 +1,115 @@
+"""The autopilot's parameters: typed values by name and by index, and their MAVLink encoding."""
+
+import math
+import struct
+import zlib
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import development as dialect
+
+INT32 = int(dialect.MAV_PARAM_TYPE_INT32)
+REAL32 = int(dialect.MAV_PARAM_TYPE_REAL32)
+UINT32 = int(dialect.MAV_PARAM_TYPE_UINT32)
+
+
+class Parameter(NamedTuple):
+    """A parameter's name and value; an ``int`` value makes it INT32, a ``float`` REAL32."""
+
+    name: str
+    value: int | float
+
+
+class ParameterRefusedError(Exception):
+    """A value or type that the parameter cannot take."""
+
+
+def to_wire(value: int | float) -> tuple[float, int]:
+    """Return (param_value, param_type): an integer's bytes travel inside the float field."""
+    if isinstance(value, int):
+        return float(struct.unpack("<f", struct.pack("<i", value))[0]), INT32
+    return value, REAL32
+
+
+def from_wire(value: float, kind: int) -> int | float:
+    """Return the value carried by a PARAM_SET.
+
+    Raises:
+        ParameterRefusedError: a type that PX4 does not have, or a value that is not finite.
+    """
+    if kind == INT32:
+        return int(struct.unpack("<i", struct.pack("<f", value))[0])
+    if kind == REAL32:
+        if not math.isfinite(value):
+            raise ParameterRefusedError("the value is not finite")
+        return value
+    raise ParameterRefusedError(f"parameter type {kind} is neither INT32 nor REAL32")
+
+
+class ParameterTable:
+    """All parameters, sorted by name; the position in that order is the MAVLink index.
+
+    Args:
+        defaults: the autopilot's parameters.
+        overrides: values from the configuration, by name.
+
+    Raises:
+        KeyError: an override names no parameter.
+        ParameterRefusedError: an override of the wrong type.
+    """
+
+    def __init__(self, defaults: Iterable[Parameter], overrides: dict[str, float]) -> None:
+        self._values = dict(sorted(defaults))
+        self._names = list(self._values)
+        self._index = {name: index for index, name in enumerate(self._names)}
+        for name, value in overrides.items():
+            whole = isinstance(self._values[name], int) and float(value).is_integer()
+            self.set(name, int(value) if whole else float(value))
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._index
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __getitem__(self, name: str) -> int | float:
+        return self._values[name]
+
+    def name_of(self, index: int) -> str:
+        """Return the name at an index.
+
+        Raises:
+            IndexError: no such index.
+        """
+        if not 0 <= index < len(self._names):
+            raise IndexError(index)
+        return self._names[index]
+
+    def index_of(self, name: str) -> int:
+        """Return a parameter's index."""
+        return self._index[name]
+
+    def set(self, name: str, value: int | float) -> None:
+        """Change a value.
+
+        Raises:
+            KeyError: no such parameter.
+            ParameterRefusedError: the type differs from the parameter's.
+        """
+        if type(value) is not type(self._values[name]):
+            kind = "an integer" if isinstance(self._values[name], int) else "a float"
+            raise ParameterRefusedError(f"{name} is {kind}")
+        if isinstance(value, float):
+            value = struct.unpack("<f", struct.pack("<f", value))[0]
+        self._values[name] = value
+
+    def hash(self) -> int:
+        """Return PX4's ``_HASH_CHECK``: the CRC-32 over all names and values, in index order."""
+        crc = 0xFFFFFFFF  # zlib inverts before and after; PX4 does not
+        for name, value in self._values.items():
+            kind = "<i" if isinstance(value, int) else "<f"
+            crc = zlib.crc32(name.encode() + struct.pack(kind, value), crc)
+        return crc ^ 0xFFFFFFFF

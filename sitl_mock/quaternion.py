@@ -1,0 +1,51 @@
+"""The few quaternion operations the vehicle needs: (w, x, y, z), Hamilton, body to world."""
+
+from math import atan2, cos, sin, sqrt
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
+    """Hamilton product: the rotation `right` followed by `left`, in world terms."""
+    lw, lx, ly, lz = left
+    rw, rx, ry, rz = right
+    return (
+        lw * rw - lx * rx - ly * ry - lz * rz,
+        lw * rx + lx * rw + ly * rz - lz * ry,
+        lw * ry - lx * rz + ly * rw + lz * rx,
+        lw * rz + lx * ry - ly * rx + lz * rw,
+    )
+
+
+def normalise(q: Quaternion) -> Quaternion:
+    """The unit quaternion along `q`, which must not be zero."""
+    w, x, y, z = q
+    scale = 1.0 / sqrt(w * w + x * x + y * y + z * z)
+    return (w * scale, x * scale, y * scale, z * scale)
+
+
+def from_yaw(angle: float) -> Quaternion:
+    """A rotation by `angle` (rad) about the down axis."""
+    return (cos(0.5 * angle), 0.0, 0.0, sin(0.5 * angle))
+
+
+def to_body(q: Quaternion, vector_ned: Vector) -> Vector:
+    """Components of a world (NED) vector along the body axes (FRD)."""
+    w, x, y, z = q
+    n, e, d = vector_ned
+    # v' = v + 2 u x (u x v + w v) with the conjugate's u = -(x, y, z)
+    tx = 2.0 * (z * e - y * d)
+    ty = 2.0 * (x * d - z * n)
+    tz = 2.0 * (y * n - x * e)
+    return (
+        n + w * tx - (y * tz - z * ty),
+        e + w * ty - (z * tx - x * tz),
+        d + w * tz - (x * ty - y * tx),
+    )
+
+
+def yaw(q: Quaternion) -> float:
+    """Euler (Z-Y-X) yaw, rad in (-pi, pi]."""
+    w, x, y, z = q
+    return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

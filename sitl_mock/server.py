@@ -1,0 +1,285 @@
+"""One vehicle on its sockets: the only place with sockets and wall time."""
+
+import select
+import time
+
+from sitl_mock.autopilot import Autopilot
+from sitl_mock.control import reply
+from sitl_mock.endpoint import Endpoint
+from sitl_mock.link import Link
+from sitl_mock.pipe import DatagramPipe
+from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
+from sitl_mock.status import StatusLine
+from sitl_mock.wire import Message, decode
+
+BEACON_FIRST_S = 0.05
+"""The first beacon is sent again after this much wall time without an answer."""
+BEACON_AGAIN_S = 0.2
+"""A later beacon is sent again after this much wall time."""
+MAX_LAG_S = 0.2
+"""Paced time that is later than this is not caught up."""
+
+MAX_BUNDLE = 1400
+"""Bytes of frames joined in one datagram at most."""
+
+_ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
+
+
+class Server:
+    """Runs one vehicle in paced time or in lockstep.
+
+    Args:
+        settings: this vehicle's own (see `MockSettings.for_vehicle`).
+        system_id: MAVLink system id.
+        status: shown while running, None = headless.
+
+    Raises:
+        ConfigError: a port is in use.
+    """
+
+    def __init__(
+        self, settings: MockSettings, system_id: int = 1, status: StatusLine | None = None
+    ) -> None:
+        self._settings = settings
+        self._status = status
+        self._autopilot = Autopilot(settings, system_id)
+        self._companion = Endpoint(settings.port + PORT_OFFSET, settings.port)
+        self._endpoints: dict[Endpoint, Link] = {self._companion: self._autopilot.companion}
+        if settings.gcs_port:
+            gcs = Endpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port)
+            self._endpoints[gcs] = self._autopilot.gcs
+        self._control = Endpoint(settings.control_port, None) if settings.control_port else None
+        self._sockets = {endpoint.socket: endpoint for endpoint in self._endpoints}
+        self._readable = list(self._sockets)
+        if self._control is not None:
+            self._readable.append(self._control.socket)
+        self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
+        self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
+        self._lockstep = settings.lockstep.enabled
+        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
+        self._beacon = b""
+        self._answered = False
+        self._collected: list[tuple[bytes, list[Message]]] = []
+        self._base_wall = 0.0
+        self._base_us = 0
+        self._autopilot.set_clock(self._clock_ns)
+
+    def run(self) -> None:
+        """Run for ever; a signal's exception ends it."""
+        try:
+            if self._settings.lockstep.enabled:
+                self._await_client()
+            else:
+                self._autopilot.boot()
+                self._flush()
+            self._rebase()
+            while True:
+                self._step()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Close the sockets."""
+        for endpoint in self._endpoints:
+            endpoint.close()
+        if self._control is not None:
+            self._control.close()
+
+    def _step(self) -> None:
+        """Fly one slot: in lockstep after the answer to the latest beacon, else when it is time."""
+        if not self._lockstep:
+            self._wait_for_time()
+        self._handle_collected()
+        self._autopilot.tick()
+        self._flush()
+        if self._settings.lockstep.enabled:
+            self._send_beacon()
+            if self._lockstep:
+                self._await_answer()
+        if self._status is not None:
+            self._status.show(self._autopilot)
+
+    # Lockstep
+
+    def _send_beacon(self) -> None:
+        self._beacon = self._autopilot.beacon()
+        self._answered = False
+        self._companion.send([self._beacon])
+
+    def _await_client(self) -> None:
+        """Before the time 0 nothing flies: send the beacon until somebody answers.
+
+        A client that speaks but does not answer has ``patience_s``.
+        """
+        self._send_beacon()
+        heard_at: float | None = None
+        while not self._answered:
+            self._collect(BEACON_FIRST_S)
+            self._companion.send([self._beacon])
+            now = time.monotonic()
+            if heard_at is None and self._companion.heard:
+                heard_at = now
+            if heard_at is not None and now - heard_at > self._settings.lockstep.patience_s:
+                self._lockstep = False
+                return
+
+    def _await_answer(self) -> None:
+        """Wait for the answer, or lose patience and go on in paced time."""
+        self._collect(BEACON_AGAIN_S)
+        if self._answered:
+            return
+        deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_AGAIN_S
+        while not self._answered and time.monotonic() < deadline:
+            self._companion.send([self._beacon])
+            self._collect(BEACON_AGAIN_S)
+        if not self._answered:
+            self._lockstep = False
+            self._rebase()
+
+    def _collect(self, timeout_s: float) -> None:
+        """Collect datagrams until the answer comes or the wall time is over."""
+        deadline = time.monotonic() + timeout_s
+        while not self._answered and timeout_s > 0.0:
+            readable, _, _ = select.select(self._readable, (), (), timeout_s)
+            for ready in readable:
+                endpoint = self._sockets.get(ready)
+                if endpoint is self._companion:
+                    self._collect_companion()
+                elif endpoint is not None:
+                    self._serve(endpoint)
+                else:
+                    self._serve_control()
+            timeout_s = deadline - time.monotonic()
+
+    def _collect_companion(self) -> None:
+        """Read the companion's datagrams up to and including the answer, never beyond."""
+        while not self._answered:
+            received = self._companion.receive()
+            if received is None:
+                return
+            datagram, from_partner = received
+            messages = decode(datagram)
+            self._collected.append((datagram, messages))
+            if from_partner and self._is_answer(messages):
+                self._answered = True
+
+    def _is_answer(self, messages: list[Message]) -> bool:
+        now_ms = self._autopilot.time_us // 1000
+        return any(
+            message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
+            for message in messages
+        )
+
+    def _handle_collected(self) -> None:
+        """Handle what was collected while waiting, in its order, after the faults of the link."""
+        collected, self._collected = self._collected, []
+        autopilot, link = self._autopilot, self._autopilot.companion
+        if self._pipe_in.is_clear(autopilot.faults.link):
+            for _, messages in collected:
+                for message in messages:
+                    autopilot.handle(message, link)
+            return
+        datagrams = [datagram for datagram, _ in collected]
+        for datagram in self._pipe_in.push(datagrams, autopilot.faults.link, autopilot.time_us):
+            for message in decode(datagram):
+                autopilot.handle(message, link)
+
+    # Paced time
+
+    def _rebase(self) -> None:
+        self._base_wall = time.monotonic()
+        self._base_us = self._autopilot.time_us
+
+    def _wait_for_time(self) -> None:
+        """Serve the sockets until the next slot is due by the wall clock.
+
+        Faster than the machine can, or after a pause, the time lost is not caught up.
+        """
+        due = self._base_wall + self._elapsed_us(self._autopilot.next_us) / 1e6
+        left = due - time.monotonic()
+        if left < -MAX_LAG_S:
+            self._rebase()
+        while True:
+            readable, _, _ = select.select(self._readable, (), (), max(0.0, left))
+            for ready in readable:
+                endpoint = self._sockets.get(ready)
+                if endpoint is None:
+                    self._serve_control()
+                else:
+                    self._serve(endpoint)
+            left = due - time.monotonic()
+            if left <= 0.0 or self._lockstep:
+                return
+
+    def _elapsed_us(self, vehicle_us: float) -> float:
+        return (vehicle_us - self._base_us) / self._settings.speed
+
+    def _serve(self, endpoint: Endpoint) -> None:
+        """Read what waits on a socket, handle it now and answer now."""
+        link = self._endpoints[endpoint]
+        autopilot = self._autopilot
+        while True:
+            received = endpoint.receive()
+            if received is None:
+                break
+            datagram, from_partner = received
+            datagrams = [datagram]
+            if endpoint is self._companion and not self._pipe_in.is_clear(autopilot.faults.link):
+                datagrams = self._pipe_in.push(datagrams, autopilot.faults.link, autopilot.time_us)
+            for one in datagrams:
+                for message in decode(one):
+                    autopilot.handle(message, link)
+            if endpoint is self._companion and self._settings.lockstep.enabled:
+                self._resume_lockstep(datagram, from_partner=from_partner)
+        self._flush()
+
+    def _resume_lockstep(self, datagram: bytes, *, from_partner: bool) -> None:
+        """Go back to lockstep when the latest beacon is answered after all."""
+        if from_partner and self._is_answer(decode(datagram)):
+            self._answered = self._lockstep = True
+
+    def _clock_ns(self) -> int:
+        """Return vehicle time for TIMESYNC: between slots it goes with the wall clock."""
+        autopilot = self._autopilot
+        if self._lockstep or autopilot.effects.clock_frozen:
+            return autopilot.state.shown_us * 1000
+        wall_us = (time.monotonic() - self._base_wall) * 1e6 * self._settings.speed
+        now_us = min(self._base_us + wall_us, autopilot.next_us)
+        return round(max(now_us, autopilot.time_us) * 1000)
+
+    # Both
+
+    def _serve_control(self) -> None:
+        control = self._control
+        if control is None:
+            return
+        while True:
+            request = control.receive_from()
+            if request is None:
+                return
+            datagram, sender = request
+            control.send_to(reply(self._autopilot, datagram), sender)
+
+    def _flush(self) -> None:
+        """Send what waits on every link, the companion's through the faults."""
+        autopilot = self._autopilot
+        for endpoint, link in self._endpoints.items():
+            frames = link.take()
+            if endpoint is self._companion and not self._pipe_out.is_clear(autopilot.faults.link):
+                frames = self._pipe_out.push(frames, autopilot.faults.link, autopilot.time_us)
+            endpoint.send(bundles(frames) if self._bundle else frames)
+
+
+def bundles(frames: list[bytes]) -> list[bytes]:
+    """Return the frames joined, in their order, into datagrams that a network carries whole."""
+    joined: list[bytes] = []
+    size = 0
+    start = 0
+    for index, frame in enumerate(frames):
+        if size + len(frame) > MAX_BUNDLE:
+            joined.append(b"".join(frames[start:index]))
+            start, size = index, 0
+        size += len(frame)
+    if size:
+        joined.append(b"".join(frames[start:]))
+    return joined

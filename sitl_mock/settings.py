@@ -1,0 +1,144 @@
+"""The ``mock:`` section of a configuration file: everything that can be set."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import Field, ValidationError, field_validator
+
+from sitl_mock.config import (
+    AirframeConfig,
+    BatteryConfig,
+    Finite,
+    NonNegative,
+    Positive,
+    RateLoopConfig,
+    Section,
+    SensorConfig,
+    WindConfig,
+)
+from sitl_mock.config_errors import ConfigError, explain, suggestion
+from sitl_mock.fault_config import Fault
+from sitl_mock.parameters import ParameterRefusedError, ParameterTable
+from sitl_mock.px4_parameters import PX4_PARAMETERS
+
+PORT_OFFSET = 40
+"""The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
+GCS_PORT_OFFSET = 4020
+"""The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
+
+Port = Annotated[int, Field(ge=0, le=65535)]
+
+
+class HomeConfig(Section):
+    """Where the vehicle stands at boot."""
+
+    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
+    altitude_m: Finite = 489.4
+    """Above mean sea level."""
+    heading_deg: Finite = 0.0
+
+
+class LockstepConfig(Section):
+    """The vehicle waits for an answer to each step."""
+
+    enabled: bool = False
+    period_ms: Annotated[int, Field(ge=1, le=100)] = 4
+    bundle: bool = True
+    """Send the frames of a step in one datagram (PX4 sends one each); the beacon stays alone."""
+    patience_s: Positive = 2.0
+    """Wall time without an answer after which the vehicle runs on in paced time."""
+
+
+class MockSettings(Section):
+    """Everything about one mock vehicle."""
+
+    autopilot: Literal["px4"] = "px4"
+    port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
+    gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
+    """0 = no ground station link."""
+    control_port: Port = 0
+    """JSON control channel on 127.0.0.1; 0 = none."""
+    seed: int = 1
+    speed: Positive = 1.0
+    """Vehicle seconds per wall second, when not in lockstep."""
+    inner_loop_hz: Literal[250, 800] = 250
+    """Sets which telemetry rates are achieved."""
+    exact_rates: bool = False
+    """Never skip a slot at the full rate, as PX4's loop does; always so in lockstep."""
+    prearm_delay_s: NonNegative = 4.5
+    """Arming is refused before; PX4 took 4.3 to 6.5 s."""
+    lockstep: LockstepConfig = LockstepConfig()
+    home: HomeConfig = HomeConfig()
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    """Autopilot parameters that differ from their defaults."""
+    airframe: AirframeConfig = AirframeConfig()
+    rate_loop: RateLoopConfig = RateLoopConfig()
+    wind: WindConfig = WindConfig()
+    battery: BatteryConfig = BatteryConfig()
+    sensors: SensorConfig = SensorConfig()
+    faults: tuple[Fault, ...] = ()
+
+    @field_validator("parameters")
+    @classmethod
+    def _known_parameters(cls, parameters: dict[str, float]) -> dict[str, float]:
+        names = [parameter.name for parameter in PX4_PARAMETERS]
+        for name in parameters:
+            if name not in names:
+                raise ValueError(f"unknown parameter {name}{suggestion(name, names)}")
+        try:
+            ParameterTable(PX4_PARAMETERS, parameters)
+        except ParameterRefusedError as error:
+            raise ValueError(str(error)) from error
+        return parameters
+
+    def for_vehicle(self, index: int) -> "MockSettings":
+        """Return the settings of the vehicle with this index: its own ports and its own luck."""
+        return self.model_copy(
+            update={
+                "port": self.port + index,
+                "gcs_port": self.gcs_port + index if self.gcs_port else 0,
+                "control_port": self.control_port + index if self.control_port else 0,
+                "seed": self.seed + index,
+            }
+        )
+
+
+def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
+    """Read the ``mock:`` section of a YAML file; without a file, the defaults.
+
+    Args:
+        path: the file; its other sections are not looked at.
+        overrides: values of top-level keys (and of ``lockstep``) from the command line.
+
+    Raises:
+        ConfigError: the file cannot be read, or says something that cannot be.
+    """
+    where = "the command line" if path is None else str(path)
+    section = {} if path is None else _mock_section(path)
+    lockstep = {**section.get("lockstep", {}), **overrides.pop("lockstep", {})}
+    merged = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
+    try:
+        return MockSettings.model_validate(merged)
+    except ValidationError as error:
+        raise ConfigError(f"{where}: {explain(error, MockSettings)}") from error
+
+
+def _mock_section(path: Path) -> dict[str, Any]:
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        problem = " ".join(str(error).split())
+        raise ConfigError(f"{path}: is not valid YAML: {problem}") from error
+    section = document.get("mock") if isinstance(document, dict) else document
+    if section is None:
+        section = {}
+    if not isinstance(section, dict):
+        raise ConfigError(f"{path}: the `mock` section must be a mapping of keys to values")
+    lockstep = section.setdefault("lockstep", {})
+    if not isinstance(lockstep, dict):
+        raise ConfigError(f"{path}: mock.lockstep must be a mapping, e.g. {{enabled: true}}")
+    return section

@@ -1,0 +1,174 @@
+"""The way of one sample: what is answered, what is not, and why."""
+
+import math
+from time import perf_counter_ns
+
+import pytest
+
+from companion.attitude import BodyRates, Limits, Target, make_planner
+from companion.flight.control_loop import Command, ControlLoop, Deadlines
+from companion.flight.freshness import SampleClock
+from companion.guidance import HoverThrust
+from companion.mavlink.samples import AttitudeSample
+from companion.recording.trace import FlightTrace
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+TARGET = Target(0.1, 0.0, 0.0)
+
+
+class Bench:
+    """A loop with its setpoints caught, and samples every 4 ms."""
+
+    def __init__(self):
+        self.sent = []
+        self.asked = 0
+        self.time = 10.0
+        self.loop = ControlLoop(
+            make_planner("first-order", limits=Limits(0.6, 1.5, 1.0)),
+            HoverThrust(0.5, 0.4, 1.5, 0.1, 0.9),
+            lambda stamp, rates, thrust: self.sent.append((stamp, rates, thrust)),
+            Deadlines(telemetry_stale=0.1, target_stale=0.15, deadline=0.004),
+            FlightTrace(),
+        )
+        self.loop.ask_mode = self.ask
+        self.loop.on = True
+        self.refresh()
+
+    def ask(self):
+        self.asked += 1
+
+    def refresh(self, **changes):
+        self.loop.command = Command(TARGET, 0.0, self.time)._replace(**changes)
+
+    def sample(self, vehicle_time=None, q=LEVEL, late=0.0, lead=0):
+        """One sample; `vehicle_time` is ours less 7 s unless told otherwise."""
+        stamp = self.time - 7.0 if vehicle_time is None else vehicle_time
+        self.loop.on_sample(
+            AttitudeSample(
+                round(stamp * 1000),
+                stamp,
+                self.time + late,
+                perf_counter_ns() - lead,
+                q,
+                BodyRates(0.0, 0.0, 0.0),
+            )
+        )
+
+    def run(self, count, **options):
+        for _ in range(count):
+            self.time += 0.004
+            self.refresh()
+            self.sample(**options)
+
+
+def test_every_fresh_sample_gets_one_answer_with_its_own_stamp():
+    bench = Bench()
+    bench.run(50)
+    assert len(bench.sent) == bench.loop.setpoints == bench.loop.samples == 50
+    stamps = [stamp for stamp, _, _ in bench.sent]
+    assert stamps == [3000 + 4 * k for k in range(1, 51)]
+    _, rates, thrust = bench.sent[0]
+    assert rates.pitch == pytest.approx(-0.5)  # towards north: nose down
+    assert thrust == pytest.approx(0.5)
+
+
+def test_nothing_is_sent_while_off_or_before_the_first_target():
+    bench = Bench()
+    bench.loop.on = False
+    bench.run(5)
+    assert (bench.sent, bench.loop.samples) == ([], 0)
+    bench.loop.on, bench.loop.command = True, None
+    bench.sample(vehicle_time=9.0)
+    assert (bench.sent, bench.loop.stale) == ([], 1)
+
+
+def test_an_old_target_is_not_answered():
+    bench = Bench()
+    bench.run(2)
+    for _ in range(60):
+        bench.time += 0.004
+        bench.sample()
+    answered = len(bench.sent) - 2
+    assert answered == 37  # 0.15 s of 4 ms samples
+    assert bench.loop.stale == 60 - answered
+
+
+@pytest.mark.parametrize("stamp", [3.02, None])
+def test_repeated_and_reordered_samples_are_not_answered(stamp):
+    bench = Bench()
+    bench.run(10)
+    bench.sample(vehicle_time=stamp)
+    assert len(bench.sent) == 10
+    assert bench.loop.stale == 1
+
+
+def test_a_duplicate_in_the_same_instant_is_not_answered_twice():
+    bench = Bench()
+    bench.run(3)
+    bench.sample()
+    assert len(bench.sent) == 3
+
+
+def test_a_sample_that_was_long_under_way_is_not_answered():
+    bench = Bench()
+    bench.run(10)
+    bench.time += 0.004
+    bench.sample(late=0.11)
+    assert (len(bench.sent), bench.loop.stale) == (10, 1)
+
+
+@pytest.mark.parametrize("q", [(1.01, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)])
+def test_an_unusable_attitude_is_refused_and_counted(q):
+    bench = Bench()
+    bench.run(3, q=q)
+    assert (bench.sent, bench.loop.refused) == ([], 3)
+
+
+def test_idle_sends_neither_rates_nor_thrust():
+    bench = Bench()
+    bench.time += 0.004
+    bench.refresh(idle=True)
+    bench.sample(q=(0.8, 0.6, 0.0, 0.0))
+    assert bench.sent[0][1:] == (BodyRates(0.0, 0.0, 0.0), 0.0)
+
+
+def test_after_a_gap_it_waits_for_the_mode_once_guarded():
+    bench = Bench()
+    bench.loop.guarded = True
+    bench.run(10)
+    bench.time += 0.2
+    bench.run(10)
+    assert (len(bench.sent), bench.asked, bench.loop.held_back) == (10, 1, True)
+    bench.loop.resume()
+    bench.run(10)
+    assert (len(bench.sent), bench.asked) == (20, 1)
+    bench.time += 0.2
+    bench.run(1)
+    assert (len(bench.sent), bench.asked) == (20, 2)
+
+
+def test_without_guard_a_gap_needs_no_confirmation():
+    bench = Bench()
+    bench.run(10)
+    bench.time += 0.2
+    bench.run(10)
+    assert (len(bench.sent), bench.asked) == (20, 0)
+
+
+def test_a_late_answer_counts_as_a_missed_deadline():
+    bench = Bench()
+    bench.run(3)
+    assert bench.loop.missed_deadlines == 0
+    bench.run(2, lead=5_000_000)
+    assert bench.loop.missed_deadlines == 2
+
+
+def test_sample_clock_ages_against_the_quickest_and_forgives_drift():
+    clock = SampleClock()
+    assert clock.age(1.0, 100.0) == 0.0
+    assert clock.age(1.01, 100.03) == pytest.approx(0.02, abs=1e-5)
+    assert clock.age(1.01, 100.04) is None
+    assert clock.age(1.005, 100.05) is None
+    for second in range(2, 3600):  # a vehicle clock that loses 50 ppm
+        age = clock.age(second * (1 - 5e-5), 99.0 + second)
+    assert age == pytest.approx(0.0, abs=1e-3)

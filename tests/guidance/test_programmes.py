@@ -1,0 +1,73 @@
+"""Programmes: their derivatives against finite differences, their beginnings and ends."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.guidance import Circle, Hover, Pose, Sequence, Steps
+
+START = Pose((3.0, -2.0, -5.0), 0.7)
+CIRCLES = [Circle(3.0, 2.0, 1.0), Circle(1.0, 3.0, 0.2), Circle(8.0, 0.5, 2.5)]
+
+
+@pytest.mark.parametrize("circle", CIRCLES)
+def test_circle_derivatives_agree_with_finite_differences(circle):
+    h = 1e-4
+    for t in np.linspace(2 * h, circle.duration - 2 * h, 200):
+        behind, here, ahead = (circle.at(t + d, START) for d in (-h, 0.0, h))
+        velocity = (np.array(ahead.position_ned) - np.array(behind.position_ned)) / (2 * h)
+        acceleration = (np.array(ahead.velocity_ned) - np.array(behind.velocity_ned)) / (2 * h)
+        assert here.velocity_ned == pytest.approx(velocity, abs=1e-6)
+        # The raised cosine has a kink in its acceleration where a ramp begins or ends.
+        assert here.acceleration_ned == pytest.approx(acceleration, abs=2e-3)
+
+
+@pytest.mark.parametrize("circle", CIRCLES)
+def test_circle_begins_and_ends_at_rest_and_keeps_its_radius(circle):
+    for t in (0.0, circle.duration, circle.duration + 5.0):
+        assert circle.at(t, START).velocity_ned == pytest.approx((0, 0, 0), abs=1e-9)
+    assert circle.at(0.0, START).position_ned == pytest.approx(START.position_ned)
+    centre = np.add(START.position_ned, (circle.radius, 0.0, 0.0))
+    for t in np.linspace(0.0, circle.duration, 50):
+        reference = circle.at(t, START)
+        assert np.linalg.norm(np.array(reference.position_ned) - centre) == pytest.approx(
+            circle.radius
+        )
+        assert np.linalg.norm(reference.velocity_ned) <= circle.speed * (1 + 1e-9)
+        assert reference.heading == START.heading
+    full = circle.laps % 1.0 == 0.0
+    end = circle.at(circle.duration, START).position_ned
+    assert (end == pytest.approx(START.position_ned, abs=1e-9)) is full
+
+
+def test_steps_leave_an_ideal_vehicle_where_it_was():
+    steps = Steps(0.25, 1.0, 3.0)
+    h = 1e-3
+    velocity, position = np.zeros(2), np.zeros(2)
+    largest = 0.0
+    for k in range(round(steps.duration / h)):
+        c = steps.at((k + 0.5) * h, START).coefficients
+        velocity += 9.8 * np.array(c or (0.0, 0.0)) * h
+        position += velocity * h
+        if c:
+            assert np.hypot(*c) == pytest.approx(0.25)
+            largest = max(largest, np.hypot(*position))
+    assert velocity == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert position == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert 2.0 < largest < 3.0
+    assert steps.at(steps.duration + 1.0, START).coefficients is None
+
+
+@given(st.floats(0.0, 40.0))
+def test_sequence_plays_its_parts_in_order(time):
+    parts = [Hover(3.0), Steps(0.2, 1.0, 2.0), Circle(3.0, 2.0, 1.0)]
+    sequence = Sequence(parts)
+    assert sequence.duration == pytest.approx(sum(p.duration for p in parts))
+    edges = np.cumsum([p.duration for p in parts])
+    expected = min(int(np.searchsorted(edges, time, side="right")), 2)
+    part, within = sequence.part_at(time)
+    assert part is parts[expected]
+    assert within == pytest.approx(time - (edges[expected - 1] if expected else 0.0))
+    assert sequence.at(time, START) == part.at(within, START)
+    assert sequence.name == "hover, steps, circle"

@@ -1,0 +1,131 @@
+"""A bench for the autopilot without sockets: commands in, telemetry out, vehicle time at will."""
+
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot import Autopilot
+from sitl_mock.settings import MockSettings
+from sitl_mock.wire import Framer, decode
+
+HOVER = 0.4903
+IGNORE_ATTITUDE = 128
+CUSTOM = 1
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+
+
+class Rig:
+    """One autopilot and a client that speaks to it over its companion link."""
+
+    def __init__(self, *, gcs: bool = True, boot: bool = True, **settings: Any) -> None:
+        settings.setdefault("lockstep", {"enabled": True})
+        settings.setdefault("gcs_port", 0)
+        self.autopilot = Autopilot(MockSettings.model_validate(settings))
+        self.framer = Framer(255, 190) if gcs else Framer(1, 191)
+        self.heartbeat_type = dialect.MAV_TYPE_GCS if gcs else dialect.MAV_TYPE_ONBOARD_CONTROLLER
+        self.received: list[tuple[float, Any]] = []
+        self.each_tick: Callable[[], None] | None = None
+        if boot:
+            self.heartbeat()
+            self.run(6.0)
+
+    @property
+    def time(self) -> float:
+        return self.autopilot.time_us / 1e6
+
+    @property
+    def state(self):
+        return self.autopilot.state
+
+    @property
+    def truth(self):
+        return self.autopilot.vehicle.truth
+
+    def say(self, message: Any) -> None:
+        """Deliver a message through the wire format, as the socket would."""
+        for each in decode(self.framer.frame(message)):
+            self.autopilot.handle(each, self.autopilot.companion)
+        self._take()
+
+    def heartbeat(self) -> None:
+        self.say(dialect.MAVLink_heartbeat_message(self.heartbeat_type, 8, 0, 0, 4, 3))
+
+    def run(self, seconds: float) -> None:
+        end = self.autopilot.time_us + round(seconds * 1e6)
+        while self.autopilot.time_us < end:
+            if self.each_tick is not None:
+                self.each_tick()
+            self.autopilot.tick()
+            self._take()
+
+    def run_until(self, condition: Callable[[], bool], limit: float) -> None:
+        end = self.time + limit
+        while not condition():
+            assert self.time < end, f"not within {limit} s"
+            self.run(0.004)
+
+    def _take(self) -> None:
+        for frame in self.autopilot.companion.take():
+            self.received.extend((self.time, message) for message in decode(frame))
+
+    def messages(self, name: str, since: float = 0.0) -> list[Any]:
+        return [m for at, m in self.received if m.get_type() == name and at >= since]
+
+    def texts(self) -> list[str]:
+        """Every text said so far, its chunks put together."""
+        whole: dict[int, str] = {}
+        for message in self.messages("STATUSTEXT"):
+            whole[message.id] = whole.get(message.id, "") + message.text
+        return list(whole.values())
+
+    def command(self, number: int, *parameters: float) -> int:
+        """Send a COMMAND_LONG and return the result of its one acknowledgement."""
+        before = len(self.messages("COMMAND_ACK"))
+        padded = [*parameters, *([0.0] * (7 - len(parameters)))]
+        self.say(dialect.MAVLink_command_long_message(1, 1, number, 0, *padded))
+        acks = self.messages("COMMAND_ACK")[before:]
+        assert len(acks) == 1
+        assert acks[0].command == number
+        return int(acks[0].result)
+
+    def mode(self, main: int, sub: int = 0) -> int:
+        return self.command(dialect.MAV_CMD_DO_SET_MODE, CUSTOM, main, sub)
+
+    def arm(self) -> int:
+        return self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def offboard(self) -> int:
+        return self.mode(6)
+
+    def rates(
+        self,
+        roll: float = 0.0,
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+        thrust: float = HOVER,
+        *,
+        mask: int = IGNORE_ATTITUDE,
+        q: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
+        target: tuple[int, int] = (1, 1),
+        body: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        self.say(
+            dialect.MAVLink_set_attitude_target_message(
+                self.autopilot.time_us // 1000, *target, mask, q, roll, pitch, yaw, thrust, body
+            )
+        )
+
+    def take_off(self, height: float = 5.0) -> None:
+        """Arm, climb and arrive in LOITER."""
+        self.autopilot.parameters.set("MIS_TAKEOFF_ALT", height)
+        assert self.mode(4, 2) == ACCEPTED
+        assert self.arm() == ACCEPTED
+        self.run_until(lambda: self.state.mode.name == "LOITER", 20.0)
+
+    def fly_offboard(self, height: float = 5.0, **setpoint: Any) -> None:
+        """Take off and hand over to a stream of setpoints that goes on by itself."""
+        self.take_off(height)
+        self.each_tick = lambda: self.rates(**setpoint)
+        self.run(0.1)
+        assert self.offboard() == ACCEPTED

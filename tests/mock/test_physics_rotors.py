@@ -1,0 +1,99 @@
+"""Allocation, thrust curve and lag of the rotors."""
+
+from math import exp
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sitl_mock.config import AirframeConfig
+from sitl_mock.rotors import Rotors, mix
+
+AIRFRAME = AirframeConfig()
+difference = st.floats(-0.6, 0.6)
+SIGNS = ((-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, -1))
+
+
+def parts(throttles):
+    """Collective and roll, pitch, yaw differences contained in four throttles."""
+    return (
+        sum(throttles) / 4,
+        *(sum(s[i] * u for s, u in zip(SIGNS, throttles, strict=True)) / 4 for i in range(3)),
+    )
+
+
+@settings(max_examples=400, derandomize=True)
+@given(st.floats(0.0, 1.5), difference, difference, difference)
+def test_throttles_stay_possible_and_no_axis_turns_the_wrong_way(throttle, roll, pitch, yaw):
+    result = mix(throttle, roll, pitch, yaw)
+    assert all(-1e-12 <= u <= 1.0 + 1e-12 for u in result.throttles)
+    got = parts(result.throttles)
+    assert got[0] <= throttle + 1e-12  # thrust gives way downwards only
+    for given_back, asked in zip(got[1:], (roll, pitch, yaw), strict=True):
+        assert abs(given_back) <= abs(asked) + 1e-12
+        assert given_back * asked >= -1e-12
+
+
+@settings(derandomize=True)
+@given(st.floats(0.4, 0.6), *[st.floats(-0.1, 0.1)] * 3)
+def test_what_fits_is_given_exactly(throttle, roll, pitch, yaw):
+    result = mix(throttle, roll, pitch, yaw)
+    assert not result.tilt_saturated
+    assert not result.yaw_saturated
+    assert parts(result.throttles) == pytest.approx((throttle, roll, pitch, yaw), abs=1e-12)
+
+
+def test_roll_and_pitch_go_before_yaw_and_before_thrust():
+    full = mix(1.0, 0.2, 0.1, 0.5)
+    assert parts(full.throttles) == pytest.approx((0.7, 0.2, 0.1, 0.2), abs=1e-12)
+    assert (full.tilt_saturated, full.yaw_saturated) == (False, True)
+    left = mix(0.3, 0.15, -0.15, -0.2)
+    assert parts(left.throttles) == pytest.approx((0.3, 0.15, -0.15, 0.0), abs=1e-12)
+    cut = mix(0.1, 0.3, -0.1, 0.0)
+    assert parts(cut.throttles) == pytest.approx((0.1, 0.075, -0.025, 0.0), abs=1e-12)
+    assert cut.tilt_saturated
+
+
+def test_nothing_turns_at_throttle_zero():
+    assert mix(0.0, 1.0, 1.0, 1.0).throttles == (0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("axis", "throttles"),
+    [(1, (0.4, 0.6, 0.6, 0.4)), (2, (0.6, 0.4, 0.6, 0.4)), (3, (0.6, 0.6, 0.4, 0.4))],
+)
+def test_torque_signs_follow_from_where_the_rotors_sit(axis, throttles):
+    """More thrust left: roll right. More in front: nose up. More counter-clockwise: nose right."""
+    rotors = Rotors(AIRFRAME, 1e-3)
+    for _ in range(2000):
+        load = rotors.step(throttles, 1.0)
+    assert load[axis] > 0.0
+    assert [load[i] for i in (1, 2, 3) if i != axis] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("throttle", [0.15, 0.3, 0.49, 0.75, 1.0])
+def test_steady_thrust_is_the_measured_line(throttle):
+    total = 4 * Rotors(AIRFRAME, 1e-3).steady(throttle)
+    assert total / AIRFRAME.mass_kg == pytest.approx(19.55 * throttle + 0.22)
+
+
+def test_thrust_below_the_line_falls_to_zero_without_a_jump():
+    rotors = Rotors(AIRFRAME, 1e-3)
+    below = AIRFRAME.thrust_linear_from - 1e-9
+    assert rotors.steady(below) == pytest.approx(rotors.steady(below + 2e-9), abs=1e-7)
+    assert rotors.steady(0.0) == 0.0
+
+
+def test_lag_is_first_order_whatever_the_step():
+    for dt in (1e-3, 1e-4):
+        rotors = Rotors(AIRFRAME, dt)
+        for _ in range(round(0.05 / dt)):
+            rotors.step((0.5,) * 4, 0.9)
+        expected = 0.9 * rotors.steady(0.5) * (1.0 - exp(-1.0))
+        assert rotors.thrusts == pytest.approx((expected,) * 4, rel=1e-9)
+
+
+def test_the_step_gives_the_mean_of_before_and_after():
+    rotors = Rotors(AIRFRAME, 1e-3)
+    thrust = rotors.step((1.0,) * 4, 1.0)[0]
+    assert thrust == pytest.approx(0.5 * sum(rotors.thrusts))

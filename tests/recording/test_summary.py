@@ -1,0 +1,79 @@
+"""The measurements recover the response they are given, and the JSON has the promised keys."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.attitude import Coefficients, Target, attitude
+from companion.recording.response import measure_response
+from companion.recording.summary import LoopCounts, Summary
+from companion.recording.trace import FlightTrace
+
+
+def trace_of(tau, bend=0.0):
+    """Two doublets answered exactly with the time constant `tau`; `bend` moves across the step."""
+    trace = FlightTrace()
+    for number, direction in enumerate(((1.0, 0.0), (0.0, 1.0))):
+        along = 0.0
+        for k in range(800):
+            target = 0.2 if k < 200 or k >= 600 else -0.2
+            across = bend * math.sin(k / 100.0)
+            north = along * direction[0] - across * direction[1]
+            east = along * direction[1] + across * direction[0]
+            trace.add_response(
+                number * 10.0 + k * 0.005,
+                attitude(Coefficients(north, east), 0.4),
+                Target(target * direction[0], target * direction[1], 0.4),
+            )
+            along = target + (along - target) * math.exp(-0.005 / tau)
+    return trace
+
+
+@pytest.mark.parametrize("tau", [0.1, 0.2, 0.34])
+def test_time_constants_are_recovered(tau):
+    response = measure_response(trace_of(tau).response_rows(), gain=1 / tau)
+    assert response.time_constant_north_s == pytest.approx(tau, rel=1e-3)
+    assert response.time_constant_east_s == pytest.approx(tau, rel=1e-3)
+    assert response.cross_axis_max == pytest.approx(0.0, abs=1e-9)
+    assert response.model_deviation_max == pytest.approx(0.0, abs=1e-9)
+
+
+def test_deviation_and_cross_axis_are_seen():
+    response = measure_response(trace_of(0.3, bend=0.02).response_rows(), gain=5.0)
+    assert response.cross_axis_max == pytest.approx(0.02, rel=0.01)
+    assert 0.03 < response.model_deviation_max < 0.1
+
+
+def test_without_steps_there_is_no_response():
+    assert measure_response(FlightTrace().response_rows(), 5.0) is None
+
+
+def summary(trace):
+    return Summary("ok", "disarm", 5.0, LoopCounts(7, 6, 1), {"lost": 0}, trace, [], Path("x"))
+
+
+def test_json_has_the_promised_keys():
+    trace = trace_of(0.2)
+    trace.add_latency(40_000)
+    trace.add_tracking(0.0, (0.0, 0.0, -5.0), (0.3, 0.4, -5.1))
+    trace.add_tracking(0.1, (math.nan, math.nan, -5.0), (9.0, 9.0, -4.9))
+    data = json.loads(summary(trace).as_json())
+    assert data["result"] == "ok"
+    assert data["phase"] == "disarm"
+    assert (data["samples"], data["setpoints"], data["missed_deadlines"]) == (7, 6, 1)
+    assert data["latency_us"] == {"p50": 40.0, "p99": 40.0, "max": 40.0}
+    assert set(data["response"]["time_constant_s"]) == {"north", "east"}
+    assert {"cross_axis_max", "model_deviation_max"} <= set(data["response"])
+    assert data["tracking"]["position_rms_m"] == pytest.approx(np.sqrt(0.26))
+    assert data["tracking"]["height_rms_m"] == pytest.approx(0.1)
+    assert data["log"] == "x"
+
+
+def test_json_of_a_flight_that_measured_nothing_is_null_not_nan():
+    data = json.loads(summary(FlightTrace()).as_json())
+    assert data["latency_us"]["p50"] is None
+    assert data["response"]["cross_axis_max"] is None
+    assert data["tracking"]["position_max_m"] is None
