@@ -1,6 +1,7 @@
 """What an offboard setpoint message asks, by PX4's type-mask rules (measured, see README)."""
 
 import math
+import struct
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as dialect
@@ -15,6 +16,9 @@ _YAW_RATE_IGNORED = 4
 _THRUST_BODY = 32
 _THROTTLE_IGNORED = 64
 _ATTITUDE_IGNORED = 128
+_THRUST_BODY_FIELD = struct.Struct("<3f")
+_FULL_LENGTH = 51
+_MAGIC_V2 = 0xFD
 
 _POSITION_BITS = (1, 2, 4)
 _VELOCITY_BITS = (8, 16, 32)
@@ -71,13 +75,20 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     yaw_rate = NAN if mask & _YAW_RATE_IGNORED else message.body_yaw_rate
     rates = (message.body_roll_rate, message.body_pitch_rate, yaw_rate) if with_rates else None
     w, x, y, z = message.q
-    thrust = -message.thrust_body[2] if mask & _THRUST_BODY else message.thrust
+    thrust = -_thrust_body_down(message) if mask & _THRUST_BODY else message.thrust
     return AttitudeSetpoint(
         (w, x, y, z) if with_attitude else None,
         rates,
         0.0 if math.isnan(yaw_rate) else yaw_rate,
         thrust,
     )
+
+
+def _thrust_body_down(message: Message) -> float:
+    """Return the down component of the extension field thrust_body, which the dialect lacks."""
+    frame = message.get_msgbuf()
+    payload = bytes(frame[10 : 10 + frame[1]]) if frame[0] == _MAGIC_V2 else b""
+    return float(_THRUST_BODY_FIELD.unpack_from(payload.ljust(_FULL_LENGTH, b"\0"), 39)[2])
 
 
 def position_setpoint(message: Message) -> PositionSetpoint | None:

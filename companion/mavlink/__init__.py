@@ -21,10 +21,11 @@ from companion.mavlink.errors import (
 )
 from companion.mavlink.family import AutopilotFamily, family_for
 from companion.mavlink.link import Link
+from companion.mavlink.records import Heartbeat
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_hex, key_from_passphrase_file
-from companion.mavlink.state import Heartbeat, VehicleState
+from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate
 

@@ -58,7 +58,14 @@ class Inbox:
         return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
-        """Take bytes from the transport; true if a frame in them was accepted."""
+        """Take bytes from the transport; true if a frame in them was accepted. Never raises."""
+        try:
+            return self._take(data, received_ns)
+        except Exception as error:  # of the tap; subscribers are guarded one by one
+            self._router.report(error)
+            return False
+
+    def _take(self, data: bytes, received_ns: int) -> bool:
         accepted = False
         for frame in self._scanner.feed(data):
             if not self._admit(frame):

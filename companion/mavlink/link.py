@@ -5,25 +5,25 @@ import logging
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from typing import Any
 
-from pymavlink.dialects.v20 import common as dialect
-
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import Message, message_id
 from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.commands import CommandClient
+from companion.mavlink.connection import Connection
 from companion.mavlink.endpoint import parse_endpoint
-from companion.mavlink.errors import EndpointError, LinkError, LinkTimeout, NotConnected
+from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.inbox import Inbox
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
-from companion.mavlink.opening import open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.presence import send_heartbeat, send_heartbeats, synchronise
+from companion.mavlink.records import Heartbeat
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.state import Heartbeat, VehicleState
+from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate, measure, set_rates
 from companion.mavlink.texts import TextAssembler
@@ -31,11 +31,6 @@ from companion.mavlink.timesync import TimeSync
 from companion.mavlink.transport import Tap
 
 _LOG = logging.getLogger(__name__)
-
-_MAV_AUTOPILOT_INVALID = 8
-_MAV_STATE_ACTIVE = 4
-_TIMESYNC_FIRST = 10  # requests at ten a second, for a good offset within the first second
-_BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 
 
 class Link:
@@ -59,11 +54,10 @@ class Link:
     """
 
     def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
-        self._endpoint = parse_endpoint(settings.endpoint)
+        endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
         self._registry = PendingRegistry()
         self._tasks: list[asyncio.Task[None]] = []
-        self._closing = False
         self.settings = settings
         self.stats = LinkStats()
         texts = TextAssembler()
@@ -74,6 +68,7 @@ class Link:
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(settings, outbox, router, self._registry)
+        self._connection = Connection(endpoint, self._inbox, outbox, self.stats, self._on_dropped)
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):
@@ -83,27 +78,24 @@ class Link:
     # --- lifetime
 
     async def __aenter__(self) -> "Link":
-        await self._open()
+        await self._connection.open()
         try:
             if self._lockstep is not None:
                 await self._first_beacon(self._lockstep)
         except BaseException:
             await self.__aexit__()
             raise
-        self._start(self._send_heartbeats())
-        self._start(self._synchronise())
+        self._start(send_heartbeats(self.settings, self._outbox))
+        self._start(synchronise(self.timesync))
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        self._closing = True
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks.clear()
         self._registry.fail("closed by us")
-        if self._outbox.transport is not None:
-            self._outbox.transport.close()
-            self._outbox.transport = None
+        await self._connection.close()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
         """Wait for the autopilot's heartbeat; return the newest at once if there was one.
@@ -119,7 +111,7 @@ class Link:
                     while self.state.heartbeat is None:
                         await heard.next(timeout_s)
             except TimeoutError:
-                raise LinkTimeout(self._why_silent(timeout_s)) from None
+                raise LinkTimeout(_why_silent(self.settings, self.stats, timeout_s)) from None
             finally:
                 unsubscribe()
         if self.state.unsupported is not None:
@@ -138,7 +130,7 @@ class Link:
     @property
     def local_address(self) -> tuple[str, int] | None:
         """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
-        return getattr(self._outbox.transport, "local", None)
+        return self._connection.local_address
 
     # --- control
 
@@ -268,52 +260,19 @@ class Link:
 
     # --- inside
 
-    def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        task = self._loop.create_task(work)
-        self._tasks.append(task)
-        task.add_done_callback(self._tasks_done)
-
-    def _tasks_done(self, task: asyncio.Task[None]) -> None:
-        if task in self._tasks:
-            self._tasks.remove(task)
-        if not task.cancelled() and task.exception() is not None:
-            _LOG.error("a task of the link failed", exc_info=task.exception())
-
-    async def _open(self) -> None:
-        transport = await open_transport(self._endpoint, self._inbox.receive, self._on_lost)
-        self._inbox.connect(streaming=transport.streaming)
-        self._outbox.transport = transport
-
-    def _on_lost(self, reason: str) -> None:
-        _LOG.warning("link lost: %s", reason)
-        transport = self._outbox.transport
+    def _on_dropped(self, reason: str) -> None:
         self._registry.fail(reason)
         self.timesync.reset()
-        self._inbox.connect(streaming=True)
-        if transport is not None and transport.reconnects and not self._closing:
-            transport.close()
-            self._outbox.transport = None
-            self._start(self._reopen())
-        else:
-            self.stats.reconnects += 1
 
-    async def _reopen(self) -> None:
-        pause = _BACKOFF_FIRST_S
-        while True:
-            await asyncio.sleep(pause)
-            try:
-                await self._open()
-            except EndpointError as error:
-                _LOG.info("not yet back: %s", error)
-                pause = min(2.0 * pause, _BACKOFF_MAX_S)
-            else:
-                self.stats.reconnects += 1
-                _LOG.info("link is back")
-                return
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(work)
+        task.add_done_callback(_log_failure)
+        self._tasks.append(task)
 
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
         timeout_s = self.settings.first_beacon_timeout_s
-        self._heartbeat()  # a vehicle that waits to be spoken to hears us by this
+        # A vehicle that waits to be spoken to (udpout, TCP) hears us by this.
+        send_heartbeat(self.settings, self._outbox)
         try:
             async with asyncio.timeout(timeout_s):
                 await lockstep.first_beacon
@@ -323,43 +282,21 @@ class Link:
                 "vehicle running, in lockstep, and sending to this port?"
             ) from None
 
-    def _why_silent(self, timeout_s: float) -> str:
-        start = f"no heartbeat from system {self.settings.target_system} within {timeout_s:g} s"
-        if self.stats.ignored_foreign:
-            return (
-                f"{start}, but {self.stats.ignored_foreign} frames from other systems or "
-                "components; is the target's system id right?"
-            )
-        if self.stats.bad_signature:
-            return f"{start}, but {self.stats.bad_signature} frames not signed with our key"
-        if self.stats.bad_crc:
-            return f"{start}, but {self.stats.bad_crc} damaged frames; is the baud rate right?"
+
+def _log_failure(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and task.exception() is not None:
+        _LOG.error("a task of the link failed", exc_info=task.exception())
+
+
+def _why_silent(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
+    start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
+    if stats.ignored_foreign:
         return (
-            f"{start} on {self.settings.endpoint}; is the vehicle running and sending to this "
-            "address?"
+            f"{start}, but {stats.ignored_foreign} frames from other systems or components; is "
+            "the target's system id right?"
         )
-
-    def _heartbeat(self) -> None:
-        self.send(
-            dialect.MAVLink_heartbeat_message(
-                type=self.settings.heartbeat_type,
-                autopilot=_MAV_AUTOPILOT_INVALID,
-                base_mode=0,
-                custom_mode=0,
-                system_status=_MAV_STATE_ACTIVE,
-                mavlink_version=3,
-            )
-        )
-
-    async def _send_heartbeats(self) -> None:
-        while True:
-            self._heartbeat()
-            await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
-
-    async def _synchronise(self) -> None:
-        for _ in range(_TIMESYNC_FIRST):
-            self.timesync.ask()
-            await asyncio.sleep(0.1)
-        while True:
-            self.timesync.ask()
-            await asyncio.sleep(1.0)
+    if stats.bad_signature:
+        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+    if stats.bad_crc:
+        return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
+    return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"

@@ -9,14 +9,19 @@ so a flight is the same to the bit each time, and as fast as both can compute.
 import asyncio
 import time
 from collections.abc import Callable, Coroutine
-from typing import Any, TypeVar
+from contextvars import Context
+from typing import Any, TypeVar, TypeVarTuple
 
 from companion.mavlink.loop import HotSelector, LinkEventLoop, Ready
 
 T = TypeVar("T")
+Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
 """Wall time without any I/O after which the vehicle counts as gone and time goes on without it."""
+
+_TIMERS_IN_ORDER = 1_000_000
+_TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
 
 _MAX_ITERATIONS = 200  # of the loop in one settling; a task that never rests may not stop the world
 
@@ -102,11 +107,29 @@ class LockstepEventLoop(LinkEventLoop):
     def __init__(self) -> None:
         self._clock = _VehicleClock()
         self._stepping = _SteppingSelector(self._clock)
+        self._scheduled_so_far = 0
         super().__init__(self._stepping)
 
     def time(self) -> float:
         """Vehicle time in s."""
         return self._clock.read()
+
+    def call_at(
+        self,
+        when: float,
+        callback: Callable[[*Arguments], object],
+        *args: *Arguments,
+        context: Context | None = None,
+    ) -> asyncio.TimerHandle:
+        """As every loop's, but timers due at the same time run in the order of scheduling.
+
+        asyncio leaves the order of such timers to the shape of its heap, and that shape depends
+        on timers of the time before the first beacon, which was wall time.
+        """
+        self._scheduled_so_far += 1
+        order = self._scheduled_so_far % _TIMERS_IN_ORDER * _TIMER_SPACING_S
+        early = _TIMERS_IN_ORDER * _TIMER_SPACING_S  # never later than asked: that is a step late
+        return super().call_at(when - early + order, callback, *args, context=context)
 
     def advance(self, vehicle_time: float) -> bool:
         """Move the clock to a beacon's time; false if that beacon was seen before."""

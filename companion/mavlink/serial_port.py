@@ -25,7 +25,6 @@ class SerialTransport:
         EndpointError: The device is missing, in use, or not permitted.
     """
 
-    streaming = True
     reconnects = True
 
     def __init__(self, endpoint: SerialPort, receive: Receive, lost: Lost) -> None:

@@ -3,12 +3,20 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import NamedTuple
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.family import AutopilotFamily, family_for
 from companion.mavlink.readiness import Readiness
+from companion.mavlink.records import (
+    Battery,
+    Estimator,
+    Gps,
+    Heartbeat,
+    Home,
+    LocalPosition,
+    Vector,
+)
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
@@ -22,106 +30,6 @@ LANDED_ON_GROUND = 1
 LANDED_IN_AIR = 2
 LANDED_TAKEOFF = 3
 LANDED_LANDING = 4
-
-Vector = tuple[float, float, float]
-
-
-class Heartbeat(NamedTuple):
-    """HEARTBEAT of the autopilot.
-
-    Attributes:
-        received: Event-loop time, s.
-        autopilot: MAV_AUTOPILOT.
-        vehicle_type: MAV_TYPE.
-        mode: The mode's name in the words of its family.
-        custom_mode: The same as a number.
-        armed: Motors may turn.
-        system_status: MAV_STATE: 3 standby, 4 active, 5 critical (failsafe).
-    """
-
-    received: float
-    autopilot: int
-    vehicle_type: int
-    mode: str
-    custom_mode: int
-    armed: bool
-    system_status: int
-
-
-class LocalPosition(NamedTuple):
-    """LOCAL_POSITION_NED.
-
-    Attributes:
-        received: Event-loop time, s.
-        vehicle_time: The vehicle's time stamp, s since boot.
-        position_ned: m.
-        velocity_ned: m/s.
-    """
-
-    received: float
-    vehicle_time: float
-    position_ned: Vector
-    velocity_ned: Vector
-
-
-class Battery(NamedTuple):
-    """SYS_STATUS and BATTERY_STATUS; `None` where the vehicle does not know.
-
-    Attributes:
-        received: Event-loop time, s.
-        voltage_v: Of the whole battery, V.
-        remaining: 0..1.
-    """
-
-    received: float
-    voltage_v: float | None
-    remaining: float | None
-
-
-class Gps(NamedTuple):
-    """GPS_RAW_INT.
-
-    Attributes:
-        received: Event-loop time, s.
-        fix_type: GPS_FIX_TYPE; 3 or more is a 3D fix.
-        satellites: Number in use, `None` if not known.
-        altitude_m: Above mean sea level, m.
-    """
-
-    received: float
-    fix_type: int
-    satellites: int | None
-    altitude_m: float
-
-
-class Home(NamedTuple):
-    """HOME_POSITION.
-
-    Attributes:
-        received: Event-loop time, s.
-        latitude_deg: WGS84.
-        longitude_deg: WGS84.
-        altitude_m: Above mean sea level, m.
-        down: In the local frame of LOCAL_POSITION_NED, m.
-    """
-
-    received: float
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
-    down: float
-
-
-class Estimator(NamedTuple):
-    """ESTIMATOR_STATUS.
-
-    Attributes:
-        received: Event-loop time, s.
-        flags: ESTIMATOR_STATUS_FLAGS.
-    """
-
-    received: float
-    flags: int
 
 
 @dataclass
@@ -261,7 +169,6 @@ class VehicleState(_Values):
         self._take_battery(
             None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
         )
-
         self.prearm_good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
 
     def _on_odometry(self, message: Message) -> None:

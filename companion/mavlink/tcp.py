@@ -74,8 +74,6 @@ class TcpTransport:
         local: (host, port) listened on, or `None` for a client.
     """
 
-    streaming = True
-
     def __init__(self, receive: Receive, lost: Lost) -> None:
         self._receive, self._lost = receive, lost
         self._server: asyncio.Server | None = None

@@ -19,9 +19,6 @@ OPEN_TIMEOUT_S = 5.0
 class Transport(Protocol):
     """One open connection. A dropped one is never reused: the link opens a fresh one."""
 
-    streaming: bool
-    """True when frames may be cut anywhere (TCP, serial); false for datagrams."""
-
     @property
     def reconnects(self) -> bool:
         """True when a lost connection is to be opened again."""

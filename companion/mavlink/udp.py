@@ -48,7 +48,6 @@ class UdpTransport:
         local: The (host, port) the socket is bound to.
     """
 
-    streaming = False
     reconnects = False
 
     def __init__(

@@ -12,13 +12,22 @@ from sitl_mock.wire import Framer, decode
 HOVER = 0.4903
 IGNORE_ATTITUDE = 128
 CUSTOM = 1
+QUICK = {"MPC_TKO_RAMP_T": 0.3, "COM_SPOOLUP_TIME": 0.1, "MPC_TKO_SPEED": 3.0}
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 
 
 class Rig:
-    """One autopilot and a client that speaks to it over its companion link."""
+    """One autopilot and a client that speaks to it over its companion link.
 
-    def __init__(self, *, gcs: bool = True, boot: bool = True, **settings: Any) -> None:
+    Unless ``quick`` is off, it boots and takes off faster than PX4 does.
+    """
+
+    def __init__(
+        self, *, gcs: bool = True, boot: bool = True, quick: bool = True, **settings: Any
+    ) -> None:
+        if quick and boot:
+            settings["parameters"] = {**QUICK, **settings.get("parameters", {})}
+            settings.setdefault("prearm_delay_s", 0.2)
         settings.setdefault("lockstep", {"enabled": True})
         settings.setdefault("gcs_port", 0)
         self.autopilot = Autopilot(MockSettings.model_validate(settings))
@@ -28,7 +37,7 @@ class Rig:
         self.each_tick: Callable[[], None] | None = None
         if boot:
             self.heartbeat()
-            self.run(6.0)
+            self.run(settings.get("prearm_delay_s", 4.5) + 0.1)
 
     @property
     def time(self) -> float:
@@ -108,11 +117,10 @@ class Rig:
         mask: int = IGNORE_ATTITUDE,
         q: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0),
         target: tuple[int, int] = (1, 1),
-        body: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         self.say(
             dialect.MAVLink_set_attitude_target_message(
-                self.autopilot.time_us // 1000, *target, mask, q, roll, pitch, yaw, thrust, body
+                self.autopilot.time_us // 1000, *target, mask, q, roll, pitch, yaw, thrust
             )
         )
 

@@ -60,7 +60,7 @@ def test_return_and_land_do_not_arm(sub):
 
 
 def test_take_off_climbs_to_the_parameter_then_holds_and_land_disarms():
-    rig = Rig()
+    rig = Rig(quick=False)
     rig.take_off(10.0)
     rig.run(5.0)
     assert -rig.truth.position_ned[2] == pytest.approx(10.0, abs=0.4)

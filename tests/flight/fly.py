@@ -1,0 +1,104 @@
+"""Whole flights for the tests: a mock vehicle in its own process, the companion in this one."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import yaml
+
+from companion.config_file import parse
+from companion.demo import free_port
+from companion.flight.observer import Silent
+from companion.flight.session import Session
+from companion.mavlink import lockstep
+
+QUICK_MOCK = {
+    "gcs_port": 0,
+    "prearm_delay_s": 0.2,
+    "speed": 20.0,
+    "lockstep": {"patience_s": 0.5},
+    "parameters": {"MPC_TKO_RAMP_T": 0.3, "COM_SPOOLUP_TIME": 0.1, "MPC_TKO_SPEED": 3.0},
+}
+QUICK_FLIGHT = {
+    "flight": {"arm": True, "takeoff_height_m": 3.0, "programme": ["hover"]},
+    "hover": {"duration_s": 6.0},
+    "guidance": {"drag_per_s": 1.0},
+    "thrust": {"hover_thrust": 0.49},
+}
+
+
+def merged(base, changes):
+    out = dict(base)
+    for key, value in changes.items():
+        out[key] = merged(out.get(key, {}), value) if isinstance(value, dict) else value
+    return out
+
+
+class Mock:
+    """A running mock vehicle and its control channel."""
+
+    def __init__(self, process, port, control_port, config):
+        self.process, self.port, self.config = process, port, config
+        self._address = ("127.0.0.1", control_port)
+
+    def ask(self, request):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
+            channel.settimeout(5.0)
+            channel.sendto(json.dumps(request).encode(), self._address)
+            return json.loads(channel.recv(65536))
+
+    def state(self):
+        return self.ask({"state": True})
+
+    def until(self, condition, seconds=20.0):
+        """Wait (wall time) until the vehicle's true state satisfies `condition`."""
+        deadline = time.monotonic() + seconds
+        while not condition(state := self.state()):
+            assert time.monotonic() < deadline, f"still {state}"
+            time.sleep(0.02)
+        return state
+
+
+@contextmanager
+def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
+    """Start `python -m sitl_mock` on free ports; its words go to `folder`/mock.log."""
+    port, control_port = free_port(), free_port()
+    config = folder / "mock.yaml"
+    config.write_text(yaml.safe_dump({"mock": merged(QUICK_MOCK, settings)}))
+    command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
+    command += ["--port", str(port), "--control-port", str(control_port)]
+    with (folder / "mock.log").open("wb") as log:
+        process = subprocess.Popen(
+            command + ["--lockstep"] * in_lockstep, stdout=log, stderr=log, env=os.environ
+        )
+        try:
+            yield Mock(process, port, control_port, config)
+        finally:
+            process.terminate()
+            assert process.wait(timeout=10) == 0, (folder / "mock.log").read_text()
+
+
+def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
+    text = yaml.safe_dump(
+        merged(
+            merged(QUICK_FLIGHT, changes),
+            {"link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": True}},
+        )
+    )
+    folder.mkdir(exist_ok=True)
+    return Session(parse(text, "test"), text, folder, observer or Silent(), ask_landing or decline)
+
+
+async def decline():
+    return False
+
+
+def fly(mock, folder: Path, observer=None, ask_landing=None, **changes):
+    """One flight in lockstep; returns its summary."""
+    session = session_for(mock, folder, observer, ask_landing, **changes)
+    return lockstep.run(session.fly())

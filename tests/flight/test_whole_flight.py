@@ -1,0 +1,73 @@
+"""The whole programme against the mock over a real socket, in lockstep."""
+
+import pytest
+from pymavlink import mavutil
+
+from tests.flight.fly import fly, mock_vehicle
+
+PROGRAMME = {"flight": {"programme": ["hover", "steps", "circle"]}, "hover": {"duration_s": 2.0}}
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory):
+    """The same programme flown twice by two fresh pairs of processes."""
+    summaries = []
+    for number in range(2):
+        folder = tmp_path_factory.mktemp(f"flight{number}")
+        with mock_vehicle(folder, seed=7) as mock:
+            summaries.append(fly(mock, folder / "log", **PROGRAMME))
+            assert not mock.state()["crashed"]
+    return summaries
+
+
+def test_it_flies_lands_and_disarms(twice):
+    summary = twice[0]
+    assert summary.result == "ok", summary.events
+    assert summary.phase == "disarm"
+    assert summary.events[-1][1] == "disarmed"
+    assert summary.counts.setpoints == summary.counts.samples > 8000
+    assert summary.counts.rate_hz == pytest.approx(250.0, abs=1.0)
+
+
+def test_the_response_is_what_the_rate_loop_allows(twice):
+    """p = 5 through the measured PX4 rate response: 0.26 s, straight within 1 %."""
+    response = twice[0].response()
+    assert response.time_constant_north_s == pytest.approx(0.26, abs=0.02)
+    assert response.time_constant_east_s == pytest.approx(0.26, abs=0.02)
+    assert response.cross_axis_max < 0.01
+    tracking = twice[0].tracking()
+    assert tracking["position_rms_m"] < 0.5
+    assert tracking["height_rms_m"] < 0.05
+
+
+def test_one_seed_gives_one_log_to_the_bit(twice):
+    first, second = (summary.log / "flight.tlog" for summary in twice)
+    assert first.stat().st_size > 1_000_000
+    assert first.read_bytes() == second.read_bytes()
+    assert twice[0].events == twice[1].events
+    assert list(twice[0].trace.tracking) == pytest.approx(
+        list(twice[1].trace.tracking), nan_ok=True
+    )
+
+
+def test_another_seed_gives_another_log(twice, tmp_path):
+    with mock_vehicle(tmp_path, seed=8) as mock:
+        other = fly(mock, tmp_path / "log", **PROGRAMME)
+    assert other.result == "ok"
+    assert (other.log / "flight.tlog").read_bytes() != (twice[0].log / "flight.tlog").read_bytes()
+
+
+def test_the_log_holds_both_directions_and_every_setpoint(twice):
+    log = mavutil.mavlink_connection(str(twice[0].log / "flight.tlog"))
+    stamps, answers = set(), []
+    while (
+        message := log.recv_match(type=["ATTITUDE_QUATERNION", "SET_ATTITUDE_TARGET"])
+    ) is not None:
+        if message.get_type() == "ATTITUDE_QUATERNION":
+            stamps.add(message.time_boot_ms)
+        else:
+            answers.append(message)
+    assert len(answers) == twice[0].counts.setpoints
+    assert {answer.time_boot_ms for answer in answers} <= stamps
+    assert {answer.type_mask for answer in answers} == {128}
+    assert all(0.0 <= answer.thrust <= 0.9 for answer in answers)

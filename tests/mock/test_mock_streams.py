@@ -1,0 +1,92 @@
+"""Telemetry rates: the defaults, and what is achieved when something else is asked."""
+
+import pytest
+from mock_rig import ACCEPTED, Rig
+from pymavlink.dialects.v20 import development as dialect
+
+ATTITUDE_QUATERNION = dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
+DEFAULTS = {
+    "ATTITUDE": 100, "ATTITUDE_QUATERNION": 50, "GLOBAL_POSITION_INT": 50, "HIGHRES_IMU": 50,
+    "LOCAL_POSITION_NED": 30, "ODOMETRY": 30, "TIMESYNC": 10, "ALTITUDE": 10, "ATTITUDE_TARGET": 10,
+    "SERVO_OUTPUT_RAW": 10, "VFR_HUD": 10, "GPS_RAW_INT": 8, "SYS_STATUS": 5,
+    "EXTENDED_SYS_STATE": 5, "ESTIMATOR_STATUS": 1, "HEARTBEAT": 1, "PING": 1,
+    "BATTERY_STATUS": 0.5, "HOME_POSITION": 0.5, "CURRENT_MODE": 0.5,
+}  # fmt: skip
+
+
+def achieved(rig, name, seconds):
+    start = rig.time
+    rig.run(seconds)
+    return len(rig.messages(name, since=start + 1e-9)) / seconds
+
+
+@pytest.mark.parametrize(
+    ("loop", "asked", "got"),
+    [
+        (250, 100, 99), (250, 200, 124), (250, 250, 197), (250, 400, 191), (250, 500, 189),
+        (250, 1000, 199), (800, 100, 98), (800, 200, 196), (800, 250, 196), (800, 400, 392),
+        (800, 500, 392), (800, 1000, 392),
+    ],
+)  # fmt: skip
+def test_measured_rates_of_px4(loop, asked, got):
+    rig = Rig(inner_loop_hz=loop, lockstep={"enabled": False})
+    rig.command(511, ATTITUDE_QUATERNION, 1e6 / asked)
+    assert achieved(rig, "ATTITUDE_QUATERNION", 2.0) == pytest.approx(got, rel=0.06)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(50, 50), (100, 100), (250, 250), (1000, 250)])
+def test_lockstep_serves_every_slot(asked, got):
+    rig = Rig()
+    rig.command(511, ATTITUDE_QUATERNION, 1e6 / asked)
+    assert achieved(rig, "ATTITUDE_QUATERNION", 2.0) == pytest.approx(got, abs=1)
+
+
+def test_exact_rates_serve_every_slot_in_paced_time_too():
+    rig = Rig(lockstep={"enabled": False}, exact_rates=True)
+    rig.command(511, ATTITUDE_QUATERNION, 4000)
+    assert achieved(rig, "ATTITUDE_QUATERNION", 1.0) == 250
+
+
+def test_default_rates_are_those_measured():
+    rig = Rig(lockstep={"enabled": False})
+    start = rig.time
+    rig.run(8.0)
+    for name, hz in DEFAULTS.items():
+        assert len(rig.messages(name, since=start + 1e-9)) / 8.0 == pytest.approx(hz, rel=0.05), name
+
+
+def test_at_most_one_attitude_sample_a_step_with_the_steps_time():
+    rig = Rig()
+    rig.command(511, ATTITUDE_QUATERNION, 1000)
+    start = rig.time
+    rig.run(1.0)
+    samples = [
+        (at, m.time_boot_ms)
+        for at, m in rig.received
+        if m.get_type() == "ATTITUDE_QUATERNION" and at > start
+    ]
+    assert [round(at * 1000) for at, _ in samples] == [ms for _, ms in samples]
+    assert len({ms for _, ms in samples}) == len(samples) == 250
+
+
+def test_interval_zero_is_the_default_and_minus_one_stops():
+    rig = Rig()
+    for asked, got in ((4000, 250), (-1, 0), (0, 50)):
+        assert rig.command(511, ATTITUDE_QUATERNION, asked) == ACCEPTED
+        assert achieved(rig, "ATTITUDE_QUATERNION", 1.0) == pytest.approx(got, abs=1)
+    assert rig.command(511, 12345, 1000) == ACCEPTED
+
+
+def test_get_message_interval():
+    rig = Rig()
+    rig.command(511, ATTITUDE_QUATERNION, 5000)
+    assert rig.command(510, ATTITUDE_QUATERNION) == ACCEPTED
+    assert rig.messages("MESSAGE_INTERVAL")[-1].interval_us == 5000
+    rig.command(510, 9999)
+    assert rig.messages("MESSAGE_INTERVAL")[-1].interval_us == -1
+
+
+def test_in_lockstep_the_companion_gets_no_streamed_system_time():
+    rig = Rig()
+    rig.run(3.0)
+    assert rig.messages("SYSTEM_TIME") == []
