@@ -138,7 +138,9 @@ def _mock_section(path: Path) -> dict[str, Any]:
         section = {}
     if not isinstance(section, dict):
         raise ConfigError(f"{path}: the `mock` section must be a mapping of keys to values")
-    lockstep = section.setdefault("lockstep", {})
+    lockstep = section.get("lockstep")
+    if lockstep is None:
+        return {**section, "lockstep": {}}
     if not isinstance(lockstep, dict):
         raise ConfigError(f"{path}: mock.lockstep must be a mapping, e.g. {{enabled: true}}")
     return section

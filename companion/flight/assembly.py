@@ -176,6 +176,7 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
         loop,
         guide,
         monitors,
+        release=procedures.release,
         silence_limit=deadman.silence_limit_ms * _MS,
         clock=clock,
     )

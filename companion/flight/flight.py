@@ -59,7 +59,8 @@ class Flight:
     async def run(self) -> str:
         """Fly; returns "ok" or the reason for which the flight ended."""
         helpers = [
-            asyncio.create_task(task) for task in (self._guide.run(), self._judge(), self._tell())
+            asyncio.create_task(self._guarded(work))
+            for work in (self._guide.run(), self._judge(), self._tell())
         ]
         try:
             for phase in self._phases:
@@ -140,6 +141,13 @@ class Flight:
                 await self._fly(self._named("disarm"))
         except FlightEnded as ended:
             self.note(ended.reason)
+
+    async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run what runs beside the phases; a fault of ours there must not go unseen."""
+        try:
+            await work
+        except Exception as error:
+            self.end(FlightEnded(f"internal error: {error!r}", Exit.LAND))
 
     async def _judge(self) -> None:
         while True:

@@ -17,6 +17,8 @@ class Phase(NamedTuple):
         on_failure: what is done with the vehicle if the phase fails.
         modes: the modes that the autopilot may be in; any other one means that someone else has
             taken the vehicle. Empty: any.
+        monitored: whether silence and the safety monitors end it; what follows a breach must not
+            be ended by the same breach.
     """
 
     name: str
@@ -24,6 +26,7 @@ class Phase(NamedTuple):
     timeout: float
     on_failure: Exit
     modes: frozenset[Role] = frozenset()
+    monitored: bool = False
 
 
 def flight_phases(config: FlightConfig, programme_duration: float) -> tuple[Phase, ...]:
@@ -41,6 +44,7 @@ def flight_phases(config: FlightConfig, programme_duration: float) -> tuple[Phas
             10.0,
             Exit.LAND,
             airborne | {Role.OFFBOARD},
+            monitored=True,
         ),
         Phase(
             "programme",
@@ -48,6 +52,7 @@ def flight_phases(config: FlightConfig, programme_duration: float) -> tuple[Phas
             programme_duration + 10.0,
             Exit.LAND,
             frozenset({Role.OFFBOARD}),
+            monitored=True,
         ),
         Phase(
             "hand back",

@@ -18,6 +18,7 @@ class Watch:
     """Notices what the control loop cannot: that nothing comes, or that others fly the vehicle.
 
     Args:
+        release: ends control; called when it stood still too long, for it is not taken up again.
         silence_limit: how long control may stand still before it is given up, s.
         clock: our clock, s.
     """
@@ -29,6 +30,7 @@ class Watch:
         guide: Guide,
         monitors: SafetyMonitors,
         *,
+        release: Callable[[], None],
         silence_limit: float,
         clock: Callable[[], float],
     ) -> None:
@@ -36,6 +38,7 @@ class Watch:
         self._loop = loop
         self._guide = guide
         self._monitors = monitors
+        self._release = release
         self._silence_limit = silence_limit
         self._clock = clock
         self._question: asyncio.Task[None] | None = None
@@ -47,10 +50,12 @@ class Watch:
             FlightEnded: control must end, with the reason and what is to be done.
         """
         self._judge_mode(phase)
-        if not self._loop.guarded:
+        if not (phase.monitored and self._loop.guarded):
             return
         if self._clock() - self._loop.last_answer > self._silence_limit:
-            raise FlightEnded(self._why_silent(), Exit.HOLD)
+            reason = self._why_silent()
+            self._release()
+            raise FlightEnded(reason, Exit.HOLD)
         self._monitors.check(self._guide.pose)
 
     def on_heartbeat(self, phase: Phase) -> None:
@@ -72,8 +77,7 @@ class Watch:
             await self._link.request_message("HEARTBEAT")
 
     def _judge_mode(self, phase: Phase) -> None:
-        role = self._role()
-        if not phase.modes or role in phase.modes:
+        if not phase.modes or self._role() in phase.modes:
             return
         who = (
             "the autopilot's failsafe took over"

@@ -90,6 +90,8 @@ class Link:
         return self
 
     async def __aexit__(self, *_: object) -> None:
+        if self._lockstep is not None:
+            self._lockstep.close()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -166,6 +166,7 @@ class LockstepClient:
         self._loop = loop
         self._process, self._deliver, self._answer = process, deliver, answer
         self._step_ms: int | None = None
+        self._closed = False
         self.first_beacon: asyncio.Future[None] = loop.create_future()
 
     @property
@@ -186,12 +187,18 @@ class LockstepClient:
         self._process()
         self._loop.settle(self._after_tasks)
 
+    def close(self) -> None:
+        """Take part no more: the open step gets no sample and no answer."""
+        self._closed = True
+
     def _after_tasks(self) -> None:
+        if self._closed:
+            return
         self._deliver()
         # Once more, so that what the control loop set off is sent before the step is closed.
         self._loop.settle(self._close)
 
     def _close(self) -> None:
         step, self._step_ms = self._step_ms, None
-        if step is not None:
+        if step is not None and not self._closed:
             self._answer(step)

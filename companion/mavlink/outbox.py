@@ -55,7 +55,7 @@ class Outbox:
 
     def message(self, message: Message) -> bool:
         """Send a pymavlink message; false if it could not leave."""
-        return self.payload(message.id, encode(message))
+        return self.payload(message.get_msgId(), encode(message))
 
     def payload(self, message_id: int, payload: bytes) -> bool:
         """Send a message given by its payload; false if it could not leave."""

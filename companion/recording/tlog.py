@@ -1,17 +1,19 @@
 """The flight's MAVLink, both directions, as a `.tlog`: MAVProxy, QGroundControl and others read it.
 
 A record is the time in microseconds since 1970, 8 bytes big endian, then the frame as it was on the
-wire. Writing happens in a thread of its own behind a bounded queue: the control loop only appends.
+wire. Writing happens in a thread of its own, which looks every 50 ms for what the control loop has
+appended: to wake it for each frame would cost the loop more than all the rest of recording.
 """
 
-import queue
 import struct
 import threading
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
-_QUEUE_LENGTH = 20_000
+_MOST_WAITING = 20_000
+_PERIOD = 0.05
 _STAMP = struct.Struct(">Q")
 
 
@@ -20,7 +22,7 @@ class TlogWriter:
 
     Attributes:
         path: where it writes.
-        dropped: frames that found the queue full.
+        dropped: frames that were not written, for too many were waiting or the disk was full.
         failure: why writing ended early (a full disk, say), or None.
 
     Args:
@@ -40,16 +42,17 @@ class TlogWriter:
         self.failure: str | None = None
         self._epoch = epoch
         self._on_failure = on_failure
-        self._queue: queue.Queue[tuple[float, bytes] | None] = queue.Queue(_QUEUE_LENGTH)
+        self._waiting: deque[tuple[float, bytes]] = deque()
+        self._closing = threading.Event()
         self._file = path.open("wb", buffering=1 << 16)
         self._thread = threading.Thread(target=self._write, name="tlog", daemon=True)
         self._thread.start()
 
     def __call__(self, time: float, frame: bytes) -> None:
         """Take one frame, seen at `time` on the flight's clock (s)."""
-        try:
-            self._queue.put_nowait((time, frame))
-        except queue.Full:
+        if len(self._waiting) < _MOST_WAITING:
+            self._waiting.append((time, frame))
+        else:
             self.dropped += 1
 
     def __enter__(self) -> "TlogWriter":
@@ -64,25 +67,30 @@ class TlogWriter:
         self.close()
 
     def close(self) -> None:
-        """Write out what is queued and close the file."""
-        self._queue.put(None)
+        """Write out what waits and close the file."""
+        self._closing.set()
         self._thread.join()
 
     def _write(self) -> None:
-        while (record := self._queue.get()) is not None:
-            if self.failure is not None:
-                self.dropped += 1
-                continue
-            time, frame = record
-            try:
-                self._file.write(_STAMP.pack(round((self._epoch + time) * 1e6)) + frame)
-                if self._queue.empty():
-                    self._file.flush()
-            except OSError as error:
-                self._fail(error)
+        while not self._closing.wait(_PERIOD):
+            self._write_waiting()
+        self._write_waiting()
         try:
             self._file.close()
         except OSError as error:
+            self._fail(error)
+
+    def _write_waiting(self) -> None:
+        records = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        if self.failure is not None:
+            self.dropped += len(records)
+            return
+        try:
+            for time, frame in records:
+                self._file.write(_STAMP.pack(round((self._epoch + time) * 1e6)) + frame)
+            self._file.flush()
+        except OSError as error:
+            self.dropped += len(records)
             self._fail(error)
 
     def _fail(self, error: OSError) -> None:

@@ -48,9 +48,14 @@ class Mock:
 
     def ask(self, request):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
-            channel.settimeout(5.0)
-            channel.sendto(json.dumps(request).encode(), self._address)
-            return json.loads(channel.recv(65536))
+            channel.settimeout(0.1)
+            for _ in range(100):  # it may not have started yet
+                try:
+                    channel.sendto(json.dumps(request).encode(), self._address)
+                    return json.loads(channel.recv(65536))
+                except (TimeoutError, ConnectionRefusedError):
+                    assert self.process.poll() is None, "the mock vehicle stopped"
+        raise AssertionError("the mock vehicle does not answer")
 
     def state(self):
         return self.ask({"state": True})

@@ -3,10 +3,13 @@
 import asyncio
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
+
+from companion.mavlink import Link, LinkSettings
 
 PX4 = 12
 
@@ -98,10 +101,24 @@ class FakeVehicle:
         return self.of(name)
 
 
+@asynccontextmanager
+async def linked(tap: Any = None, **settings: Any) -> AsyncIterator[tuple[Link, FakeVehicle]]:
+    """An open UDP link whose vehicle has been heard."""
+    settings.setdefault("endpoint", "udpin://127.0.0.1:0")
+    async with Link(LinkSettings(**settings), tap) as link:
+        vehicle = await FakeVehicle(link.local_address).open_udp()
+        try:
+            vehicle.send(heartbeat())
+            await link.wait_connected(5.0)
+            yield link, vehicle
+        finally:
+            vehicle.close()
+
+
 async def until(condition: Callable[[], Any]) -> None:
     """Wait until the condition holds; fail after 5 s."""
     async with asyncio.timeout(5.0):
-        while not condition():
+        while not condition():  # noqa: ASYNC110  any condition, of either side
             await asyncio.sleep(0.001)
 
 
@@ -138,25 +155,30 @@ class LockstepVehicle(threading.Thread):
         replies: list[Any] = []
         for step in range(self._steps):
             now = 4 * step
-            for message in (*replies, *self._say(now)):
+            # The first beacon is repeated until the client is there; until then nothing is said.
+            for message in (*replies, *self._say(now)) if step else ():
                 opened.sendto(message.pack(mav), self._peer)
-            replies, answered = [], False
+            replies, answered, silence = [], False, 0
             beacon = dialect.MAVLink_system_time_message(0, now).pack(mav)
             for _ in range(self._copies if step else 1):
                 opened.sendto(beacon, self._peer)
             while not answered:
                 try:
                     data = opened.recv(4096)
-                except OSError:
+                except TimeoutError:
+                    silence += 1
                     if step == 0:
                         opened.sendto(beacon, self._peer)
+                    elif silence > 20:
+                        return  # the client has gone home
                     continue
+                silence = 0
                 for message in parser.parse_buffer(data) or ():
                     name = message.get_type()
                     closes = name in ("SYSTEM_TIME", "SET_ATTITUDE_TARGET")
                     if closes and message.time_boot_ms != now:
                         continue  # a second answer to a repeated beacon
-                    self.log.append((now, name, bytes(message.get_payload())))
+                    self.log.append((now, name, bytes(message.get_msgbuf()[10:-2])))
                     replies += self._hear(message)
                     answered = answered or closes
 

@@ -29,7 +29,7 @@ def test_several_frames_in_one_datagram():
     packed = frames_of(*SOME)
     found = scanner().feed(b"".join(packed))
     assert [frame.raw for frame in found] == packed
-    assert [frame.message_id for frame in found] == [message.id for message in SOME]
+    assert [frame.message_id for frame in found] == [message.get_msgId() for message in SOME]
     assert [frame.sequence for frame in found] == list(range(len(SOME)))
     assert {(frame.system, frame.component) for frame in found} == {(1, 1)}
 
@@ -111,7 +111,12 @@ def test_built_frames_are_pymavlinks_byte_for_byte(message):
     packed = message.pack(mav)
     full = bytes(message.get_payload()) + bytes(9)
     built = build_frame(
-        message.id, full, CRC_EXTRA[message.id], sequence=200, system=7, component=191
+        message.get_msgId(),
+        full,
+        CRC_EXTRA[message.get_msgId()],
+        sequence=200,
+        system=7,
+        component=191,
     )
     assert built == packed
 

@@ -8,6 +8,8 @@ import pytest
 from mock_rig import ACCEPTED, DENIED, UNSUPPORTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.wire import decode
+
 INT32, REAL32 = 6, 9
 
 
@@ -148,9 +150,15 @@ def test_ping_and_mission_list():
 
 def test_only_mavlink_2_leaves_even_for_a_version_1_client():
     rig = Rig()
-    rig.autopilot.tick()
-    frames = rig.autopilot.companion.take()
-    assert frames
+    link = rig.autopilot.companion
+    request = dialect.MAVLink_param_request_read_message(1, 1, b"MAV_TYPE", -1)
+    version_1 = bytes(request.pack(dialect.MAVLink(None, 255, 190), force_mavlink1=True))
+    for message in decode(version_1):
+        rig.autopilot.handle(message, link)
+    for _ in range(25):
+        rig.autopilot.tick()
+    frames = link.take()
+    assert len(frames) > 10
     assert {frame[0] for frame in frames} == {0xFD}
 
 

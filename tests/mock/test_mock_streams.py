@@ -52,7 +52,9 @@ def test_default_rates_are_those_measured():
     start = rig.time
     rig.run(8.0)
     for name, hz in DEFAULTS.items():
-        assert len(rig.messages(name, since=start + 1e-9)) / 8.0 == pytest.approx(hz, rel=0.05), name
+        assert len(rig.messages(name, since=start + 1e-9)) / 8.0 == pytest.approx(hz, rel=0.05), (
+            name
+        )
 
 
 def test_at_most_one_attitude_sample_a_step_with_the_steps_time():

@@ -43,7 +43,7 @@ def test_a_full_disk_is_told_once_and_raises_nothing(tmp_path):
     assert len(told) == 1
     assert "No space left on device" in told[0]
     assert tlog.failure == told[0]
-    assert tlog.dropped == 99
+    assert tlog.dropped == 100
 
 
 def test_a_folder_that_cannot_be_written_is_an_error_at_once(tmp_path):

@@ -1,0 +1,100 @@
+"""How our program can end, and what the vehicle does then: over the command line, as users do."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import yaml
+
+from tests.flight.fly import QUICK_FLIGHT, merged, mock_vehicle
+
+RETURN_LOW = {"parameters": {"COM_OBL_RC_ACT": 4}}
+
+
+def start(mock, folder, *options, **changes):
+    """`companion fly` in real time against the mock, in a process of its own."""
+    config = folder / "fly.yaml"
+    quick = merged(QUICK_FLIGHT, {"hover": {"duration_s": 60.0}})
+    places = {
+        "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}"},
+        "recording": {"directory": str(folder / "flights")},
+    }
+    config.write_text(yaml.safe_dump(merged(merged(quick, places), changes)))
+    return subprocess.Popen(
+        [sys.executable, "-m", "companion", "fly", "--config", str(config), "--json", *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "COLUMNS": "200"},
+    )
+
+
+def finish(process, code):
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code, err
+    assert "Traceback" not in err
+    return json.loads(out.splitlines()[-1])
+
+
+@pytest.fixture
+def mock(tmp_path):
+    with mock_vehicle(tmp_path, in_lockstep=False, speed=1.0, **RETURN_LOW) as vehicle:
+        yield vehicle
+
+
+def in_offboard(state):
+    return state["mode"] == "OFFBOARD" and state["armed"]
+
+
+def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(mock, tmp_path):
+    process = start(mock, tmp_path)
+    mock.until(in_offboard)
+    process.send_signal(signal.SIGINT)
+    result = finish(process, 1)
+    assert result["result"] == "interrupted by the user (Ctrl-C)"
+    state = mock.state()
+    assert (state["mode"], state["armed"]) == ("LOITER", True)
+    assert state["time"] - state["last_setpoint"] > 0.0
+    count = state["setpoints"]
+    time.sleep(0.2)
+    assert mock.state()["setpoints"] == count
+
+
+def test_sigterm_hands_back_too(mock, tmp_path):
+    process = start(mock, tmp_path)
+    mock.until(in_offboard)
+    process.terminate()
+    assert finish(process, 1)["result"] == "interrupted by SIGTERM"
+    assert mock.state()["mode"] == "LOITER"
+
+
+def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path):
+    # The uplink is cut, so that handing back cannot succeed and takes its time.
+    with mock_vehicle(tmp_path, in_lockstep=False, speed=1.0, **RETURN_LOW) as mock:
+        process = start(mock, tmp_path)
+        mock.until(in_offboard)
+        mock.ask({"fault": {"kind": "drop", "direction": "from_companion"}})
+        time.sleep(0.1)  # faults begin with the vehicle's next step
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        result = finish(process, 1)
+        assert time.monotonic() - began < 3.0
+        assert result["result"] == "left at once by the user"
+        assert mock.until(lambda state: state["mode"] == "LAND")["armed"]
+
+
+def test_killed_the_autopilots_failsafe_lands_it(tmp_path):
+    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+        process = start(mock, tmp_path, "--lockstep")
+        mock.until(in_offboard)
+        process.kill()
+        process.communicate()
+        state = mock.until(lambda state: state["landed"] and not state["armed"], seconds=40)
+        assert not state["crashed"]
+        assert state["touchdown_speed"] < 1.5

@@ -1,0 +1,172 @@
+"""Every fault, in flight: a stated reason, the autopilot in charge, no setpoint out of turn."""
+
+import pytest
+from pymavlink import mavutil
+
+from tests.flight.fly import fly, mock_vehicle
+
+CONTROL = {"after_offboard_s": 3.0}
+HANDED_BACK = {"LOITER", "LAND", "RTL"}
+
+
+def setpoint_times(summary):
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    times, samples = [], []
+    while (
+        message := log.recv_match(type=["SET_ATTITUDE_TARGET", "ATTITUDE_QUATERNION"])
+    ) is not None:
+        if message.get_type() == "SET_ATTITUDE_TARGET":
+            times.append(message._timestamp)
+        else:
+            samples.append(message._timestamp)
+    return times, samples
+
+
+FAULTS = [
+    # name, fault, words in the result, modes the vehicle may be in afterwards
+    ("silence", {"kind": "stop_telemetry"}, "no attitude from the vehicle", HANDED_BACK),
+    (
+        "attitude silence",
+        {"kind": "stop_telemetry", "messages": ["ATTITUDE_QUATERNION"]},
+        "no attitude from the vehicle",
+        HANDED_BACK,
+    ),
+    (
+        "position silence",
+        {"kind": "stop_telemetry", "messages": ["LOCAL_POSITION_NED"]},
+        "no position from the vehicle",
+        HANDED_BACK,
+    ),
+    ("drop all", {"kind": "drop"}, "no attitude from the vehicle", HANDED_BACK),
+    (
+        "drop downlink",
+        {"kind": "drop", "direction": "to_companion"},
+        "no attitude from the vehicle",
+        HANDED_BACK,
+    ),
+    (
+        "drop uplink",
+        {"kind": "drop", "direction": "from_companion"},
+        "the autopilot's failsafe took over",
+        HANDED_BACK,
+    ),
+    (
+        "delay",
+        {"kind": "delay", "delay_ms": 400.0, "direction": "to_companion"},
+        "attitude arrives later",
+        HANDED_BACK,
+    ),
+    ("corrupt all", {"kind": "corrupt"}, "no attitude from the vehicle", HANDED_BACK),
+    ("freeze", {"kind": "freeze_clock"}, "the vehicle's clock stands still", HANDED_BACK),
+    (
+        "nan attitude",
+        {"kind": "nan_field", "message": "ATTITUDE_QUATERNION", "field": "q2"},
+        "no attitude from the vehicle",
+        HANDED_BACK,
+    ),
+    (
+        "nan rate",
+        {"kind": "nan_field", "message": "ATTITUDE_QUATERNION", "field": "rollspeed"},
+        "no attitude from the vehicle",
+        HANDED_BACK,
+    ),
+    (
+        "nan position",
+        {"kind": "nan_field", "message": "LOCAL_POSITION_NED", "field": "x"},
+        "no position from the vehicle",
+        HANDED_BACK,
+    ),
+    (
+        "pilot",
+        {"kind": "pilot_takeover", "mode": "POSCTL"},
+        "the pilot or another station took over: mode POSCTL",
+        {"POSCTL"},
+    ),
+    (
+        "pilot by hand",
+        {"kind": "pilot_takeover", "mode": "STABILIZED"},
+        "the pilot or another station took over: mode STABILIZED",
+        {"STABILIZED"},
+    ),
+    (
+        "estimator",
+        {"kind": "estimator_reset", "yaw_deg": 30.0, "position_ned_m": [2.0, 0.0, 0.0]},
+        "estimator was reset",
+        HANDED_BACK,
+    ),
+    ("battery", {"kind": "low_battery", "remaining": 0.15}, "battery at 15 %", HANDED_BACK),
+    ("gps", {"kind": "gps_loss"}, "GPS position lost", HANDED_BACK),
+]
+
+
+@pytest.mark.parametrize(
+    ("fault", "words", "modes"), [row[1:] for row in FAULTS], ids=[row[0] for row in FAULTS]
+)
+def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes):
+    with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert words in summary.result, summary.events
+        assert summary.phase == "programme"
+        state = mock.state()
+        assert state["mode"] in modes
+        assert not state["crashed"]
+    times, samples = setpoint_times(summary)
+    began = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    silent_from = began + 3.0
+    assert times[-1] < silent_from + 2.5  # nothing flows on
+    if "attitude" in words:
+        assert times[-1] - max(at for at in samples if at <= times[-1]) <= 0.150
+
+
+MILD = [
+    {"kind": "drop", "probability": 0.2},
+    {"kind": "duplicate", "probability": 0.5},
+    {"kind": "reorder", "probability": 0.3},
+    {"kind": "corrupt", "probability": 0.05},
+    {"kind": "delay", "probability": 0.1, "delay_ms": 30.0},
+    {"kind": "stop_telemetry", "duration_s": 0.3},
+]
+
+
+@pytest.mark.parametrize("fault", MILD, ids=[f["kind"] for f in MILD])
+def test_a_mild_fault_is_flown_through_and_counted(tmp_path, fault):
+    with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert summary.result == "ok", summary.events
+        assert not mock.state()["crashed"]
+    link = summary.link
+    counted = {
+        "drop": link["lost"],
+        "duplicate": link["repeated"],
+        "reorder": link["repeated"],
+        "corrupt": link["bad_crc"],
+        "delay": link["repeated"],
+        "stop_telemetry": summary.counts.stale,
+    }
+    assert counted[fault["kind"]] > 0
+    assert summary.counts.setpoints <= summary.counts.samples
+
+
+def test_refused_arming_says_why(tmp_path):
+    refusal = {"kind": "refuse_arming", "reason": "system power unavailable", "at_s": 1.4}
+    with mock_vehicle(tmp_path, faults=[refusal]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert not mock.state()["armed"]
+    assert summary.phase == "arm"
+    assert "MAV_CMD_COMPONENT_ARM_DISARM was refused" in summary.result
+
+
+def test_a_vehicle_that_never_gets_ready_is_left_alone(tmp_path):
+    with mock_vehicle(tmp_path, faults=[{"kind": "refuse_arming"}]) as mock:
+        summary = fly(mock, tmp_path / "log", flight={"ready_timeout_s": 3.0})
+        assert not mock.state()["armed"]
+    assert summary.phase == "checks"
+    assert "the autopilot's pre-arm checks" in summary.result
+
+
+def test_a_flat_battery_is_not_armed(tmp_path):
+    with mock_vehicle(tmp_path, faults=[{"kind": "low_battery", "remaining": 0.1}]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert not mock.state()["armed"]
+    assert summary.phase == "checks"
+    assert "battery at 10 %" in summary.result

@@ -1,0 +1,73 @@
+"""The configuration: defaults, and each kind of mistake told in one sentence, exit code 2."""
+
+import pytest
+
+from sitl_mock.__main__ import main
+from sitl_mock.config_errors import ConfigError
+from sitl_mock.settings import MockSettings, load_settings
+
+MISTAKES = {
+    "prot: 3": ("mock.prot", "did you mean port?"),
+    "wind: {speed: 3}": ("mock.wind.speed", "did you mean speed_m_s?"),
+    "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
+    "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
+    "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
+    "speed: fast": ("mock.speed", "number"),
+    "speed: -1": ("mock.speed", "greater than 0"),
+    "faults: [{kind: drop, probabilty: 1}]": ("did you mean probability?",),
+    "faults: [{kind: dropp}]": ("mock.faults.0", "'drop'"),
+    "lockstep: 5": ("mock.lockstep",),
+    "rate_loop: {roll: {proportional: 1}}": ("mock.rate_loop.roll",),
+}
+
+
+@pytest.mark.parametrize(("text", "words"), MISTAKES.items(), ids=MISTAKES)
+def test_mistakes(text, words, tmp_path, capsys):
+    path = tmp_path / "mock.yaml"
+    path.write_text(f"mock:\n  {text}\n")
+    assert main(["--config", str(path), "--check"]) == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
+    assert str(path) in errors
+    for word in words:
+        assert word in errors
+
+
+@pytest.mark.parametrize("text", ["mock: [1]", "mock: [", "- 1", "\x00"])
+def test_what_is_no_mapping(text, tmp_path):
+    path = tmp_path / "mock.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"mock\.yaml"):
+        load_settings(path, {})
+
+
+def test_a_missing_file(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_settings(tmp_path / "none.yaml", {})
+
+
+@pytest.mark.parametrize("text", ["", "mock:", "other: {x: 1}", "mock: {lockstep: }"])
+def test_other_sections_are_ignored_and_defaults_hold(text, tmp_path):
+    path = tmp_path / "mock.yaml"
+    path.write_text(text)
+    assert load_settings(path, {}) == MockSettings()
+
+
+def test_the_command_line_goes_before_the_file(tmp_path):
+    path = tmp_path / "mock.yaml"
+    path.write_text("mock: {port: 1000, seed: 3, lockstep: {period_ms: 5}}")
+    settings = load_settings(path, {"port": 2000, "lockstep": {"enabled": True}})
+    assert (settings.port, settings.seed) == (2000, 3)
+    assert (settings.lockstep.enabled, settings.lockstep.period_ms) == (True, 5)
+
+
+def test_each_vehicle_has_its_own_ports_and_luck():
+    settings = MockSettings(port=14540, gcs_port=14550, control_port=9000, seed=7)
+    third = settings.for_vehicle(2)
+    assert (third.port, third.gcs_port, third.control_port, third.seed) == (14542, 14552, 9002, 9)
+    assert MockSettings(gcs_port=0).for_vehicle(2).gcs_port == 0
+
+
+def test_check_says_so(capsys):
+    assert main(["--check"]) == 0
+    assert "valid" in capsys.readouterr().out
