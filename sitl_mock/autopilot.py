@@ -97,6 +97,7 @@ class Autopilot:
             self.commander,
             commands,
             self._parameter_protocol,
+            self.parameters,
             self.stream,
             personality,
             system_id,

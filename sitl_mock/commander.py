@@ -56,6 +56,7 @@ class Commander:
         self._ready_us = ready_us
         self._landed_since_us = 0
         self._crashed = False
+        self._asked_takeoff_z: float | None = None
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
@@ -73,8 +74,8 @@ class Commander:
         state.home_ned = state.estimate.position_ned
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
-        self._control.enter(state.mode)
         self._announce(Occasion.ARMED, "")
+        self._enter(state.mode)
         return ACCEPTED
 
     def disarm(self, *, force: bool = False) -> int:
@@ -104,14 +105,11 @@ class Commander:
         if state.armed and not self._can_run(mode):
             self._announce(Occasion.MODE_DENIED, mode.name.capitalize())
             return TEMPORARILY_REJECTED
-        if mode is Mode.TAKEOFF and takeoff_z is None:
-            altitude = self._parameters["MIS_TAKEOFF_ALT"]
-            takeoff_z = state.home_ned[2] - altitude
-            if state.armed:
-                self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}")
         state.intended_mode = mode
         self.failsafe.clear()
-        self._enter(mode, takeoff_z=takeoff_z, hold=hold)
+        if mode is Mode.TAKEOFF:
+            self._asked_takeoff_z = takeoff_z
+        self._enter(mode, hold=hold)
         return ACCEPTED
 
     def take_over(self, mode: Mode) -> None:
@@ -187,8 +185,17 @@ class Commander:
             return False
         return self._state.position_valid or mode not in NEEDS_POSITION
 
-    def _enter(
-        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
-    ) -> None:
+    def _enter(self, mode: Mode, *, hold: Vector | None = None) -> None:
+        """Enter a mode at the present estimate, whatever the intended one is."""
         self._state.mode = mode
+        takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
         self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)
+
+    def _takeoff_z(self) -> float:
+        """Return where TAKEOFF ends, m down: as asked, else MIS_TAKEOFF_ALT above home."""
+        if self._asked_takeoff_z is not None:
+            return self._asked_takeoff_z
+        altitude = self._parameters["MIS_TAKEOFF_ALT"]
+        if self._state.armed:
+            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}")
+        return self._state.home_ned[2] - altitude

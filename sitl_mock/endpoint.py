@@ -7,6 +7,8 @@ from sitl_mock.config_errors import ConfigError
 
 HOST = "127.0.0.1"
 _MAX_DATAGRAM = 2048
+MAX_BUNDLE = 1400
+"""Bytes of frames joined in one datagram at most."""
 
 
 class Endpoint:
@@ -70,3 +72,18 @@ class Endpoint:
     def close(self) -> None:
         """Close the socket."""
         self.socket.close()
+
+
+def bundles(frames: list[bytes]) -> list[bytes]:
+    """Return the frames joined, in their order, into datagrams that a network carries whole."""
+    joined: list[bytes] = []
+    size = 0
+    start = 0
+    for index, frame in enumerate(frames):
+        if size + len(frame) > MAX_BUNDLE:
+            joined.append(b"".join(frames[start:index]))
+            start, size = index, 0
+        size += len(frame)
+    if size:
+        joined.append(b"".join(frames[start:]))
+    return joined

@@ -91,7 +91,7 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("NAV_DLL_ACT", 0),  # *
         ("NAV_RCL_ACT", 2),
         ("RTL_CONE_ANG", 45),  # *
-        ("RTL_DESCEND_ALT", 30.0),  # *
+        ("RTL_DESCEND_ALT", 30.0),
         ("RTL_LAND_DELAY", 0.0),
         ("RTL_RETURN_ALT", 60.0),  # *
         ("RTL_TYPE", 0),

@@ -10,8 +10,9 @@ from sitl_mock.commands import DENIED, Command, Commands
 from sitl_mock.link import Link
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameter_protocol import ParameterProtocol
+from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Personality
-from sitl_mock.setpoints import attitude_setpoint, position_setpoint
+from sitl_mock.setpoints import Setpoint, attitude_setpoint, position_setpoint
 from sitl_mock.state import State
 from sitl_mock.wire import Message
 
@@ -34,7 +35,8 @@ class Receiver:
         state: the autopilot's state.
         commander: hears heartbeats and mode requests.
         commands: carries out commands.
-        parameters: answers parameter messages.
+        protocol: answers parameter messages.
+        parameters: the autopilot's parameters.
         stream: takes setpoints.
         personality: translates custom modes.
         system_id: this vehicle's.
@@ -45,7 +47,8 @@ class Receiver:
         state: State,
         commander: Commander,
         commands: Commands,
-        parameters: ParameterProtocol,
+        protocol: ParameterProtocol,
+        parameters: ParameterTable,
         stream: OffboardStream,
         personality: Personality,
         system_id: int,
@@ -55,6 +58,7 @@ class Receiver:
         self._commander = commander
         self._commands = commands
         self._stream = stream
+        self._parameters = parameters
         self._personality = personality
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
@@ -66,9 +70,9 @@ class Receiver:
             "SET_MODE": self._set_mode,
             "TIMESYNC": self._timesync,
             "PING": self._ping,
-            "PARAM_REQUEST_LIST": parameters.request_list,
-            "PARAM_REQUEST_READ": parameters.request_read,
-            "PARAM_SET": parameters.set,
+            "PARAM_REQUEST_LIST": protocol.request_list,
+            "PARAM_REQUEST_READ": protocol.request_read,
+            "PARAM_SET": protocol.set,
             "MISSION_REQUEST_LIST": self._mission_list,
         }
 
@@ -84,13 +88,13 @@ class Receiver:
         return system in (_BROADCAST, self._system_id) and component in (_BROADCAST, _COMPONENT)
 
     def _attitude_target(self, message: Message, _: Link) -> None:
-        setpoint = attitude_setpoint(message)
-        if setpoint is not None:
-            self._stream.accept(setpoint, self._state.time_us)
+        self._accept(attitude_setpoint(message))
 
     def _position_target(self, message: Message, _: Link) -> None:
-        setpoint = position_setpoint(message)
-        if setpoint is not None:
+        self._accept(position_setpoint(message))
+
+    def _accept(self, setpoint: Setpoint | None) -> None:
+        if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
             self._stream.accept(setpoint, self._state.time_us)
 
     def _heartbeat(self, message: Message, link: Link) -> None:

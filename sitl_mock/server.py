@@ -5,7 +5,7 @@ import time
 
 from sitl_mock.autopilot import Autopilot
 from sitl_mock.control import reply
-from sitl_mock.endpoint import Endpoint
+from sitl_mock.endpoint import Endpoint, bundles
 from sitl_mock.link import Link
 from sitl_mock.pipe import DatagramPipe
 from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
@@ -19,8 +19,8 @@ BEACON_AGAIN_S = 0.2
 MAX_LAG_S = 0.2
 """Paced time that is later than this is not caught up."""
 
-MAX_BUNDLE = 1400
-"""Bytes of frames joined in one datagram at most."""
+SPIN_S = 0.0005
+"""The mock spins this long for an answer before it sleeps."""
 
 _ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
 
@@ -137,19 +137,31 @@ class Server:
             self._rebase()
 
     def _collect(self, timeout_s: float) -> None:
-        """Collect datagrams until the answer comes or the wall time is over."""
-        deadline = time.monotonic() + timeout_s
-        while not self._answered and timeout_s > 0.0:
-            readable, _, _ = select.select(self._readable, (), (), timeout_s)
-            for ready in readable:
-                endpoint = self._sockets.get(ready)
-                if endpoint is self._companion:
-                    self._collect_companion()
-                elif endpoint is not None:
-                    self._serve(endpoint)
-                else:
-                    self._serve_control()
-            timeout_s = deadline - time.monotonic()
+        """Collect datagrams until the answer comes or the wall time is over.
+
+        Spinning a little before sleeping saves two wake-ups a step, most of a round trip's cost.
+        """
+        began = time.monotonic()
+        self._poll(0.0)
+        while not self._answered and time.monotonic() - began < SPIN_S:
+            self._collect_companion()
+        while not self._answered:
+            left = began + timeout_s - time.monotonic()
+            if left <= 0.0:
+                return
+            self._poll(left)
+
+    def _poll(self, timeout_s: float) -> None:
+        """Collect from the companion and serve the others, once something came or in time."""
+        readable, _, _ = select.select(self._readable, (), (), timeout_s)
+        for ready in readable:
+            endpoint = self._sockets.get(ready)
+            if endpoint is self._companion:
+                self._collect_companion()
+            elif endpoint is not None:
+                self._serve(endpoint)
+            else:
+                self._serve_control()
 
     def _collect_companion(self) -> None:
         """Read the companion's datagrams up to and including the answer, never beyond."""
@@ -268,18 +280,3 @@ class Server:
             if endpoint is self._companion and not self._pipe_out.is_clear(autopilot.faults.link):
                 frames = self._pipe_out.push(frames, autopilot.faults.link, autopilot.time_us)
             endpoint.send(bundles(frames) if self._bundle else frames)
-
-
-def bundles(frames: list[bytes]) -> list[bytes]:
-    """Return the frames joined, in their order, into datagrams that a network carries whole."""
-    joined: list[bytes] = []
-    size = 0
-    start = 0
-    for index, frame in enumerate(frames):
-        if size + len(frame) > MAX_BUNDLE:
-            joined.append(b"".join(frames[start:index]))
-            start, size = index, 0
-        size += len(frame)
-    if size:
-        joined.append(b"".join(frames[start:]))
-    return joined

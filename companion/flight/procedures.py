@@ -7,7 +7,7 @@ from companion.config import Config
 from companion.flight.control_loop import ControlLoop
 from companion.flight.ending import FlightEnded
 from companion.flight.guide import Guide
-from companion.flight.roles import Role, mode_name, role_of
+from companion.flight.roles import Role, mode_name, require_role, role_of
 from companion.flight.safety import SafetyMonitors
 from companion.guidance import Sequence
 from companion.mavlink.link import Link
@@ -116,6 +116,9 @@ class Procedures:
         """Hand control over to our stream, and settle."""
         self._guide.hold_here()
         self._monitors.begin()
+        # The mode we know may be a second old; never take the vehicle from a pilot who took it.
+        await self._link.request_message("HEARTBEAT")
+        require_role(self._link, {Role.TAKEOFF, Role.HOLD})
         self.detail = "the autopilot to enter offboard"
         await self._enter(Role.OFFBOARD)
         await self._until(lambda: self._in(Role.OFFBOARD))

@@ -8,7 +8,7 @@ from companion.flight.control_loop import ControlLoop
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.guide import Guide
 from companion.flight.phases import Phase
-from companion.flight.roles import Role, role_of
+from companion.flight.roles import Role, require_role, role_of
 from companion.flight.safety import SafetyMonitors
 from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
@@ -77,14 +77,8 @@ class Watch:
             await self._link.request_message("HEARTBEAT")
 
     def _judge_mode(self, phase: Phase) -> None:
-        if not phase.modes or self._role() in phase.modes:
-            return
-        who = (
-            "the autopilot's failsafe took over"
-            if self._link.state.failsafe
-            else "the pilot or another station took over"
-        )
-        raise FlightEnded(f"{who}: mode {self._link.state.mode}", Exit.LET_GO)
+        if phase.modes:
+            require_role(self._link, phase.modes)
 
     def _role(self) -> Role | None:
         return role_of(self._link.family, self._link.state.mode)

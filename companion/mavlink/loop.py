@@ -32,9 +32,10 @@ class HotSelector(selectors.DefaultSelector):
     def select(self, timeout: float | None = None) -> Ready:
         """Wait as every selector does; the hot descriptor is served before this returns."""
         ready: Ready = super().select(timeout)
-        for index, (key, _) in enumerate(ready):
-            if key.fd == self._hot_fd and self._hot is not None:
-                del ready[index]
+        for index, (key, events) in enumerate(ready):
+            if key.fd == self._hot_fd and events & selectors.EVENT_READ and self._hot is not None:
+                rest = events & ~selectors.EVENT_READ
+                ready[index : index + 1] = [(key, rest)] if rest else []
                 self._hot()
                 break
         return ready

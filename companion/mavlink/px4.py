@@ -67,6 +67,8 @@ class Px4:
     # 800 Hz loop 196; asked 400 Hz they give 191 and 392.
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
+            # PX4 tells its mode at 1 Hz; a pilot who takes over should not have to wait for that.
+            "HEARTBEAT": 10.0,
             "ATTITUDE_QUATERNION": 250.0,
             "LOCAL_POSITION_NED": 50.0,
             "EXTENDED_SYS_STATE": 5.0,

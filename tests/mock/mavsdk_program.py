@@ -1,4 +1,4 @@
-"""A program as MAVSDK's users write it: connect, arm, take off, fly by rates, land. Run by a test."""
+"""A program as MAVSDK's users write it: connect, arm, take off, fly by rates, land."""
 
 import asyncio
 import json

@@ -121,6 +121,16 @@ def test_take_off_command_takes_altitude_above_sea_level():
     assert -rig.truth.position_ned[2] == pytest.approx(4.0, abs=0.3)
 
 
+def test_the_take_off_altitude_counts_at_arming():
+    rig = Rig()
+    assert rig.mode(4, 2) == ACCEPTED
+    rig.autopilot.parameters.set("MIS_TAKEOFF_ALT", 4.0)
+    assert rig.arm() == ACCEPTED
+    assert "Using default takeoff altitude: 4.0 m\t" in rig.texts()
+    rig.run_until(lambda: rig.state.mode.name == "LOITER", 15.0)
+    assert -rig.truth.position_ned[2] > 3.5
+
+
 def test_return_goes_home_and_lands():
     rig = Rig(home={"heading_deg": 40.0})
     rig.take_off(5.0)

@@ -6,7 +6,6 @@ import pytest
 from mock_rig import ACCEPTED, HOVER, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-
 from sitl_mock.wire import decode
 
 OFFBOARD = 0x00060000
@@ -312,6 +311,12 @@ def test_short_nan_quaternion_is_survived():
     rig.mode(4, 3)
     rig.run(3.0)
     assert degrees(tilt(rig.truth.q)) < 2.0
+
+
+def test_without_forwarding_no_setpoint_counts():
+    rig = Rig(parameters={"MAV_FWDEXTSP": 0})
+    rig.rates()
+    assert rig.autopilot.stream.received == 0
 
 
 def test_land_command_from_offboard():

@@ -10,7 +10,7 @@ import pytest
 from mock_process import HOST, Client, ask, free_gcs_port, free_port, mock_process
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.server import bundles
+from sitl_mock.endpoint import bundles
 from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.wire import Framer, decode
 
@@ -191,11 +191,10 @@ def test_the_ground_station_has_a_link_of_its_own():
         station.command(400, 1)
         assert "Arming denied" in station.wait_for("STATUSTEXT").text
         assert station.wait_for("COMMAND_ACK").result == 1
-        companion.socket.settimeout(0.2)
-        with pytest.raises(TimeoutError):
-            while True:
-                assert "STATUSTEXT" not in {m.get_type() for m in decode(companion.receive())}
-                companion.socket.settimeout(0.002)
+        names = set()
+        while "HEARTBEAT" not in names or "ATTITUDE_QUATERNION" not in names:
+            names |= {m.get_type() for m in decode(companion.receive())}
+        assert "STATUSTEXT" not in names
 
 
 def test_several_vehicles_have_ids_and_ports_of_their_own():
@@ -218,16 +217,24 @@ def test_control_channel():
         assert state["setpoints"] == 0
         assert state["touchdown_speed"] is None
         assert ask(control, {"fault": {"kind": "stop_telemetry"}}) == {"ok": True}
-        client.socket.settimeout(0.3)
-        with pytest.raises(TimeoutError):
-            while True:
-                client.receive()
+        assert falls_silent(client)
         assert ask(control, {"clear": True}) == {"ok": True}
         client.socket.settimeout(10)
         client.wait_for("ATTITUDE")
         for bad in (b"\xff", b"[]", {"fault": {"kind": "nope"}}, {"what": 1}, {"clear": False},
                     b"[" * 5000):  # fmt: skip
             assert "error" in ask(control, bad)
+
+
+def falls_silent(client):
+    """Whether nothing comes for a while, once what was under way has come."""
+    client.socket.settimeout(0.3)
+    for _ in range(1000):
+        try:
+            client.receive()
+        except TimeoutError:
+            return True
+    return False
 
 
 def test_random_datagrams_over_the_socket_change_nothing():

@@ -1,0 +1,1 @@
+"""What this program costs, measured against others that do the same job."""

@@ -1,0 +1,37 @@
+"""Our own way of a sample, as it flies: link, control loop, planner, thrust, encoder."""
+
+import asyncio
+import sys
+
+from companion.attitude import Target
+from companion.config import Config
+from companion.flight.assembly import hover_thrust, planner
+from companion.flight.control_loop import Command, ControlLoop, Deadlines
+from companion.mavlink import Link, LinkSettings
+from companion.mavlink import loop as link_loop
+from companion.recording.trace import FlightTrace
+
+_GUIDANCE_PERIOD_S = 0.02
+
+
+async def fly(port: int) -> None:
+    """Answer each sample until killed; guidance leaves a fresh target 50 times a second."""
+    config = Config()
+    now = asyncio.get_running_loop().time
+    async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
+        loop = ControlLoop(
+            planner(config),
+            hover_thrust(config),
+            link.send_setpoint,
+            Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
+            FlightTrace(),
+        )
+        loop.on = True
+        link.on_attitude = loop.on_sample
+        while True:
+            loop.command = Command(Target(0.1, 0.0, 0.0), 0.0, now())
+            await asyncio.sleep(_GUIDANCE_PERIOD_S)
+
+
+if __name__ == "__main__":
+    link_loop.run(fly(int(sys.argv[1])))

@@ -1,0 +1,24 @@
+"""The floor: a blocking socket that answers each datagram with one of a setpoint's size.
+
+It decides nothing and decodes nothing; Python cannot answer any faster than this.
+"""
+
+import socket
+import sys
+
+_BEFORE = bytes([0xFD, 39, 0, 0, 0, 1, 191, 82, 0, 0])  # the header of SET_ATTITUDE_TARGET
+_AFTER = bytes(35 + 2)  # the rest of its payload, and its checksum
+_STAMP = slice(10, 14)  # time_boot_ms stands there in a sample and in a setpoint
+
+
+def main(port: int) -> None:
+    """Answer until killed."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        opened.bind(("127.0.0.1", port))
+        while True:
+            data, sender = opened.recvfrom(2048)
+            opened.sendto(_BEFORE + data[_STAMP] + _AFTER, sender)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,54 @@
+"""The same job by the official MAVSDK and its asyncio interface, written as its users would.
+
+MAVSDK stamps setpoints with its own clock, so the sample's stamp goes back in the yaw rate: one
+degree per second for each millisecond.
+"""
+
+import asyncio
+import sys
+from math import degrees
+
+from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
+from mavsdk.asyncio.plugins.offboard import AttitudeRate, OffboardAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.component_type import ComponentType
+
+from companion.attitude import Target
+from companion.config import Config
+from companion.flight.assembly import planner as make_planner
+
+STAMP_MODULUS = 8192  # float32 holds the degrees and their radians exactly enough up to here
+_HOVER = 0.5
+_DT = 0.004
+
+
+def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> AttitudeRate:
+    """An AttitudeRate; its C structure has no constructor with values."""
+    rate = AttitudeRate()
+    rate.roll_deg_s, rate.pitch_deg_s, rate.yaw_deg_s = roll_deg_s, pitch_deg_s, yaw_deg_s
+    rate.thrust_value = _HOVER
+    return rate
+
+
+async def fly(port: int) -> None:
+    """Answer each sample until killed."""
+    planner = make_planner(Config())
+    target = Target(0.1, 0.0, 0.0)
+    configuration = Configuration.create_with_component_type(ComponentType.COMPANION_COMPUTER)
+    async with Mavsdk(configuration) as mavsdk:
+        await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
+        system = await mavsdk.first_autopilot(timeout_s=-1)
+        offboard, telemetry = OffboardAsync(system), TelemetryAsync(system)
+        await offboard.set_attitude_rate(setpoint(0.0, 0.0, 0.0))
+        await offboard.start()
+        async for attitude in telemetry.subscribe_attitude_quaternion():
+            q = (attitude.w, attitude.x, attitude.y, attitude.z)
+            rates = planner.rates(q, target, _DT)
+            stamp_ms = attitude.timestamp_us // 1000
+            await offboard.set_attitude_rate(
+                setpoint(degrees(rates.roll), degrees(rates.pitch), stamp_ms % STAMP_MODULUS)
+            )
+
+
+if __name__ == "__main__":
+    asyncio.run(fly(int(sys.argv[1])))

@@ -1,0 +1,119 @@
+"""Bad input gets one clear sentence and exit code 2, before anything is sent."""
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from companion.cli import main
+from tests.flight.fly import free_port
+
+ROOT = Path(__file__).parents[2]
+
+
+def run(capsys, *arguments):
+    try:
+        code = main([str(a) for a in arguments])
+    except SystemExit as exit_:  # argparse's own way
+        code = exit_.code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    return code, captured.out, " ".join(captured.err.split())
+
+
+def config(tmp_path, text):
+    path = tmp_path / "vehicle.yaml"
+    path.write_text(f"recording: {{directory: {tmp_path}/flights}}\n{text}")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("limts: {}", "`limts` is not a known key; did you mean `limits`?"),
+        ("limits: {max_tilt: 30}", "`limits.max_tilt` is not a known key; did you mean"),
+        ("limits: {max_tilt_deg: 90}", "`limits.max_tilt_deg`"),
+        ("limits: {min_thrust: 0.9}", "min_thrust must be below max_thrust"),
+        ("planner: {name: so4}", "unknown planner 'so4'"),
+        ("planner: {gain_per_s: .nan}", "finite"),
+        ("flight: {programme: [loop]}", "`flight.programme.0`"),
+        ("a: [", "not valid YAML"),
+        ("link: 3", "`link`"),
+        ("link: {endpoint: nonsense}", "nonsense"),
+        ("link: {endpoint: 'udpin://0.0.0.0:port'}", "port"),
+        ("link: {endpoint: 'serial:///dev/not-there:57600'}", "/dev/not-there"),
+        ("link: {signing_key_file: /not/there}", "/not/there"),
+        ("mock: {sped: 2}", "speed"),
+    ],
+)
+def test_a_wrong_configuration_is_refused_with_what_where_and_how(capsys, tmp_path, text, words):
+    path = config(tmp_path, text)
+    command = "check-config" if text.startswith("mock") else "fly"
+    arguments = (command, path) if command == "check-config" else (command, "--config", path)
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert words in err
+
+
+def test_a_missing_file_is_named(capsys, tmp_path):
+    code, _, err = run(capsys, "fly", "--config", tmp_path / "none.yaml")
+    assert code == 2
+    assert "none.yaml: cannot read the configuration: No such file or directory" in err
+
+
+def test_a_busy_port_is_named(capsys, tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("0.0.0.0", 0))
+        port = other.getsockname()[1]
+        path = config(tmp_path, f"link: {{endpoint: 'udpin://0.0.0.0:{port}'}}")
+        code, _, err = run(capsys, "fly", "--config", path)
+    assert code == 2
+    assert f"{port}: the port is in use by another program" in err
+
+
+def test_a_vehicle_that_is_not_there_is_a_failed_flight(capsys, tmp_path):
+    path = config(tmp_path, "flight: {connect_timeout_s: 0.3}")
+    endpoint = f"udpin://127.0.0.1:{free_port()}"
+    code, out, _ = run(capsys, "fly", "--config", path, "--endpoint", endpoint)
+    assert code == 1
+    assert "no heartbeat" in " ".join(out.split())
+
+
+def test_a_recording_folder_that_cannot_be_made_is_named(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "c.yaml"
+    path.write_text(f"recording: {{directory: {tmp_path}/file/flights}}")
+    code, _, err = run(capsys, "fly", "--config", path)
+    assert code == 2
+    assert "recording.directory: cannot make" in err
+
+
+def test_an_unknown_programme_names_the_known(capsys, tmp_path):
+    code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--programme", "loop")
+    assert code == 2
+    assert "known: hover, steps, circle" in err
+
+
+def test_bench_without_mavsdk_says_what_to_install(tmp_path):
+    (tmp_path / "mavsdk").mkdir()  # shadows the real one, as if it were not installed
+    (tmp_path / "mavsdk" / "__init__.py").write_text("raise ImportError('no mavsdk')")
+    done = subprocess.run(
+        [sys.executable, "-m", "companion", "bench", "link", "--seconds", "0.1"],
+        env={"PYTHONPATH": str(tmp_path), "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert "mavsdk" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [(), ("fly",), ("bench",), ("check-config",), ("hover",)])
+def test_wrong_usage_exits_with_2(capsys, arguments):
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert "usage" in err

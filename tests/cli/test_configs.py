@@ -1,0 +1,65 @@
+"""The shipped configurations: complete, correct, and described by the shipped schema."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from pydantic import BaseModel
+
+from companion.cli import main
+from companion.config import Config
+from companion.config_file import json_schema, load
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+FILES = sorted(CONFIGS.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
+def test_a_shipped_configuration_is_right_and_names_every_key(path, capsys):
+    load(path)
+    assert main(["check-config", str(path)]) == 0
+    assert capsys.readouterr().out == f"{path}: ok\n"
+    data = yaml.safe_load(path.read_text())
+    for section, field in Config.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            assert list(data[section]) == list(field.annotation.model_fields), section
+
+
+@pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
+def test_what_differs_from_the_default_is_marked_so(path):
+    """A comment `# default: …` stands exactly at the keys that differ, and tells the truth."""
+    default = Config()
+    section = ""
+    for line in path.read_text().splitlines():
+        if line.startswith("mock:"):
+            break
+        if line and not line[0].isspace() and line.endswith(":"):
+            section = line[:-1]
+        if not line.startswith("  ") or line.lstrip().startswith("#"):
+            continue
+        pair, _, marked = line.partition("  # default: ")
+        ((key, value),) = yaml.safe_load(pair).items()
+        standard = getattr(getattr(default, section), key)
+        standard = list(standard) if isinstance(standard, tuple) else standard
+        standard = str(standard) if isinstance(standard, Path) else standard
+        assert yaml.safe_load(marked) == standard if marked else value == standard, line
+        assert bool(marked) == (value != standard), line
+
+
+def test_a_real_vehicle_is_not_armed_by_default():
+    assert Config().flight.arm is False
+    assert load(CONFIGS / "px4.yaml").flight.arm is False
+
+
+def test_the_schema_is_the_one_that_is_printed(capsys):
+    assert (CONFIGS / "companion.schema.json").read_text() == json_schema()
+    assert main(["check-config", "--schema"]) == 0
+    assert capsys.readouterr().out == json_schema()
+
+
+def test_every_key_is_described():
+    for section, field in Config.model_fields.items():
+        model = field.annotation
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            for key, inner in model.model_fields.items():
+                assert inner.description, f"{section}.{key}"

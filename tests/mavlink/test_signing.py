@@ -1,0 +1,148 @@
+"""Signing: pymavlink judges ours, ours judges pymavlink's, and nothing else gets in."""
+
+import asyncio
+import hashlib
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.attitude import BodyRates
+from companion.mavlink import (
+    Link,
+    LinkSettings,
+    LinkTimeout,
+    Signing,
+    SigningError,
+    key_from_hex,
+    key_from_passphrase_file,
+)
+from companion.mavlink.codec import CRC_EXTRA
+from companion.mavlink.framing import FrameScanner
+from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
+
+KEY = bytes(range(32))
+NOW = 1_800_000_000.0
+TICKS = round((NOW - 1420070400) * 100_000)
+
+
+def signer(key=KEY, ticks=TICKS, link_id=3):
+    mav = dialect.MAVLink(None, 1, 1)
+    mav.signing.secret_key, mav.signing.link_id = key, link_id
+    mav.signing.timestamp, mav.signing.sign_outgoing = ticks, True
+    return mav
+
+
+def frame_of(packed):
+    [frame] = FrameScanner(CRC_EXTRA).feed(packed)
+    return frame
+
+
+def signing(now=NOW):
+    return Signing(KEY, clock=lambda: now)
+
+
+def test_pymavlinks_signature_is_accepted_once():
+    ours = signing()
+    mav = signer()
+    first, second = (frame_of(heartbeat().pack(mav)) for _ in range(2))
+    assert first.signed
+    assert ours.accepts(first)
+    assert ours.accepts(second)
+    assert not ours.accepts(second), "a replay"
+    assert not ours.accepts(first), "an older one"
+
+
+def test_another_key_a_changed_byte_and_no_signature_are_refused():
+    ours = signing()
+    assert not ours.accepts(frame_of(heartbeat().pack(signer(bytes(32)))))
+    assert not ours.accepts(frame_of(heartbeat().pack(dialect.MAVLink(None, 1, 1))))
+    packed = bytearray(heartbeat().pack(signer()))
+    packed[-1] ^= 1
+    assert not ours.accepts(frame_of(bytes(packed)))
+
+
+def test_a_recording_of_an_old_flight_is_refused():
+    a_minute_and_a_bit = 61 * 100_000
+    assert not signing().accepts(
+        frame_of(heartbeat().pack(signer(ticks=TICKS - a_minute_and_a_bit)))
+    )
+    assert signing().accepts(frame_of(heartbeat().pack(signer(ticks=TICKS - 59 * 100_000))))
+
+
+def test_streams_are_kept_apart():
+    ours = signing()
+    assert ours.accepts(frame_of(heartbeat().pack(signer(ticks=TICKS + 50, link_id=1))))
+    assert ours.accepts(frame_of(heartbeat().pack(signer(ticks=TICKS + 10, link_id=2))))
+
+
+def test_our_stamps_rise_even_when_the_clock_goes_back():
+    times = iter([NOW, NOW, NOW - 1000.0])
+    ours = Signing(KEY, clock=lambda: next(times))
+    stamps = [int.from_bytes(ours.sign(b"x")[2:8], "little") for _ in range(3)]
+    assert stamps == [TICKS, TICKS + 1, TICKS + 2]
+
+
+def test_keys(tmp_path):
+    assert key_from_hex(KEY.hex()) == KEY
+    phrase = tmp_path / "phrase"
+    phrase.write_text("open sesame\n")
+    assert key_from_passphrase_file(phrase) == hashlib.sha256(b"open sesame").digest()
+    for bad in ("", "12", "zz" * 32):
+        with pytest.raises(SigningError, match="64 hexadecimal"):
+            key_from_hex(bad)
+    with pytest.raises(SigningError, match="cannot be read"):
+        key_from_passphrase_file(tmp_path / "missing")
+    phrase.write_text("\n")
+    with pytest.raises(SigningError, match="empty"):
+        key_from_passphrase_file(phrase)
+    with pytest.raises(SigningError, match="32 bytes"):
+        Signing(b"short")
+
+
+def test_a_signed_link_end_to_end(run):
+    async def scene():
+        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
+        async with Link(settings) as link:
+            vehicle = await FakeVehicle(link.local_address).open_udp()
+            vehicle.mav = signer()
+            checked = signer()
+            vehicle._parser.signing = checked.signing
+            vehicle.send(heartbeat())
+            await link.wait_connected(5.0)
+            link.on_attitude = lambda sample: link.send_setpoint(
+                sample.time_boot_ms, BodyRates(0.1, 0.2, 0.3), 0.5
+            )
+            vehicle.send(attitude(4))
+            [setpoint] = await vehicle.hears("SET_ATTITUDE_TARGET")
+            assert setpoint.get_signed()
+            assert (setpoint.time_boot_ms, setpoint.thrust) == (4, 0.5)
+            vehicle.close()
+
+    run(scene())
+
+
+def test_an_unsigned_vehicle_is_refused_and_that_is_said_once(run, caplog):
+    async def scene():
+        settings = LinkSettings(endpoint="udpin://127.0.0.1:0", signing=signing())
+        async with Link(settings) as link:
+            vehicle = await FakeVehicle(link.local_address).open_udp()
+            vehicle.send(heartbeat(), heartbeat(), heartbeat())
+            with pytest.raises(LinkTimeout, match="3 frames not signed with our key"):
+                await link.wait_connected(0.1)
+            vehicle.close()
+
+    run(scene())
+    assert caplog.text.count("same key") == 1
+
+
+def test_without_a_key_signed_frames_are_heard_too(run):
+    async def scene():
+        async with linked() as (link, vehicle):
+            vehicle.mav = signer()
+            heard = asyncio.Event()
+            link.on_attitude = lambda sample: heard.set()
+            vehicle.send(attitude(4))
+            async with asyncio.timeout(5.0):
+                await heard.wait()
+
+    run(scene())

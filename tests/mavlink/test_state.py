@@ -1,0 +1,170 @@
+"""What telemetry becomes, and what of it is never believed."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.mavlink import UnsupportedAutopilot, family_for
+from companion.mavlink.codec import decode
+from companion.mavlink.px4 import Px4
+from companion.mavlink.router import Router
+from companion.mavlink.state import VehicleState
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.texts import TextAssembler
+from tests.mavlink.fakes import heartbeat
+
+
+class Bench:
+    def __init__(self):
+        self.now, self.stats = 10.0, LinkStats()
+        self.router = Router(self.stats)
+        self.state = VehicleState(self.router, self.stats, TextAssembler(), lambda: self.now)
+
+    def take(self, message):
+        message.pack(dialect.MAVLink(None))
+        self.router.route(message.get_msgId(), bytes(message.get_payload()))
+        return self.state
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+# As PX4 main sends them.
+@pytest.mark.parametrize(
+    ("base_mode", "custom_mode", "mode", "armed"),
+    [
+        (29, 0x03040000, "AUTO.LOITER", False),
+        (157, 0x02040000, "AUTO.TAKEOFF", True),
+        (157, 0x05040000, "AUTO.RTL", True),
+        (157, 0x06040000, "AUTO.LAND", True),
+        (1, 0x00060000, "OFFBOARD", False),
+        (129, 0x00060000, "OFFBOARD", True),
+        (129, 0x00630000, "mode 0x00630000", True),
+    ],
+)
+def test_heartbeats(bench, base_mode, custom_mode, mode, armed):
+    state = bench.take(dialect.MAVLink_heartbeat_message(2, 12, base_mode, custom_mode, 4, 3))
+    assert (state.mode, state.armed) == (mode, armed)
+    assert state.heartbeat.received == 10.0
+    assert state.heartbeat.system_status == 4
+    assert not state.failsafe
+
+
+def test_failsafe_is_seen(bench):
+    assert bench.take(dialect.MAVLink_heartbeat_message(2, 12, 157, 0x05040000, 5, 3)).failsafe
+
+
+def test_another_parts_heartbeat_is_not_the_autopilots(bench):
+    assert bench.take(heartbeat(autopilot=8)).heartbeat is None
+
+
+def test_position_with_both_times(bench):
+    state = bench.take(dialect.MAVLink_local_position_ned_message(2500, 1, 2, -3, 0.5, -0.5, 0.25))
+    assert (state.position.received, state.position.vehicle_time) == (10.0, 2.5)
+    assert state.position_ned == (1.0, 2.0, -3.0)
+    assert state.velocity_ned == (0.5, -0.5, 0.25)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_positions_that_are_not_finite_are_counted_never_stored(bench, bad):
+    good = dialect.MAVLink_local_position_ned_message(4, 1, 2, -3, 0, 0, 0)
+    bench.take(good)
+    for place in range(6):
+        values = [1.0, 2.0, -3.0, 0.0, 0.0, 0.0]
+        values[place] = bad
+        bench.take(dialect.MAVLink_local_position_ned_message(8, *values))
+    assert bench.state.position.vehicle_time == 0.004
+    assert bench.stats.non_finite == 6
+
+
+def sys_status(voltage, remaining, health=0):
+    return dialect.MAVLink_sys_status_message(
+        0, 0, health, 0, voltage, -1, remaining, 0, 0, 0, 0, 0, 0
+    )
+
+
+def test_battery(bench):
+    assert bench.take(sys_status(15800, 73)).battery == (10.0, 15.8, 0.73)
+    assert bench.take(sys_status(65535, -1)).battery == (10.0, None, None)
+    cells = [4100, 4000, 3900, *[65535] * 7]
+    message = dialect.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 55)
+    assert bench.take(message).battery == (10.0, 12.0, 0.55)
+
+
+def test_prearm_check_comes_with_sys_status(bench):
+    assert bench.state.prearm_good is None
+    assert bench.take(sys_status(0, 0, 0x10000000)).prearm_good is True
+    assert bench.take(sys_status(0, 0, 0)).prearm_good is False
+
+
+def test_landed_gps_home_estimator(bench):
+    assert bench.take(dialect.MAVLink_extended_sys_state_message(0, 1)).landed
+    assert not bench.take(dialect.MAVLink_extended_sys_state_message(0, 2)).landed
+    gps = dialect.MAVLink_gps_raw_int_message(0, 3, 473977418, 85455939, 488000, 1, 1, 1, 1, 10)
+    assert bench.take(gps).gps == (10.0, 3, 10, 488.0)
+    home = dialect.MAVLink_home_position_message(
+        473977418, 85455939, 488000, 0, 0, -0.5, [1, 0, 0, 0], 0, 0, 0
+    )
+    state = bench.take(home)
+    assert (state.home.latitude_deg, state.home.altitude_m) == (47.3977418, 488.0)
+    estimator = dialect.MAVLink_estimator_status_message(0, 0x33F, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert bench.take(estimator).estimator == (10.0, 0x33F)
+
+
+def text(words, number=0, chunk=0, severity=4):
+    return dialect.MAVLink_statustext_message(severity, words, number, chunk)
+
+
+def test_texts_lose_their_tab_and_long_ones_are_joined(bench):
+    bench.take(text(b"Armed by external command\t"))
+    bench.take(text(b"a" * 50, 7, 0))
+    bench.take(text(b"b" * 50, 7, 1))
+    bench.take(text(b"c\t", 7, 2))
+    words = [entry.text for entry in bench.state.texts]
+    assert words == ["Armed by external command", "a" * 50 + "b" * 50 + "c"]
+
+
+def test_a_text_without_its_end_is_given_when_the_next_begins(bench):
+    bench.take(text(b"a" * 50, 7, 0))
+    bench.take(text(b"next"))
+    bench.take(text(b"d" * 50, 8, 0))
+    bench.take(text(b"e" * 50, 9, 0))
+    bench.take(text(b"", 9, 1))
+    words = [entry.text for entry in bench.state.texts]
+    assert words == ["a" * 50, "next", "d" * 50, "e" * 50]
+
+
+def test_px4_speaks_px4():
+    family = family_for(12)
+    assert family.name == "PX4"
+    assert family.set_mode("OFFBOARD")[:4] == (176, 1.0, 6.0, 0.0)
+    assert family.set_mode("AUTO.LOITER")[:4] == (176, 1.0, 4.0, 3.0)
+    for name, number in family.modes.items():
+        assert family.mode_name(number) == name
+    assert {family.offboard_mode, family.hold_mode, family.land_mode} <= set(family.modes)
+    assert family.arm()[:2] == (400, 1.0)
+    assert family.disarm()[:2] == (400, 0.0)
+    assert family.land()[0] == 21
+    with pytest.raises(KeyError):
+        family.set_mode("WARP")
+
+
+def test_wanted_messages_exist():
+    for name in Px4.wanted_rates:
+        Router(LinkStats()).subscribe(name, lambda _: None)
+
+
+def test_other_autopilots_are_refused():
+    with pytest.raises(UnsupportedAutopilot, match="PX4"):
+        family_for(3)
+
+
+def test_a_malformed_message_is_counted(bench):
+    heard = []
+    bench.router.subscribe("STATUSTEXT", heard.append)
+    bench.router.route(253, b"\x04" + b"\xff" * 50)
+    assert len(heard) == 1  # undecodable letters are replaced, not refused
+    assert decode(253, b"\x04" + b"\xff" * 50).severity == 4

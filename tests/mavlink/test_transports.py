@@ -1,0 +1,273 @@
+"""TCP both ways and serial (a pseudo-terminal): cut frames, drops, and nothing stale after them."""
+
+import asyncio
+import os
+import pty
+import tty
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.attitude import BodyRates
+from companion.mavlink import EndpointError, Link, LinkLost, LinkSettings
+from companion.mavlink import connection as connection_module
+from companion.mavlink import udp as udp_module
+from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
+
+LEVEL = BodyRates(0.0, 0.0, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def quick_reconnect(monkeypatch):
+    monkeypatch.setattr(connection_module, "_BACKOFF_FIRST_S", 0.01)
+
+
+class TcpVehicle(FakeVehicle):
+    """A vehicle that listens, or connects."""
+
+    async def listen(self, port=0):
+        self.server = await asyncio.start_server(self._serve, "127.0.0.1", port)
+        self.address = self.server.sockets[0].getsockname()
+        return self
+
+    async def connect(self, address):
+        await self._use(*await asyncio.open_connection(*address))
+        return self
+
+    async def _serve(self, reader, writer):
+        await self._use(reader, writer)
+
+    async def _use(self, reader, writer):
+        self.writer = writer
+        self.write_with(writer.write)
+        self.reading = asyncio.create_task(self._read(reader))
+        self.send(heartbeat())
+
+    async def _read(self, reader):
+        while data := await reader.read(4096):
+            self.take(data)
+
+    def drop(self):
+        self.writer.transport.abort()
+
+
+def tcp(vehicle):
+    return LinkSettings(endpoint=f"tcp://127.0.0.1:{vehicle.address[1]}")
+
+
+def test_tcp_client_reads_frames_cut_anywhere(run):
+    async def scene():
+        vehicle = await TcpVehicle().listen()
+        async with Link(tcp(vehicle)) as link:
+            await link.wait_connected(5.0)
+            stamps = []
+            link.on_attitude = lambda sample: stamps.append(sample.time_boot_ms)
+            [first, second] = frames_of(attitude(4), attitude(8), start=vehicle.mav.seq)
+            stream = b"noise" + first + b"\xfd\x00" + second
+            for index in range(0, len(stream), 7):
+                vehicle.send_raw(stream[index : index + 7])
+                await asyncio.sleep(0)
+            await until(lambda: len(stamps) == 2)
+            assert stamps == [4, 8]
+            link.send_setpoint(8, LEVEL, 0.5)
+            assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 8
+        vehicle.server.close()
+
+    run(scene())
+
+
+def test_after_a_drop_nothing_old_is_sent_and_commands_are_told(run):
+    async def scene():
+        vehicle = await TcpVehicle().listen()
+        async with Link(tcp(vehicle)) as link:
+            await link.wait_connected(5.0)
+            waiting = asyncio.create_task(link.command(400, 1.0, timeout_s=30.0))
+            await vehicle.hears("COMMAND_LONG")
+            port = vehicle.address[1]
+            vehicle.server.close()
+            vehicle.drop()
+            with pytest.raises(LinkLost, match="dropped"):
+                await waiting
+            for stamp in range(50):  # into the void
+                link.send_setpoint(stamp, LEVEL, 0.5)
+            assert link.stats.not_sent >= 50
+            again = await TcpVehicle().listen(port)
+            await until(lambda: link.stats.reconnects == 1)
+            link.send_setpoint(1000, LEVEL, 0.5)
+            setpoints = await again.hears("SET_ATTITUDE_TARGET")
+            assert [setpoint.time_boot_ms for setpoint in setpoints] == [1000]
+            assert again.of("COMMAND_LONG") == []
+            samples = []
+            link.on_attitude = samples.append
+            again.send(attitude(4))
+            await until(lambda: samples)
+            again.server.close()
+
+    run(scene())
+
+
+def test_a_vehicle_that_does_not_read_gets_no_backlog(run):
+    async def scene():
+        vehicle = TcpVehicle()
+        server = await asyncio.start_server(
+            lambda reader, writer: vehicle.write_with(writer.write), "127.0.0.1", 0, limit=1
+        )
+        vehicle.address = server.sockets[0].getsockname()
+        async with Link(tcp(vehicle)) as link:
+            await asyncio.sleep(0.01)
+            connection = link._outbox.transport._connection
+            connection.pause_reading()
+            for stamp in range(200_000):
+                link.send_setpoint(stamp, LEVEL, 0.5)
+                if link.stats.not_sent:
+                    break
+            assert link.stats.not_sent
+            assert connection.get_write_buffer_size() < 4096
+        server.close()
+
+    run(scene())
+
+
+def test_tcp_server_takes_one_vehicle_and_the_next_after_it(run):
+    async def scene():
+        async with Link(LinkSettings(endpoint="tcpin://127.0.0.1:0")) as link:
+            vehicle = await TcpVehicle().connect(link.local_address)
+            await link.wait_connected(5.0)
+            _, turned_away = await asyncio.open_connection(*link.local_address)
+            vehicle.send(heartbeat(0x00060000))
+            await until(lambda: link.state.mode == "OFFBOARD")
+            vehicle.drop()
+            await until(lambda: link.stats.reconnects == 1)
+            turned_away.close()
+            again = await TcpVehicle().connect(link.local_address)
+            await until(lambda: link.state.mode == "AUTO.LOITER")
+            link.send_setpoint(4, LEVEL, 0.5)
+            await again.hears("SET_ATTITUDE_TARGET")
+            again.drop()
+
+    run(scene())
+
+
+def test_tcp_errors_say_how_to_mend_them(run, monkeypatch):
+    async def scene():
+        vehicle = await TcpVehicle().listen()
+        port = vehicle.address[1]
+        with pytest.raises(EndpointError, match="port is in use"):
+            async with Link(LinkSettings(endpoint=f"tcpin://127.0.0.1:{port}")):
+                pass
+        vehicle.server.close()
+        await vehicle.server.wait_closed()
+        with pytest.raises(EndpointError, match="running and listening"):
+            async with Link(LinkSettings(endpoint=f"tcp://127.0.0.1:{port}")):
+                pass
+
+    run(scene())
+
+
+@pytest.mark.parametrize("scheme", ["tcp", "udpout"])
+def test_an_unknown_host_is_said(run, scheme):
+    async def scene():
+        with pytest.raises(EndpointError, match=r"host .*unknown"):
+            async with Link(LinkSettings(endpoint=f"{scheme}://no-such-host.invalid:5760")):
+                pass
+
+    run(scene())
+
+
+def test_an_address_that_is_not_ours_is_said(run):
+    async def scene():
+        with pytest.raises(EndpointError, match="no interface"):
+            async with Link(LinkSettings(endpoint="udpin://192.0.2.1:0")):
+                pass
+
+    run(scene())
+
+
+def test_serial_both_ways_and_its_end(run):
+    async def scene():
+        ours, theirs = pty.openpty()
+        tty.setraw(ours)
+        loop = asyncio.get_running_loop()
+        vehicle = FakeVehicle()
+        vehicle.write_with(lambda frame: os.write(ours, frame))
+        loop.add_reader(ours, lambda: vehicle.take(os.read(ours, 4096)))
+        async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
+            vehicle.send(heartbeat())
+            await link.wait_connected(5.0)
+            link.on_attitude = lambda sample: link.send_setpoint(sample.time_boot_ms, LEVEL, 0.5)
+            vehicle.send(attitude(4))
+            assert (await vehicle.hears("SET_ATTITUDE_TARGET"))[0].time_boot_ms == 4
+            waiting = asyncio.create_task(link.command(400, timeout_s=30.0))
+            await vehicle.hears("COMMAND_LONG")
+            loop.remove_reader(ours)
+            os.close(theirs)
+            os.close(ours)
+            with pytest.raises(LinkLost):
+                await waiting
+            link.send_setpoint(8, LEVEL, 0.5)  # harmless
+
+    run(scene())
+
+
+def test_a_full_serial_buffer_never_cuts_a_frame(run):
+    async def scene():
+        ours, theirs = pty.openpty()
+        tty.setraw(ours)
+        os.set_blocking(ours, False)
+        parser = dialect.MAVLink(None)
+        async with Link(LinkSettings(endpoint=f"serial://{os.ttyname(theirs)}:921600")) as link:
+            stamps, sent = [], 0
+
+            def drain():
+                try:
+                    for message in parser.parse_buffer(os.read(ours, 65536)) or ():
+                        if message.get_type() == "SET_ATTITUDE_TARGET":
+                            stamps.append(message.time_boot_ms)
+                except BlockingIOError:
+                    pass
+
+            for round_number in range(20):
+                for index in range(500):
+                    before = link.stats.sent
+                    link.send_setpoint(1000 * round_number + index, LEVEL, 0.5)
+                    sent += link.stats.sent - before
+                drain()
+                await asyncio.sleep(0.002)
+            assert link.stats.not_sent > 0
+            while len(stamps) < sent:
+                drain()
+                await asyncio.sleep(0.001)
+            assert stamps == sorted(stamps)  # pymavlink would raise on a frame that was cut
+            assert len(stamps) == sent
+        os.close(theirs)
+        os.close(ours)
+
+    run(scene())
+
+
+def test_a_missing_device_is_said(run):
+    async def scene():
+        with pytest.raises(EndpointError, match="no such device"):
+            async with Link(LinkSettings(endpoint="serial:///dev/ttyNOSUCH:57600")):
+                pass
+
+    run(scene())
+
+
+def test_udp_vehicle_may_come_back_from_another_port(run, monkeypatch):
+    monkeypatch.setattr(udp_module, "_PEER_SILENCE_S", 0.05)
+
+    async def scene():
+        async with linked() as (link, _):
+            other = await FakeVehicle(link.local_address).open_udp()
+
+            def heard():
+                other.send(heartbeat(0x00060000))
+                return link.state.mode == "OFFBOARD"
+
+            await until(heard)
+            link.send_setpoint(4, LEVEL, 0.5)
+            await other.hears("SET_ATTITUDE_TARGET")
+            other.close()
+
+    run(scene())
