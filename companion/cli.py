@@ -21,6 +21,7 @@ from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, LinkError, SigningError
+from companion.recording.figure import FigureError, draw_flight
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
 from companion.terminal import TerminalObserver
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     errors = Console(stderr=True)
     try:
         return int(options.run(options))
-    except (ConfigError, EndpointError, SigningError) as error:
+    except (ConfigError, EndpointError, FigureError, SigningError) as error:
         errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
         return EXIT_USAGE
     except (LinkError, OSError) as error:
@@ -90,6 +91,11 @@ def _parser() -> argparse.ArgumentParser:
     link.add_argument("--rate", type=float, default=250.0, help="samples a second")
     link.add_argument("--json", action="store_true", help="print the figures as one JSON line")
     link.set_defaults(run=_bench_link)
+
+    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
+    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
+    plot.set_defaults(run=_plot)
 
     check = commands.add_parser("check-config", help="check a configuration file")
     which = check.add_mutually_exclusive_group(required=True)
@@ -205,6 +211,13 @@ def _bench_link(options: argparse.Namespace) -> int:
     figures = link.run(options.seconds, options.rate, options.json)
     if options.json:
         print(json.dumps(figures))
+    return EXIT_OK
+
+
+def _plot(options: argparse.Namespace) -> int:
+    out = options.out or options.folder / "flight.png"
+    draw_flight(options.folder, out)
+    print(out)
     return EXIT_OK
 
 

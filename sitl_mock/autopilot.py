@@ -89,7 +89,9 @@ class Autopilot:
             ).builders(),
         }
         self.faults = FaultSchedule(settings.faults)
-        self.effects = FaultEffects(self.state, self.vehicle, self.commander, self.links)
+        self.effects = FaultEffects(
+            self.state, self.vehicle, self.commander, self._control, self.links
+        )
         self._parameter_protocol = ParameterProtocol(self.parameters)
         commands = Commands(self.state, self.commander, personality, origin, self._builders)
         self._receiver = Receiver(

@@ -145,6 +145,8 @@ class Commander:
         if state.armed and crashed:
             self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
         self.check()
+        if state.armed and state.mode in PILOTED and not self.pilot:
+            self.failsafe.pilot_lost()
         self.failsafe.step()
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:

@@ -13,8 +13,8 @@ from sitl_mock.state import BatteryWarning, State
 
 _OFFBOARD_ACTIONS = {4: Mode.LAND, 5: Mode.LOITER}
 """COM_OBL_RC_ACT -> mode without a pilot; every other value returns."""
-_GCS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}
-"""NAV_DLL_ACT -> mode."""
+_LINK_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}
+"""NAV_DLL_ACT and NAV_RCL_ACT -> mode."""
 _GCS_MARGIN_US = 2_000_000
 """A lost ground station is noticed this much after COM_DL_LOSS_T (measured 12 s for 10 s)."""
 _COMPANION_MARGIN_US = 1_500_000
@@ -38,6 +38,7 @@ class Cause(Enum):
     """Why a failsafe is active; a later one never replaces an earlier of a higher value."""
 
     OFFBOARD_LOST = auto()
+    PILOT_LOST = auto()
     GCS_LOST = auto()
     BATTERY = auto()
     POSITION_LOST = auto()
@@ -105,6 +106,13 @@ class Failsafe:
             self._watch_position()
             self._watch_offboard()
 
+    def pilot_lost(self) -> None:
+        """Act on sticks that are gone while a mode needs them."""
+        action = _LINK_ACTIONS.get(int(self._parameters["NAV_RCL_ACT"]))
+        if action is not None:
+            self._announce(Occasion.PILOT_LOST, "")
+            self._act(Cause.PILOT_LOST, action)
+
     def _act(self, cause: Cause, mode: Mode) -> None:
         if self._cause is not None and self._cause.value > cause.value:
             return
@@ -142,7 +150,7 @@ class Failsafe:
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
             self._announce(Occasion.GCS_LOST, "")
-        action = _GCS_ACTIONS.get(int(self._parameters["NAV_DLL_ACT"]))
+        action = _LINK_ACTIONS.get(int(self._parameters["NAV_DLL_ACT"]))
         if action is None or not state.armed or self._gcs_lost_us < 0:
             return
         held = state.time_us - self._gcs_lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6

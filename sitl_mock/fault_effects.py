@@ -18,6 +18,7 @@ from sitl_mock.fault_config import (
     VehicleFault,
 )
 from sitl_mock.link import Link
+from sitl_mock.mode_control import ModeControl
 from sitl_mock.modes import Mode
 from sitl_mock.state import State
 from sitl_mock.vehicle import Vehicle
@@ -31,11 +32,17 @@ class FaultEffects:
         state: the autopilot's state.
         vehicle: whose estimate and battery are spoilt.
         commander: which refuses, or whose mode the pilot changes.
+        control: whose held position and heading follow an estimator reset.
         links: whose messages are spoilt.
     """
 
     def __init__(
-        self, state: State, vehicle: Vehicle, commander: Commander, links: list[Link]
+        self,
+        state: State,
+        vehicle: Vehicle,
+        commander: Commander,
+        control: ModeControl,
+        links: list[Link],
     ) -> None:
         self.offboard_us: int | None = None
         """When OFFBOARD was first entered armed, vehicle time."""
@@ -43,6 +50,7 @@ class FaultEffects:
         self._state = state
         self._vehicle = vehicle
         self._commander = commander
+        self._control = control
         self._links = links
         self._stopped: list[StopTelemetry] = []
         self._nan: list[NanField] = []
@@ -80,9 +88,9 @@ class FaultEffects:
             case PilotTakeover():
                 self._commander.take_over(Mode[fault.mode])
             case EstimatorReset():
-                self._vehicle.shift_estimate(
-                    yaw=radians(fault.yaw_deg), position_ned=fault.position_ned_m
-                )
+                step = radians(fault.yaw_deg)
+                self._vehicle.shift_estimate(yaw=step, position_ned=fault.position_ned_m)
+                self._control.shift(step, fault.position_ned_m)
             case RefuseArming():
                 self._commander.refusal = fault.reason
             case LowBattery():

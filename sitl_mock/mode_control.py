@@ -71,6 +71,14 @@ class ModeControl:
             self._begin_return()
         self._position.reset()
 
+    def shift(self, yaw_step: float, position_step: Vector) -> None:
+        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        x, y, z = self._hold
+        dx, dy, dz = position_step
+        self._hold = (x + dx, y + dy, z + dz)
+        self._takeoff_z += dz
+        self._yaw += yaw_step
+
     @property
     def takeoff_reached(self) -> bool:
         """Whether TAKEOFF is as good as at its height."""

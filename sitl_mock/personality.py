@@ -33,6 +33,7 @@ class Occasion(Enum):
     BATTERY_CRITICAL = auto()
     BATTERY_EMERGENCY = auto()
     PILOT_TOOK_OVER = auto()
+    PILOT_LOST = auto()
 
 
 class Event(NamedTuple):

@@ -38,5 +38,6 @@ PX4_EVENTS: dict[Occasion, Event] = {
     Occasion.BATTERY_LOW: Event("Low battery level, return advised\t", _WARNING),
     Occasion.BATTERY_CRITICAL: Event("Critical battery level, land now\t", _CRITICAL),
     Occasion.BATTERY_EMERGENCY: Event("Dangerously low battery, shut system down\t", _CRITICAL),
+    Occasion.PILOT_LOST: Event("Failsafe activated: no manual control\t", _CRITICAL),
     Occasion.PILOT_TOOK_OVER: Event("Pilot took over using sticks\t", _CRITICAL),
 }

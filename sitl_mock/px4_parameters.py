@@ -89,7 +89,7 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("MPC_Z_V_AUTO_UP", 3.0),  # *
         ("NAV_ACC_RAD", 2.0),  # *
         ("NAV_DLL_ACT", 0),  # *
-        ("NAV_RCL_ACT", 2),
+        ("NAV_RCL_ACT", 2),  # *
         ("RTL_CONE_ANG", 45),  # *
         ("RTL_DESCEND_ALT", 30.0),
         ("RTL_LAND_DELAY", 0.0),

@@ -1,11 +1,13 @@
 """The vehicle's side of the benchmark: sends samples at a rate, times what comes back."""
 
+import contextlib
 import select
 import socket
 import struct
 import time
 from collections.abc import Callable
 from math import degrees
+from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
 
@@ -53,12 +55,19 @@ class Sender:
         self._mav = dialect.MAVLink(None, 1, 1)
         self._parser = dialect.MAVLink(None)
         self._parser.robust_parsing = True
+        self._boot = time.perf_counter_ns()
         self._time_ms = 0
         self._under_way: dict[int, int] = {}
+        self._keeping = False
         self.round_trips_ns: list[int] = []
         self.sent = 0
         self.cpu_ns = 0
         self.wall_ns = 0
+
+    @property
+    def name(self) -> str:
+        """Who answers, for people."""
+        return self._contestant.name
 
     def close(self) -> None:
         """Close the socket."""
@@ -80,7 +89,8 @@ class Sender:
         """
         end = time.monotonic() + _READY_TIMEOUT_S
         beat = 0.0
-        while not self.round_trips_ns:
+        answered = False
+        while not answered:
             self._contestant.check_running()
             if time.monotonic() > end:
                 raise ContestantError(
@@ -89,9 +99,8 @@ class Sender:
             if time.monotonic() > beat:
                 beat = time.monotonic() + 0.5
                 self.heartbeat()
-            self._sample(4)
-            self._listen_until(time.perf_counter_ns() + 20_000_000)
-        self.round_trips_ns.clear()
+            self._sample()
+            answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
 
     def play(self, rate_hz: float, seconds: float) -> None:
         """Send samples at `rate_hz` for `seconds`, and keep the round trips.
@@ -101,21 +110,69 @@ class Sender:
         """
         self._contestant.check_running()
         self.heartbeat()
-        period_ns = round(1e9 / rate_hz)
-        period_ms = max(1, round(1000.0 / rate_hz))
-        due = time.perf_counter_ns() + period_ns
-        for _ in range(_SETTLE_SAMPLES):
-            self._listen_until(due)
-            self._sample(period_ms)
-            due += period_ns
-        self._listen_until(due)
-        before, cpu = len(self.round_trips_ns), self._contestant.cpu_ns()
-        began = time.perf_counter_ns()
-        del self.round_trips_ns[before - min(before, self._fresh) :]
-        for _ in range(round(rate_hz * seconds)):
-            self._sample(period_ms)
-            due += period_ns
-            self._listen_until(due)
-            self.sent += 1
+        due = self._samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
+        self._under_way.clear()
+        self._keeping = True
+        cpu, began = self._contestant.cpu_ns(), time.perf_counter_ns()
+        count = round(rate_hz * seconds)
+        self._samples(count, rate_hz, due)
+        self.sent += count
         self.cpu_ns += self._contestant.cpu_ns() - cpu
         self.wall_ns += time.perf_counter_ns() - began
+        self._keeping = False
+
+    def _samples(self, count: int, rate_hz: float, due: int) -> int:
+        period_ns = round(1e9 / rate_hz)
+        for _ in range(count):
+            self._sample()
+            due += period_ns
+            self._listen_until(due)
+        return due
+
+    def _sample(self) -> None:
+        # Real time, as a vehicle's is, but no stamp twice: it is what answers are known by.
+        self._time_ms = max(self._time_ms + 1, (time.perf_counter_ns() - self._boot) // 1_000_000)
+        frame = self._pack(
+            dialect.MAVLink_attitude_quaternion_message(self._time_ms, *_TILT, 0.01, 0.02, 0.03)
+        )
+        self._under_way[self._time_ms % self._modulus] = time.perf_counter_ns()
+        self._send(frame)
+
+    def _listen_until(self, due: int) -> bool:
+        """Take answers until the time `due`; true if one belonged to a sample."""
+        matched = False
+        while (left := due - time.perf_counter_ns()) > 0:
+            # poll() counts whole milliseconds, so the last one is slept away beside it.
+            if not self._poll.poll(left // 1_000_000):
+                time.sleep(max(0, due - time.perf_counter_ns()) * 1e-9)
+            try:
+                data = self._socket.recv(2048)
+            except OSError:
+                continue  # nothing yet, or a refusal: the contestant is not up yet
+            now = time.perf_counter_ns()
+            if len(data) == _SETPOINT_BYTES and data[7] == _SETPOINT_ID:
+                began = self._under_way.pop(self._stamp(data) % self._modulus, None)
+                matched = matched or began is not None
+                if began is not None and self._keeping:
+                    self.round_trips_ns.append(now - began)
+            else:
+                self._converse(data)
+        return matched
+
+    def _converse(self, data: bytes) -> None:
+        """Accept every command, as MAVSDK needs to begin."""
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_type() == "COMMAND_LONG":
+                self._say(dialect.MAVLink_command_ack_message(message.command, 0))
+
+    def _say(self, message: Any) -> None:
+        self._send(self._pack(message))
+
+    def _pack(self, message: Any) -> bytes:
+        frame: bytes = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) & 0xFF
+        return frame
+
+    def _send(self, frame: bytes) -> None:
+        with contextlib.suppress(OSError):  # refused: the contestant is not up yet
+            self._socket.sendto(frame, ("127.0.0.1", self._contestant.port))

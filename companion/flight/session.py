@@ -51,7 +51,7 @@ class Session:
         return True
 
     async def fly(self) -> Summary:
-        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`.
+        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, two CSV files.
 
         Raises:
             LinkError: the link could not be opened; nothing was sent.
@@ -114,6 +114,7 @@ class Session:
         )
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
+            assembled.trace.save(self._folder)
         except OSError as error:
-            flight.note(f"{self._folder}: summary not written: {error.strerror}")
+            flight.note(f"{self._folder}: not everything was written: {error.strerror}")
         return summary

@@ -37,7 +37,7 @@ class Hover:
     duration: float
     name: str = "hover"
 
-    def at(self, time: float, start: Pose) -> Reference:  # noqa: ARG002
+    def at(self, time: float, start: Pose) -> Reference:
         """The reference: the starting pose at rest."""
         return Reference(start.position_ned, heading=start.heading)
 

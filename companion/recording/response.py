@@ -37,7 +37,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         rows: vehicle time s, quaternion w x y z, target north, target east.
         gain: p of the ideal model, 1/s.
     """
-    doublets = [part for part in _split(rows) if len(part) > 10]
+    doublets = [part for part in split_doublets(rows) if len(part) > 10]
     if not doublets:
         return None
     times = [part[:, 0] for part in doublets]
@@ -45,7 +45,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     targets = [part[:, 5:7] for part in doublets]
     deviation, cross = 0.0, 0.0
     for t, c, d in zip(times, measured, targets, strict=True):
-        ideal = _first_order(t, d, c[0], 1.0 / gain)
+        ideal = first_order(t, d, c[0], 1.0 / gain)
         deviation = max(deviation, float(np.hypot(*(c - ideal).T).max()))
         along = d[0] / np.hypot(*d[0])
         across = (c - c[0]) @ np.array([-along[1], along[0]])
@@ -63,13 +63,14 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     return StepResponse(north, east, cross, deviation)
 
 
-def _split(rows: Floats) -> list[Floats]:
+def split_doublets(rows: Floats) -> list[Floats]:
+    """The rows of each doublet by itself."""
     if len(rows) == 0:
         return []
     return np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _GAP) + 1)
 
 
-def _first_order(t: Floats, target: Floats, start: Floats, time_constant: float) -> Floats:
+def first_order(t: Floats, target: Floats, start: Floats, time_constant: float) -> Floats:
     """Exact response, in discrete time, of τ·ċ = c_d − c to a target held over each sample."""
     decay = np.exp(-np.diff(t) / time_constant)
     out = np.empty_like(target)
@@ -86,7 +87,7 @@ def _fit_time_constant(runs: list[tuple[Floats, Floats, Floats]]) -> float:
 
     def cost(log_tau: float) -> float:
         tau = float(np.exp(log_tau))
-        return sum(float(np.sum((_first_order(t, d, c[0], tau) - c) ** 2)) for t, d, c in runs)
+        return sum(float(np.sum((first_order(t, d, c[0], tau) - c) ** 2)) for t, d, c in runs)
 
     low, high = np.log(0.02), np.log(2.0)
     ratio = (np.sqrt(5.0) - 1.0) / 2.0

@@ -88,6 +88,7 @@ class Summary:
         return {
             "result": self.result,
             "phase": self.phase,
+            "gain_per_s": self.gain,
             "samples": self.counts.samples,
             "setpoints": self.counts.setpoints,
             "missed_deadlines": self.counts.missed_deadlines,

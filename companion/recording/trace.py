@@ -2,6 +2,7 @@
 
 from array import array
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,12 @@ from companion.attitude import Quaternion, Target
 _MAX_SAMPLES = 500_000
 """Half an hour at 250 Hz; later samples are not measured, only recorded in the tlog."""
 
-_RESPONSE_WIDTH = 7
-_TRACKING_WIDTH = 7
+_RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
+_TRACKING = (
+    "time_s",
+    *(f"reference_{axis}_m" for axis in ("north", "east", "down")),
+    *(f"measured_{axis}_m" for axis in ("north", "east", "down")),
+)
 
 
 @dataclass(slots=True)
@@ -31,7 +36,7 @@ class FlightTrace:
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
         """Note an attitude sample that was answered during a step."""
-        if len(self.response) < _RESPONSE_WIDTH * _MAX_SAMPLES:
+        if len(self.response) < len(_RESPONSE) * _MAX_SAMPLES:
             self.response.extend((vehicle_time, *q, target.north, target.east))
 
     def add_tracking(
@@ -41,7 +46,7 @@ class FlightTrace:
         measured: tuple[float, float, float],
     ) -> None:
         """Note where the vehicle ought to be and where it is (NED, m)."""
-        if len(self.tracking) < _TRACKING_WIDTH * _MAX_SAMPLES:
+        if len(self.tracking) < len(_TRACKING) * _MAX_SAMPLES:
             self.tracking.extend((time, *reference, *measured))
 
     def add_latency(self, nanoseconds: int) -> None:
@@ -49,10 +54,24 @@ class FlightTrace:
         if len(self.latencies_ns) < _MAX_SAMPLES:
             self.latencies_ns.append(nanoseconds)
 
+    def save(self, folder: Path) -> None:
+        """Write `response.csv` and `tracking.csv`, as far as there is something to write.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        for name, columns, rows in (
+            ("response.csv", _RESPONSE, self.response_rows()),
+            ("tracking.csv", _TRACKING, self.tracking_rows()),
+        ):
+            if len(rows):
+                header = ",".join(columns)
+                np.savetxt(folder / name, rows, "%.9g", ",", header=header, comments="")
+
     def response_rows(self) -> NDArray[np.float64]:
         """(N, 7), as `response`."""
-        return np.array(self.response).reshape(-1, _RESPONSE_WIDTH)
+        return np.array(self.response).reshape(-1, len(_RESPONSE))
 
     def tracking_rows(self) -> NDArray[np.float64]:
         """(N, 7), as `tracking`."""
-        return np.array(self.tracking).reshape(-1, _TRACKING_WIDTH)
+        return np.array(self.tracking).reshape(-1, len(_TRACKING))

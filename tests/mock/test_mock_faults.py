@@ -179,6 +179,26 @@ def test_the_pilot_takes_over_and_setpoints_do_not_bring_offboard_back(mode):
     assert "Pilot took over using sticks\t" in rig.texts()
 
 
+def test_when_the_pilots_sticks_are_gone_it_returns():
+    rig = Rig()
+    rig.fly_offboard()
+    strike(rig, "pilot_takeover", mode="ALTCTL", duration_s=1.0)
+    rig.run(1.2)
+    assert rig.state.mode.name == "RTL"
+    assert rig.state.failsafe
+
+
+def test_an_estimator_reset_does_not_move_a_holding_vehicle():
+    rig = Rig()
+    rig.take_off()
+    rig.run(2.0)
+    before = rig.truth
+    strike(rig, "estimator_reset", yaw_deg=15.0, position_ned_m=[2.0, 3.0, -1.0])
+    rig.run(3.0)
+    assert rig.truth.position_ned == pytest.approx(before.position_ned, abs=0.2)
+    assert rig.truth.q == pytest.approx(before.q, abs=0.02)
+
+
 def test_estimator_reset_jumps_and_counts():
     rig = Rig()
     before = rig.messages("ODOMETRY")[-1]

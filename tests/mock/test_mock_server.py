@@ -249,8 +249,9 @@ def test_random_datagrams_over_the_socket_change_nothing():
             if data:
                 data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
             client.socket.sendto(bytes(data), client.mock)
-        client.command(512, 148)
-        client.wait_for("AUTOPILOT_VERSION")
+            if number % 50 == 49:  # let the mock keep up: a full socket buffer drops datagrams
+                client.command(512, 148)
+                client.wait_for("AUTOPILOT_VERSION")
         state = ask(control, {"state": True})
         assert (state["armed"], state["mode"], state["setpoints"]) == (False, "LOITER", 0)
 

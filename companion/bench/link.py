@@ -1,0 +1,141 @@
+"""`companion bench link`: how long a sample takes to become a setpoint, ours and others'.
+
+One sender plays the vehicle to three programs in turn, in short rounds, so that all of them meet
+the same state of the machine: a bare echo in Python (the floor), this program, and MAVSDK.
+"""
+
+import gc
+import importlib.util
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from math import ceil
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from companion.bench.process import Contestant, ContestantError
+from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
+
+_ROUND_S = 1.0
+_NO_WRAP = 2**32
+_YAW_RATE_WRAP = 8192
+
+
+class _Entry(NamedTuple):
+    key: str
+    title: str
+    module: str
+    stamp: Stamp
+    modulus: int
+
+
+_ENTRIES = (
+    _Entry("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
+    _Entry("companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP),
+    _Entry("mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
+)
+
+
+def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
+    """Measure all three, in interleaved rounds of about a second.
+
+    Args:
+        seconds: How long each of them is measured.
+        rate_hz: Samples a second.
+        as_json: Print nothing; the caller prints what is returned.
+
+    Returns:
+        For `echo`, `companion` and `mavsdk`: `p50_us`, `p99_us`, `max_us`, `cpu_percent` (of one
+        core), `samples` and `unanswered`; and `ratio` with `companion_to_echo` and
+        `companion_to_mavsdk` of the p50.
+
+    Raises:
+        ContestantError: MAVSDK is not installed, a program failed, or an argument is not above 0.
+    """
+    if seconds <= 0.0 or rate_hz <= 0.0:
+        raise ContestantError("--seconds and --rate must be above 0")
+    if importlib.util.find_spec("mavsdk") is None:
+        raise ContestantError(
+            "MAVSDK is not installed; the benchmark needs the extra: "
+            "pip install 'mavlink-companion[mavsdk]'"
+        )
+    rounds = ceil(seconds / _ROUND_S)
+    with ExitStack() as stack, _no_garbage_collection():
+        senders = {entry.key: _start(stack, entry) for entry in _ENTRIES}
+        for sender in senders.values():
+            sender.wait_ready()
+        for _ in range(rounds):
+            for playing in senders.values():
+                playing.play(rate_hz, seconds / rounds)
+                for sender in senders.values():
+                    sender.heartbeat()
+        figures = {key: _figures(sender) for key, sender in senders.items()}
+    figures["ratio"] = {
+        f"companion_to_{other}": round(figures["companion"]["p50_us"] / figures[other]["p50_us"], 3)
+        for other in ("echo", "mavsdk")
+    }
+    if not as_json:
+        _show(figures, rate_hz)
+    return figures
+
+
+def _start(stack: ExitStack, entry: _Entry) -> Sender:
+    contestant = Contestant(entry.title, entry.module)
+    stack.callback(contestant.stop)
+    sender = Sender(contestant, entry.stamp, entry.modulus)
+    stack.callback(sender.close)
+    return sender
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    """Keep the sender's own pauses out of what it measures."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _figures(sender: Sender) -> dict[str, Any]:
+    ordered = sorted(sender.round_trips_ns)
+    if not ordered:
+        raise ContestantError(f"{sender.name} answered none of {sender.sent} samples in time")
+    return {
+        "p50_us": _us(ordered, 0.50),
+        "p99_us": _us(ordered, 0.99),
+        "max_us": _us(ordered, 1.0),
+        "cpu_percent": round(100.0 * sender.cpu_ns / sender.wall_ns, 2),
+        "samples": sender.sent,
+        "unanswered": sender.sent - len(ordered),
+    }
+
+
+def _us(ordered: list[int], quantile: float) -> float:
+    index = min(len(ordered) - 1, int(quantile * len(ordered)))
+    return round(ordered[index] / 1000.0, 1)
+
+
+def _show(figures: dict[str, Any], rate_hz: float) -> None:
+    table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz")
+    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for entry in _ENTRIES:
+        row = figures[entry.key]
+        table.add_row(
+            entry.title,
+            *(f"{row[key]:.0f}" for key in ("p50_us", "p99_us", "max_us")),
+            f"{row['cpu_percent']:.1f}",
+            f"{row['unanswered']} of {row['samples']}",
+        )
+    ratio = figures["ratio"]
+    console = Console()
+    console.print(table)
+    console.print(
+        f"p50 of companion: {ratio['companion_to_echo']:.2f} × echo, "
+        f"{ratio['companion_to_mavsdk']:.2f} × MAVSDK",
+        highlight=False,
+    )

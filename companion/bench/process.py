@@ -1,0 +1,55 @@
+"""A program under measurement, as a process of its own."""
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+from companion.mavlink.errors import LinkError
+
+
+class ContestantError(LinkError):
+    """A program of the benchmark cannot take part."""
+
+
+def free_port() -> int:
+    """A UDP port that nobody uses at the moment."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        opened.bind(("127.0.0.1", 0))
+        return int(opened.getsockname()[1])
+
+
+class Contestant:
+    """Starts `python -m MODULE PORT` and reads how much processor time it takes.
+
+    Args:
+        name: For people.
+        module: A module that listens on the UDP port it is given.
+    """
+
+    def __init__(self, name: str, module: str) -> None:
+        self.name = name
+        self.port = free_port()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module, str(self.port)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def check_running(self) -> None:
+        """Raise `ContestantError` with its last words if the program has ended."""
+        if self._process.poll() is not None:
+            _, errors = self._process.communicate()
+            words = errors.strip().splitlines() or ["no message"]
+            raise ContestantError(f"{self.name} ended early: {words[-1]}")
+
+    def cpu_ns(self) -> int:
+        """Processor time of all its threads so far, ns (Linux: the scheduler's own count)."""
+        tasks = Path(f"/proc/{self._process.pid}/task").iterdir()
+        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
+
+    def stop(self) -> None:
+        """Kill it."""
+        self._process.kill()
+        self._process.communicate()
