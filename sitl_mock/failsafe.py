@@ -110,21 +110,23 @@ class Failsafe:
         """Act on sticks that are gone while a mode needs them."""
         action = _LINK_ACTIONS.get(int(self._parameters["NAV_RCL_ACT"]))
         if action is not None:
-            self._announce(Occasion.PILOT_LOST, "")
-            self._act(Cause.PILOT_LOST, action)
+            self._act(Cause.PILOT_LOST, action, Occasion.PILOT_LOST)
 
-    def _act(self, cause: Cause, mode: Mode) -> None:
+    def _act(self, cause: Cause, mode: Mode, occasion: Occasion | None = None) -> None:
+        """Enter a mode for a cause, unless a graver one acts; tell of it when it is new."""
         if self._cause is not None and self._cause.value > cause.value:
             return
+        if occasion is not None and self._cause is not cause:
+            self._announce(occasion, "")
         state = self._state
         if not state.position_valid and mode in NEEDS_POSITION:
             mode = Mode.LAND
         self._cause = cause
         state.failsafe = True
-        if state.mode is not mode and not state.landed:
+        if state.landed:
+            mode = Mode.LOITER  # stays where it stands, and disarms
+        if state.mode is not mode:
             self._enter(mode)
-        elif state.landed and state.mode is Mode.OFFBOARD:
-            self._enter(Mode.LOITER)
 
     def _watch_offboard(self) -> None:
         state = self._state
@@ -132,9 +134,9 @@ class Failsafe:
             return
         alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         if state.mode is Mode.OFFBOARD and not alive:
-            self._announce(Occasion.OFFBOARD_LOST, "")
             action = int(self._parameters["COM_OBL_RC_ACT"])
-            self._act(Cause.OFFBOARD_LOST, _OFFBOARD_ACTIONS.get(action, Mode.RTL))
+            mode = _OFFBOARD_ACTIONS.get(action, Mode.RTL)
+            self._act(Cause.OFFBOARD_LOST, mode, Occasion.OFFBOARD_LOST)
         elif alive and self._cause is Cause.OFFBOARD_LOST:
             self.clear()
             self._announce(Occasion.OFFBOARD_REGAINED, "")
@@ -168,8 +170,7 @@ class Failsafe:
     def _watch_position(self) -> None:
         state = self._state
         if not state.position_valid and state.mode in NEEDS_POSITION:
-            self._announce(Occasion.POSITION_LOST, "")
-            self._act(Cause.POSITION_LOST, Mode.LAND)
+            self._act(Cause.POSITION_LOST, Mode.LAND, Occasion.POSITION_LOST)
 
     def _watch_battery(self) -> None:
         state, parameters = self._state, self._parameters

@@ -82,6 +82,14 @@ def test_lost_position_lands_where_it_is_needed():
     assert not rig.truth.crashed
 
 
+def test_a_failsafe_is_told_of_once():
+    rig = Rig(parameters={"EKF2_NOAID_TOUT": 100_000})
+    assert rig.arm() == ACCEPTED
+    rig.autopilot.faults.add(fault("gps_loss"), rig.autopilot.time_us)
+    rig.run(2.0)
+    assert sum("no valid position" in text for text in rig.texts()) == 1
+
+
 def test_offboard_by_rates_needs_no_position():
     rig = Rig(parameters={"EKF2_NOAID_TOUT": 1_000_000})
     rig.fly_offboard()
