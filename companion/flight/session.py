@@ -61,14 +61,20 @@ class Session:
         (self._folder / "config.yaml").write_text(self._config_text, encoding="utf-8")
         loop = asyncio.get_running_loop()
         epoch = 0.0 if settings.lockstep else time.time() - loop.time()
-        failures: list[str] = []
-        with TlogWriter(self._folder / "flight.tlog", epoch, failures.append) as tlog:
+
+        def on_failure(text: str) -> None:  # called in the writing thread
+            loop.call_soon_threadsafe(self._note, text)
+
+        with TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog:
             async with Link(settings, tap=tlog) as link:
                 self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
                 result = await self._run(link, self._assembled)
-        for failure in failures:
-            self._assembled.flight.note(failure)
+        await asyncio.sleep(0)  # a last word of the writing thread
         return self._finish(link, self._assembled, result, tlog.dropped)
+
+    def _note(self, text: str) -> None:
+        if self._assembled is not None:
+            self._assembled.flight.note(text)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""

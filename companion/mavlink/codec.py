@@ -115,19 +115,6 @@ class SetpointEncoder:
         self._target_system, self._target_component = target_system, target_component
         self._flags = SIGNED if signed else 0
 
-    def check(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
-        """Raise what `frame` would raise for this setpoint."""
-        roll, pitch, yaw = rates
-        # Written so that NaN fails too: it compares false with everything.
-        if not (
-            -_FLOAT32_MAX <= roll <= _FLOAT32_MAX
-            and -_FLOAT32_MAX <= pitch <= _FLOAT32_MAX
-            and -_FLOAT32_MAX <= yaw <= _FLOAT32_MAX
-            and 0.0 <= thrust <= 1.0
-            and 0 <= time_boot_ms <= 0xFFFFFFFF
-        ):
-            raise _refusal(time_boot_ms, rates, thrust)
-
     def frame(self, sequence: int, time_boot_ms: int, rates: BodyRates, thrust: float) -> bytes:
         """Build one frame (with signing: all but the signature).
 
@@ -141,8 +128,16 @@ class SetpointEncoder:
             NonFiniteSetpoint: A rate or the thrust is not finite as float32.
             InvalidSetpoint: Thrust outside 0..1 or time stamp outside uint32.
         """
-        self.check(time_boot_ms, rates, thrust)
         roll, pitch, yaw = rates
+        # Written so that NaN fails too: it compares false with everything.
+        if not (
+            -_FLOAT32_MAX <= roll <= _FLOAT32_MAX
+            and -_FLOAT32_MAX <= pitch <= _FLOAT32_MAX
+            and -_FLOAT32_MAX <= yaw <= _FLOAT32_MAX
+            and 0.0 <= thrust <= 1.0
+            and 0 <= time_boot_ms <= 0xFFFFFFFF
+        ):
+            raise _refusal(time_boot_ms, rates, thrust)
         body = _SETPOINT.pack(
             # header
             V2,

@@ -4,6 +4,8 @@ import asyncio
 import logging
 from collections.abc import Callable
 
+from fastcrc import crc16
+
 from companion.mavlink.codec import (
     ATTITUDE_QUATERNION,
     CRC_EXTRA,
@@ -11,7 +13,7 @@ from companion.mavlink.codec import (
     decode_attitude,
     decode_system_time,
 )
-from companion.mavlink.framing import Frame, FrameScanner
+from companion.mavlink.framing import V2, Frame, FrameScanner
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.router import Router
 from companion.mavlink.samples import AttitudeSample
@@ -20,6 +22,9 @@ from companion.mavlink.stats import LinkStats, SequenceTracker
 from companion.mavlink.transport import Tap
 
 _LOG = logging.getLogger(__name__)
+
+_SOURCE_AND_ID = slice(5, 10)  # system, component and the three bytes of the message id
+_ATTITUDE_EXTRA = CRC_EXTRA[ATTITUDE_QUATERNION]
 
 
 class Inbox:
@@ -37,6 +42,8 @@ class Inbox:
         self._signing = settings.signing
         self._stats, self._router, self._tap = stats, router, tap
         self._loop = asyncio.get_running_loop()
+        self._attitude_source = bytes((*self._source, ATTITUDE_QUATERNION, 0, 0))
+        self._quick = False
         self._sequence = SequenceTracker()
         self._signature_said = False
         self._held: list[tuple[Frame, int]] = []
@@ -49,21 +56,50 @@ class Inbox:
         """Begin with a fresh connection."""
         self._scanner = FrameScanner(CRC_EXTRA, streaming=streaming, stats=self._stats)
         self._sequence.reset()
+        self._quick = not streaming and self._signing is None and self.lockstep is None
 
     def follow_vehicle_time(
         self, loop: LockstepEventLoop, answer: Callable[[int], None]
     ) -> LockstepClient:
         """From now on hold what arrives until the vehicle closes its step."""
+        self._quick = False
         self.lockstep = LockstepClient(loop, self._process, self._deliver, answer)
         return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes from the transport; true if a frame in them was accepted. Never raises."""
         try:
+            if self._quick and data[_SOURCE_AND_ID] == self._attitude_source:
+                return self._take_attitude(data, received_ns) or self._take(data, received_ns)
             return self._take(data, received_ns)
         except Exception as error:  # of the tap; subscribers are guarded one by one
             self._router.report(error)
             return False
+
+    def _take_attitude(self, data: bytes, received_ns: int) -> bool:
+        """The way of a datagram that is one sample and nothing else: control first, count later.
+
+        False, and nothing done, if it is not just that. At 250 Hz the caches are cold when a
+        sample comes, and each line before the answer counts five times what it does in a loop.
+        """
+        end = len(data) - 2
+        if data[0] != V2 or data[1] + 10 != end or data[2]:
+            return False
+        if crc16.mcrf4xx(data[1:end] + _ATTITUDE_EXTRA) != data[end] | data[end + 1] << 8:
+            return False
+        decoded = decode_attitude(data[10:end])
+        if decoded is None:
+            return False
+        time_boot_ms, q, rates = decoded
+        now = self._loop.time()
+        if self._tap is not None:
+            self._tap(now, data)
+        self._control(
+            AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
+        )
+        self._count(ATTITUDE_QUATERNION, data[4])
+        self._router.route(ATTITUDE_QUATERNION, data[10:end])
+        return True
 
     def _take(self, data: bytes, received_ns: int) -> bool:
         accepted = False
@@ -95,14 +131,18 @@ class Inbox:
                     "sides the same key, or leave signing out on both"
                 )
             return False
-        missing = self._sequence.missing(frame.sequence)
+        self._count(frame.message_id, frame.sequence)
+        return True
+
+    def _count(self, message_id: int, sequence: int) -> None:
+        stats = self._stats
+        missing = self._sequence.missing(sequence)
         if missing < 0:
             stats.repeated += 1
         else:
             stats.lost += missing
         stats.frames += 1
-        stats.by_message[frame.message_id] = stats.by_message.get(frame.message_id, 0) + 1
-        return True
+        stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
     def _pass_on(self, frame: Frame, received_ns: int) -> AttitudeSample | None:
         now = self._loop.time()

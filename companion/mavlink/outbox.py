@@ -42,7 +42,7 @@ class Outbox:
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""
-        self._setpoints.check(time_boot_ms, rates, thrust)
+        self._setpoints.frame(0, time_boot_ms, rates, thrust)  # raises what cannot be sent
         self._latched = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from resource import RLIMIT_FSIZE, prlimit
 
 import pytest
 import yaml
@@ -98,3 +99,17 @@ def test_killed_the_autopilots_failsafe_lands_it(tmp_path):
         state = mock.until(lambda state: state["landed"] and not state["armed"], seconds=40)
         assert not state["crashed"]
         assert state["touchdown_speed"] < 1.5
+
+
+def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0})
+        prlimit(process.pid, RLIMIT_FSIZE, (300_000, 300_000))
+        result = finish(process, 0)
+        assert not mock.state()["armed"]
+    assert result["result"] == "ok"
+    told = [event["text"] for event in result["events"] if "recording stopped" in event["text"]]
+    assert len(told) == 1
+    assert "flight.tlog" in told[0]
+    assert result["link"]["not_recorded"] > 1000
+    assert json.loads(next((tmp_path / "flights").glob("*/summary.json")).read_text()) == result
