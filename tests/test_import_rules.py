@@ -1,0 +1,50 @@
+"""The import rules of pyproject.toml hold, and they do bite."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LINT = "from importlinter.cli import lint_imports; raise SystemExit(lint_imports(no_cache=True))"
+
+
+def lint(folder):
+    """Lint the packages that lie in `folder`, whatever is installed."""
+    return subprocess.run(
+        [sys.executable, "-c", LINT],
+        cwd=folder,
+        env={"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_imports_point_one_way():
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("sitl_mock/vehicle.py", "import companion.attitude"),
+        ("companion/flight/watch.py", "import sitl_mock.physics"),
+        ("companion/attitude/limits.py", "import companion.guidance"),
+        ("companion/guidance/hold.py", "import numpy"),
+        ("companion/mavlink/link.py", "import companion.recording.tlog"),
+        ("companion/recording/tlog.py", "import companion.config"),
+    ],
+)
+def test_a_forbidden_import_is_found(tmp_path, module, line):
+    for package in ("companion", "sitl_mock"):
+        shutil.copytree(ROOT / package, tmp_path / package)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    with (tmp_path / module).open("a") as source:
+        source.write(f"{line}\n")
+    done = lint(tmp_path)
+    assert done.returncode == 1, done.stdout
+    assert "BROKEN" in done.stdout
