@@ -19,12 +19,13 @@ class Endpoint:
     Args:
         local_port: to bind.
         remote_port: to send to from the start; None = nobody until somebody speaks.
+        option: the command-line option that changes the port, for the error message.
 
     Raises:
         ConfigError: the local port is in use.
     """
 
-    def __init__(self, local_port: int, remote_port: int | None) -> None:
+    def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self.socket.bind((HOST, local_port))
@@ -32,7 +33,7 @@ class Endpoint:
             self.socket.close()
             raise ConfigError(
                 f"UDP port {local_port} on {HOST} cannot be used ({error.strerror}): is another"
-                " mock running? Choose a different --port"
+                f" mock running? Choose a different {option}"
             ) from error
         self.socket.setblocking(False)
         self.heard = False

@@ -43,12 +43,16 @@ class Server:
         self._settings = settings
         self._status = status
         self._autopilot = Autopilot(settings, system_id)
-        self._companion = Endpoint(settings.port + PORT_OFFSET, settings.port)
+        self._companion = Endpoint(settings.port + PORT_OFFSET, settings.port, "--port")
         self._endpoints: dict[Endpoint, Link] = {self._companion: self._autopilot.companion}
         if settings.gcs_port:
-            gcs = Endpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port)
+            gcs = Endpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port, "--gcs-port")
             self._endpoints[gcs] = self._autopilot.gcs
-        self._control = Endpoint(settings.control_port, None) if settings.control_port else None
+        self._control = (
+            Endpoint(settings.control_port, None, "--control-port")
+            if settings.control_port
+            else None
+        )
         self._sockets = {endpoint.socket: endpoint for endpoint in self._endpoints}
         self._readable = list(self._sockets)
         if self._control is not None:

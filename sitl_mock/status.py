@@ -28,7 +28,7 @@ class StatusLine:
         text = (
             f"{state.time_s:8.1f} s  {state.mode.name:<9} {'armed' if state.armed else 'disarmed'}"
             f"{' FAILSAFE' if state.failsafe else ''}"
-            f"  N {north:7.2f}  E {east:7.2f}  up {-down:6.2f} m"
+            f"  N {north:7.2f}  E {east:7.2f}  up {0.0 - down:6.2f} m"
             f"  roll {roll:4.0f}  pitch {pitch:4.0f}  heading {heading % 360:4.0f} deg"
             f"  setpoints {autopilot.stream.received}"
         )

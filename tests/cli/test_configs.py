@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from companion.cli import main
 from companion.config import Config
 from companion.config_file import json_schema, load
+from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted(CONFIGS.glob("*.yaml"))
@@ -63,3 +64,10 @@ def test_every_key_is_described():
         if isinstance(model, type) and issubclass(model, BaseModel):
             for key, inner in model.model_fields.items():
                 assert inner.description, f"{section}.{key}"
+
+
+def test_the_bundled_vehicle_is_configured_with_its_defaults():
+    """As its comment says; the default of every key that is shown, too."""
+    assert load_settings(CONFIGS / "mock-px4.yaml", {}) == MockSettings()
+    shown = yaml.safe_load((CONFIGS / "mock-px4.yaml").read_text())["mock"]
+    assert list(shown) == list(MockSettings.model_fields)

@@ -267,6 +267,7 @@ def test_a_busy_port_is_one_clear_error():
     assert run.returncode == 2
     assert run.stderr.count("\n") == 1
     assert str(port + PORT_OFFSET) in run.stderr
+    assert "different --port\n" in run.stderr
 
 
 def test_ctrl_c_ends_well():
