@@ -3,6 +3,7 @@
 import socket
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 from companion.mavlink.errors import LinkError
@@ -30,19 +31,20 @@ class Contestant:
     def __init__(self, name: str, module: str) -> None:
         self.name = name
         self.port = free_port()
+        # A file, not a pipe: nobody reads it meanwhile, and a full pipe would stop the program.
+        self._words = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, str(self.port)],
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
+            stderr=self._words,
         )
 
     def check_running(self) -> None:
         """Raise `ContestantError` with its last words if the program has ended."""
         if self._process.poll() is not None:
-            _, errors = self._process.communicate()
-            words = errors.strip().splitlines() or ["no message"]
-            raise ContestantError(f"{self.name} ended early: {words[-1]}")
+            self._words.seek(0)
+            words = self._words.read().decode(errors="replace").strip().splitlines()
+            raise ContestantError(f"{self.name} ended early: {words[-1] if words else 'no word'}")
 
     def cpu_ns(self) -> int:
         """Processor time of all its threads so far, ns (Linux: the scheduler's own count)."""
@@ -52,4 +54,5 @@ class Contestant:
     def stop(self) -> None:
         """Kill it."""
         self._process.kill()
-        self._process.communicate()
+        self._process.wait()
+        self._words.close()

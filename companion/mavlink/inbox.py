@@ -45,6 +45,7 @@ class Inbox:
         self._attitude_source = bytes((*self._source, ATTITUDE_QUATERNION, 0, 0))
         self._quick = False
         self._sequence = SequenceTracker()
+        self._explained = 0
         self._signature_said = False
         self._held: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
@@ -94,9 +95,13 @@ class Inbox:
         now = self._loop.time()
         if self._tap is not None:
             self._tap(now, data)
-        self._control(
-            AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
-        )
+        if self.on_attitude is not None:
+            try:
+                self.on_attitude(
+                    AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
+                )
+            except Exception as error:
+                self._router.report(error)
         self._count(ATTITUDE_QUATERNION, data[4])
         self._router.route(ATTITUDE_QUATERNION, data[10:end])
         return True
@@ -107,12 +112,15 @@ class Inbox:
             if not self._admit(frame):
                 continue
             accepted = True
+            if self.lockstep is not None and frame.message_id == SYSTEM_TIME:
+                # Beacons are no telemetry: they have running numbers of their own.
+                self.lockstep.beacon(decode_system_time(frame.payload))
+                continue
+            self._count(frame.message_id, frame.sequence)
             if self.lockstep is None:
                 sample = self._pass_on(frame, received_ns)
                 if sample is not None:
                     self._control(sample)
-            elif frame.message_id == SYSTEM_TIME:
-                self.lockstep.beacon(decode_system_time(frame.payload))
             else:
                 self._held.append((frame, received_ns))
         return accepted
@@ -131,7 +139,6 @@ class Inbox:
                     "sides the same key, or leave signing out on both"
                 )
             return False
-        self._count(frame.message_id, frame.sequence)
         return True
 
     def _count(self, message_id: int, sequence: int) -> None:
@@ -140,7 +147,10 @@ class Inbox:
         if missing < 0:
             stats.repeated += 1
         else:
-            stats.lost += missing
+            # A message the dialect does not know has a number too; it came, and is no loss.
+            explained = min(missing, stats.unknown - self._explained)
+            self._explained += explained
+            stats.lost += missing - explained
         stats.frames += 1
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 

@@ -37,8 +37,7 @@ class Outbox:
 
     def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Send SET_ATTITUDE_TARGET now. Raises `InvalidSetpoint` before anything is sent."""
-        frame = self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust)
-        self._send(frame)
+        self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""

@@ -152,14 +152,16 @@ class LockstepVehicle(threading.Thread):
 
     def _fly(self, opened: socket.socket) -> None:
         mav, parser = dialect.MAVLink(None, 1, 1), dialect.MAVLink(None)
+        beacons = dialect.MAVLink(None, 1, 1)  # numbered apart, as the mock vehicle does
         replies: list[Any] = []
         for step in range(self._steps):
             now = 4 * step
             # The first beacon is repeated until the client is there; until then nothing is said.
             for message in (*replies, *self._say(now)) if step else ():
                 opened.sendto(message.pack(mav), self._peer)
+                mav.seq = (mav.seq + 1) & 0xFF
             replies, answered, silence = [], False, 0
-            beacon = dialect.MAVLink_system_time_message(0, now).pack(mav)
+            beacon = dialect.MAVLink_system_time_message(0, now).pack(beacons)
             for _ in range(self._copies if step else 1):
                 opened.sendto(beacon, self._peer)
             while not answered:

@@ -225,6 +225,14 @@ def test_losses_are_counted_by_the_gaps(run):
             vehicle.send(heartbeat(0x00060000))
             await until(lambda: link.state.mode == "OFFBOARD")
             assert link.stats.lost == 5
+            # A message of another dialect is not understood, but it is not lost.
+            unknown = bytearray(frames_of(heartbeat(), start=vehicle.mav.seq)[0])
+            unknown[9] = 1  # message id 65536
+            vehicle.send_raw(bytes(unknown))
+            vehicle.mav.seq = (vehicle.mav.seq + 1) & 0xFF
+            vehicle.send(heartbeat(0x03040000))
+            await until(lambda: link.state.mode == "AUTO.LOITER")
+            assert (link.stats.unknown, link.stats.lost) == (1, 5)
 
     run(scene())
 

@@ -61,7 +61,9 @@ def one_flight(steps=200, **options):
     async def scene():
         tap = lambda now, frame: taped.append((now, frame))  # noqa: E731
         async with Link(settings(port), tap) as link:
-            return await fly_a_little(link)
+            trace = await fly_a_little(link)
+            assert (link.stats.lost, link.stats.repeated) == (0, 0)
+            return trace
 
     vehicle.start()
     trace = lockstep.run(scene())

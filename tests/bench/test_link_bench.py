@@ -1,0 +1,86 @@
+"""The benchmark itself: that it measures the right answer, and says what it cannot do."""
+
+import importlib.util
+import math
+import struct
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.bench import link
+from companion.bench.process import Contestant, ContestantError
+from companion.bench.sender import Sender, stamp_by_time, stamp_by_yaw_rate
+
+
+def setpoint(stamp, yaw_rate=0.0):
+    return dialect.MAVLink_set_attitude_target_message(
+        stamp, 1, 1, 128, [1.0, 0.0, 0.0, 0.0], 0.1, 0.2, yaw_rate, 0.5
+    ).pack(dialect.MAVLink(None, 1, 191))
+
+
+def test_stamps_are_read_where_pymavlink_puts_them():
+    assert stamp_by_time(setpoint(123456)) == 123456
+    assert [
+        stamp_by_yaw_rate(setpoint(7, math.radians(degrees))) for degrees in range(8192)
+    ] == list(range(8192))
+
+
+@pytest.mark.parametrize("module", ["echo_program", "companion_program"])
+def test_every_sample_is_answered_and_its_time_taken(module):
+    contestant = Contestant(module, f"companion.bench.{module}")
+    sender = Sender(contestant, stamp_by_time, 2**32)
+    try:
+        sender.wait_ready()
+        sender.play(100.0, 0.5)
+        assert sender.sent == 50
+        assert 0 < len(sender.round_trips_ns) <= 50
+        assert min(sender.round_trips_ns) > 0
+        assert sender.cpu_ns > 0
+    finally:
+        sender.close()
+        contestant.stop()
+
+
+def test_the_echo_is_of_a_setpoints_size():
+    from companion.bench import echo_program  # noqa: PLC0415
+
+    size = len(echo_program._BEFORE) + 4 + len(echo_program._AFTER)
+    assert size == len(setpoint(1))
+    assert struct.unpack_from("<B", echo_program._BEFORE, 7)[0] == 82
+
+
+def test_a_program_that_ends_early_is_told_with_its_last_words():
+    contestant = Contestant("broken", "companion.bench.no_such_program")
+    try:
+        contestant._process.wait(10)
+        with pytest.raises(ContestantError, match=r"broken ended early: .*no_such_program"):
+            contestant.check_running()
+    finally:
+        contestant.stop()
+
+
+def test_without_mavsdk_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(ContestantError, match=r"mavlink-companion\[mavsdk\]"):
+        link.run(1.0, 250.0, as_json=True)
+
+
+@pytest.mark.parametrize(("seconds", "rate"), [(0.0, 250.0), (1.0, 0.0), (1.0, -1.0)])
+def test_senseless_arguments_are_refused(seconds, rate):
+    with pytest.raises(ContestantError, match="above 0"):
+        link.run(seconds, rate, as_json=True)
+
+
+def test_all_three_in_one_go(capsys):
+    pytest.importorskip("mavsdk")
+    figures = link.run(1.0, 100.0, as_json=False)
+    for key in ("echo", "companion", "mavsdk"):
+        row = figures[key]
+        assert 0.0 < row["p50_us"] <= row["p99_us"] <= row["max_us"]
+        assert row["cpu_percent"] > 0.0
+        assert row["samples"] == 100
+    ratio = figures["companion"]["p50_us"] / figures["echo"]["p50_us"]
+    assert figures["ratio"]["companion_to_echo"] == pytest.approx(ratio, abs=1e-3)
+    shown = capsys.readouterr().out
+    assert "MAVSDK" in shown
+    assert "× echo" in shown
