@@ -17,6 +17,7 @@ from rich.console import Console
 from companion import demo
 from companion.config import Config, FlightConfig
 from companion.config_file import ConfigError, json_schema, load
+from companion.extras import MissingExtraError
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
@@ -28,6 +29,7 @@ from companion.terminal import TerminalObserver
 
 EXIT_OK, EXIT_FLIGHT, EXIT_USAGE = 0, 1, 2
 
+_USAGE_ERRORS = (ConfigError, EndpointError, FigureError, MissingExtraError, SigningError)
 _PROGRAMMES = get_args(get_args(FlightConfig.model_fields["programme"].annotation)[0])
 
 
@@ -37,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     errors = Console(stderr=True)
     try:
         return int(options.run(options))
-    except (ConfigError, EndpointError, FigureError, SigningError) as error:
+    except _USAGE_ERRORS as error:
         errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
         return EXIT_USAGE
     except (LinkError, OSError) as error:
@@ -206,7 +208,7 @@ async def _interruptible(session: Session) -> Summary:
 
 
 def _bench_link(options: argparse.Namespace) -> int:
-    from companion.bench import link  # noqa: PLC0415  needs the extra `mavsdk`
+    from companion.bench import link  # noqa: PLC0415  no other command needs it
 
     figures = link.run(options.seconds, options.rate, options.json)
     if options.json:

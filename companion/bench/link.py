@@ -5,7 +5,6 @@ the same state of the machine: a bare echo in Python (the floor), this program, 
 """
 
 import gc
-import importlib.util
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from math import ceil
@@ -16,6 +15,7 @@ from rich.table import Table
 
 from companion.bench.process import Contestant, ContestantError
 from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
+from companion.extras import require
 
 _ROUND_S = 1.0
 _NO_WRAP = 2**32
@@ -51,15 +51,12 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         `companion_to_mavsdk` of the p50.
 
     Raises:
-        ContestantError: MAVSDK is not installed, a program failed, or an argument is not above 0.
+        MissingExtraError: MAVSDK is not installed.
+        ContestantError: A program failed, or an argument is not above 0.
     """
     if seconds <= 0.0 or rate_hz <= 0.0:
         raise ContestantError("--seconds and --rate must be above 0")
-    if importlib.util.find_spec("mavsdk") is None:
-        raise ContestantError(
-            "MAVSDK is not installed; the benchmark needs the extra: "
-            "pip install 'mavlink-companion[mavsdk]'"
-        )
+    require("mavsdk", "mavsdk", "this benchmark")
     rounds = ceil(seconds / _ROUND_S)
     with ExitStack() as stack, _no_garbage_collection():
         senders = {entry.key: _start(stack, entry) for entry in _ENTRIES}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import coefficients
+from companion.extras import require
 from companion.recording.response import first_order, split_doublets
 
 if TYPE_CHECKING:
@@ -27,15 +28,13 @@ def draw_flight(folder: Path, out: Path) -> None:
     """Draw the flight recorded in `folder` into the file `out` (its ending says which kind).
 
     Raises:
-        FigureError: matplotlib is missing, or the folder holds no response or tracking.
+        MissingExtraError: matplotlib is missing.
+        FigureError: the folder holds no response or tracking.
         OSError: the picture cannot be written.
     """
-    try:
-        import matplotlib as mpl  # noqa: PLC0415  an extra, and slow to load
-    except ImportError as error:
-        raise FigureError(
-            "drawing needs matplotlib; install it with: pip install 'mavlink-companion[plot]'"
-        ) from error
+    require("matplotlib", "plot", "drawing")
+    import matplotlib as mpl  # noqa: PLC0415  an extra, and slow to load
+
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 

@@ -36,7 +36,7 @@ def upright(c: Coefficients, heading: float) -> Rotation:
 def fly(
     planner: Planner, start: Rotation, target: Target, seconds: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray, Rotation]:
-    """Ideal kinematics: rates held over each sample. Returns (coefficients, rates, last attitude)."""
+    """Ideal kinematics, rates held over each sample: (coefficients, rates, last attitude)."""
     r = start
     path, rates = [coefficients_of(r)], []
     for _ in range(round(seconds / dt)):

@@ -21,7 +21,7 @@ from tests.attitude.simulate import coefficients_of, quaternion, rotation, uprig
 
 angles = st.floats(-math.pi, math.pi)
 unit_quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(
-    lambda v: 0.1 < math.sqrt(sum(c * c for c in v))
+    lambda v: math.sqrt(sum(c * c for c in v)) > 0.1
 )
 
 

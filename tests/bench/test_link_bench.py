@@ -1,6 +1,5 @@
 """The benchmark itself: that it measures the right answer, and says what it cannot do."""
 
-import importlib.util
 import math
 import struct
 
@@ -57,12 +56,6 @@ def test_a_program_that_ends_early_is_told_with_its_last_words():
             contestant.check_running()
     finally:
         contestant.stop()
-
-
-def test_without_mavsdk_one_sentence_says_what_to_install(monkeypatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
-    with pytest.raises(ContestantError, match=r"mavlink-companion\[mavsdk\]"):
-        link.run(1.0, 250.0, as_json=True)
 
 
 @pytest.mark.parametrize(("seconds", "rate"), [(0.0, 250.0), (1.0, 0.0), (1.0, -1.0)])

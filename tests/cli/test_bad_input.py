@@ -1,16 +1,12 @@
 """Bad input gets one clear sentence and exit code 2, before anything is sent."""
 
+import importlib.util
 import socket
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 from companion.cli import main
 from tests.flight.fly import free_port
-
-ROOT = Path(__file__).parents[2]
 
 
 def run(capsys, *arguments):
@@ -96,20 +92,24 @@ def test_an_unknown_programme_names_the_known(capsys, tmp_path):
     assert "known: hover, steps, circle" in err
 
 
-def test_bench_without_mavsdk_says_what_to_install(tmp_path):
-    (tmp_path / "mavsdk").mkdir()  # shadows the real one, as if it were not installed
-    (tmp_path / "mavsdk" / "__init__.py").write_text("raise ImportError('no mavsdk')")
-    done = subprocess.run(
-        [sys.executable, "-m", "companion", "bench", "link", "--seconds", "0.1"],
-        env={"PYTHONPATH": str(tmp_path), "PATH": "/usr/bin:/bin"},
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        check=False,
+@pytest.mark.parametrize(
+    ("module", "extra", "arguments"),
+    [("mavsdk", "mavsdk", ("bench", "link")), ("matplotlib", "plot", ("plot", "flights/x"))],
+)
+def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arguments):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *rest: None if name == module else found(name)
     )
-    assert done.returncode == 2, done.stderr
-    assert "mavsdk" in done.stderr
-    assert "Traceback" not in done.stderr
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert f"needs {module}; install it with: pip install 'mavlink-companion[{extra}]'" in err
+
+
+def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):
+    code, _, err = run(capsys, "plot", tmp_path)
+    assert code == 2
+    assert "no flight with the programme `steps` is recorded there" in err
 
 
 @pytest.mark.parametrize("arguments", [(), ("fly",), ("bench",), ("check-config",), ("hover",)])
