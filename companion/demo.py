@@ -3,6 +3,7 @@
 import socket
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,15 +15,18 @@ _LOCAL_PORT_OFFSET = 40
 
 
 def default_config() -> Path:
-    """The configuration that ships with the program.
+    """The configuration that ships with the program: in the repository, or where pip put it.
 
     Raises:
-        ConfigError: it is not where the repository has it.
+        ConfigError: it is in neither place.
     """
-    path = Path(__file__).parent.parent / "configs" / "mock-px4.yaml"
-    if not path.is_file():
-        raise ConfigError(f"{path} is missing; name a configuration with --config")
-    return path
+    repository = Path(__file__).parent.parent
+    installed = Path(sysconfig.get_path("data"), "share", "mavlink-companion")
+    for place in (repository, installed):
+        path = place / "configs" / "mock-px4.yaml"
+        if path.is_file():
+            return path
+    raise ConfigError(f"mock-px4.yaml is not in {installed}; name a configuration with --config")
 
 
 def free_port() -> int:
