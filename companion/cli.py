@@ -16,11 +16,13 @@ from rich.console import Console
 
 from companion import demo
 from companion.config import Config, FlightConfig
-from companion.config_file import ConfigError, json_schema, load
+from companion.config_file import ConfigError, changed, json_schema, load
 from companion.extras import MissingExtraError
+from companion.flight.assembly import link_settings
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import EndpointError, LinkError, SigningError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.report import flight_table
@@ -42,10 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except _USAGE_ERRORS as error:
         errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
         return EXIT_USAGE
-    except (LinkError, OSError) as error:
+    except (LinkError, OSError, demo.VehicleStoppedError) as error:
         errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
         return EXIT_FLIGHT
     except (KeyboardInterrupt, asyncio.CancelledError):
+        errors.print("companion: interrupted before anything was sent")
         return EXIT_FLIGHT
     except Exception as error:
         if options.debug:
@@ -146,12 +149,7 @@ def _changed(config: Config, options: argparse.Namespace) -> Config:
         flight["programme"] = options.programme
     if options.arm:
         flight["arm"] = True
-    return config.model_copy(
-        update={
-            "link": config.link.model_copy(update=link),
-            "flight": config.flight.model_copy(update=flight),
-        }
-    )
+    return changed(config, {"link": link, "flight": flight}, "the command line")
 
 
 def _flight_folder(config: Config) -> Path:
@@ -183,6 +181,7 @@ def _fly_in(folder: Path, config: Config, text: str, options: argparse.Namespace
     with ExitStack() as stack:
         stack.callback(observer.close)
         summary = run(_interruptible(session))
+    # From here on the vehicle is in other hands, and all is on the disk.
     console.print(flight_table(summary))
     console.print(f"Recorded in {folder}", soft_wrap=True)
     if options.json:
@@ -191,7 +190,7 @@ def _fly_in(folder: Path, config: Config, text: str, options: argparse.Namespace
 
 
 async def _interruptible(session: Session) -> Summary:
-    """Fly; the first Ctrl-C hands back, the second leaves at once. SIGTERM hands back, too."""
+    """Fly; the first Ctrl-C, SIGTERM or SIGHUP hands back, the second leaves at once."""
     loop = asyncio.get_running_loop()
     flight = asyncio.ensure_future(session.fly())
     interrupts = 0
@@ -204,6 +203,7 @@ async def _interruptible(session: Session) -> Summary:
 
     loop.add_signal_handler(signal.SIGINT, interrupt, "the user (Ctrl-C)")
     loop.add_signal_handler(signal.SIGTERM, interrupt, "SIGTERM")
+    loop.add_signal_handler(signal.SIGHUP, interrupt, "SIGHUP (the terminal went away)")
     return await flight
 
 
@@ -228,6 +228,7 @@ def _check_config(options: argparse.Namespace) -> int:
         sys.stdout.write(json_schema())
         return EXIT_OK
     config = load(options.file)
+    parse_endpoint(link_settings(config).endpoint)
     if config.mock is not None:
         demo.check_mock(options.file)
     print(f"{options.file}: ok")

@@ -4,22 +4,27 @@ Degrees and milliseconds live only here, for people; `companion.flight.assembly`
 Every field's description is also what an editor shows, through the JSON Schema.
 """
 
+from math import radians, sin, tan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from companion.attitude import PLANNER_NAMES
+from companion.guidance.reference import GRAVITY
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 
 
 class Section(BaseModel):
     """A part of the configuration: immutable, unknown keys refused, every key described."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 class LinkConfig(Section):
@@ -41,12 +46,23 @@ class LinkConfig(Section):
     """Run on the bundled vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
     """Asked of the autopilot for ATTITUDE_QUATERNION; the loop runs at what really arrives."""
-    min_attitude_rate_hz: Positive = 50.0
+    min_attitude_rate_hz: Annotated[float, Field(ge=10.0)] = 50.0
     """Refuse to fly if less than this arrives."""
     position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
     """Asked for LOCAL_POSITION_NED."""
-    min_position_rate_hz: Positive = 10.0
+    min_position_rate_hz: Annotated[float, Field(ge=1.0)] = 10.0
     """Refuse to fly if less than this arrives."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "LinkConfig":
+        if self.min_attitude_rate_hz > self.attitude_rate_hz:
+            raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
+        if self.min_position_rate_hz > self.position_rate_hz:
+            raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
+        ours, theirs = self.source_component, self.target_component
+        if (self.source_system, ours) == (self.target_system, theirs):
+            raise ValueError("source_system and source_component are the autopilot's own")
+        return self
 
 
 class PlannerConfig(Section):
@@ -54,9 +70,9 @@ class PlannerConfig(Section):
 
     name: str = PLANNER_NAMES[0]
     """Which planner: first-order is Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727)."""
-    gain_per_s: Positive = 5.0
+    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
     """p: acceleration approaches its target with the time constant 1/p."""
-    yaw_gain_per_s: NotNegative = 2.0
+    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
     """Heading approaches its target with the time constant 1/yaw_gain."""
 
     @model_validator(mode="after")
@@ -69,11 +85,11 @@ class PlannerConfig(Section):
 class LimitsConfig(Section):
     """What we never ask of the vehicle, and where it may fly."""
 
-    max_tilt_deg: Annotated[float, Field(gt=0.0, le=75.0)] = 35.0
+    max_tilt_deg: Annotated[float, Field(gt=0.0, le=60.0)] = 35.0
     """Largest tilt of a target; longer targets are shortened along their direction."""
-    max_tilt_rate_deg_s: Positive = 90.0
+    max_tilt_rate_deg_s: Annotated[float, Field(gt=0.0, le=1000.0)] = 90.0
     """Largest roll-pitch rate, as the length of the two."""
-    max_yaw_rate_deg_s: Positive = 60.0
+    max_yaw_rate_deg_s: Annotated[float, Field(gt=0.0, le=1000.0)] = 60.0
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
@@ -108,16 +124,23 @@ class LimitsConfig(Section):
 class DeadmanConfig(Section):
     """When silence ends control. A setpoint leaves only in answer to fresh data."""
 
-    telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=1000.0)] = 100.0
+    telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
     """Attitude older than this is not answered, and counts as silence."""
-    target_stale_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 150.0
+    target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
     """Guidance older than this is not answered."""
-    position_stale_ms: Annotated[float, Field(ge=50.0, le=2000.0)] = 300.0
+    position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
     """Position older than this stops guidance, and so the setpoints."""
-    silence_limit_ms: Annotated[float, Field(ge=50.0, le=10000.0)] = 500.0
-    """Control that stood still this long is not taken up again: hand back."""
+    silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
+    """Control that stood still this long is not taken up again: hand back. Keep it below the
+    autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s)."""
     deadline_ms: Positive = 4.0
     """An answer that takes longer inside this process counts as a missed deadline."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "DeadmanConfig":
+        if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
+            raise ValueError("silence_limit_ms must be at least as long as the stale limits")
+        return self
 
 
 class GuidanceConfig(Section):
@@ -142,9 +165,9 @@ class ThrustConfig(Section):
 
     hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
     """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER)."""
-    correction_limit: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.4
+    correction_limit: Annotated[float, Field(ge=0.0, le=0.6)] = 0.4
     """How far flight may correct hover_thrust, as a share of it."""
-    correction_time_s: Positive = 1.5
+    correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
     """Time constant of that correction."""
 
 
@@ -153,26 +176,30 @@ class FlightConfig(Section):
 
     takeoff_height_m: Annotated[float, Field(ge=1.5, le=100.0)] = 5.0
     """Height above home to which the autopilot takes off."""
-    programme: tuple[Literal["hover", "steps", "circle"], ...] = ("hover", "steps", "circle")
+    programme: Annotated[tuple[Literal["hover", "steps", "circle"], ...], Field(min_length=1)] = (
+        "hover",
+        "steps",
+        "circle",
+    )
     """Flown in this order."""
     arm: bool = False
     """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
-    connect_timeout_s: Positive = 30.0
+    connect_timeout_s: Seconds = 30.0
     """Wait this long for a heartbeat."""
-    ready_timeout_s: Positive = 60.0
+    ready_timeout_s: Seconds = 60.0
     """Wait this long for the autopilot's estimator and pre-arm checks."""
-    arming_timeout_s: Positive = 60.0
+    arming_timeout_s: Seconds = 60.0
     """Wait this long for the vehicle to be armed."""
-    takeoff_timeout_s: Positive = 40.0
+    takeoff_timeout_s: Seconds = 40.0
     """Wait this long to reach takeoff_height_m."""
-    landing_timeout_s: Positive = 90.0
+    landing_timeout_s: Seconds = 90.0
     """Wait this long for the autopilot to report that it has landed."""
 
 
 class HoverConfig(Section):
     """Programme `hover`: stay where control began."""
 
-    duration_s: Positive = 3.0
+    duration_s: Seconds = 3.0
     """How long."""
 
 
@@ -183,7 +210,7 @@ class StepsConfig(Section):
     """Size of a step: horizontal acceleration per specific thrust, the sine of the tilt."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.0
     """How long the first part of a doublet lasts; the middle part takes twice as long."""
-    settle_s: Annotated[float, Field(ge=0.5)] = 3.0
+    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
     """Position hold between doublets."""
 
 
@@ -194,7 +221,7 @@ class CircleConfig(Section):
     """Radius; the circle begins where the vehicle is and lies north of it."""
     speed_m_s: Positive = 2.0
     """Speed along the circle, reached and left smoothly."""
-    laps: Positive = 1.0
+    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     """How often round, gathering speed and braking included."""
 
 
@@ -221,3 +248,44 @@ class Config(Section):
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
     """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Config":
+        faults = [text for wrong, text in _contradictions(self) if wrong]
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+def _contradictions(config: Config) -> list[tuple[bool, str]]:
+    """What no single section can know: (whether it is wrong, what to say)."""
+    limits, thrust, flight = config.limits, config.thrust, config.flight
+    circle, flown = config.circle, flight.programme
+    tilt = radians(limits.max_tilt_deg)
+    needed = circle.speed_m_s**2 / circle.radius_m + config.guidance.drag_per_s * circle.speed_m_s
+    return [
+        (
+            not limits.min_thrust < thrust.hover_thrust < limits.max_thrust,
+            "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust",
+        ),
+        (
+            config.deadman.target_stale_ms < 2000.0 / config.guidance.rate_hz,
+            "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
+        ),
+        (
+            limits.fence_floor_m > flight.takeoff_height_m - 0.5,
+            "limits.fence_floor_m must be at least 0.5 m below flight.takeoff_height_m",
+        ),
+        (
+            "steps" in flown and config.steps.coefficient > sin(tilt),
+            "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
+        ),
+        (
+            "circle" in flown and needed > GRAVITY * tan(tilt),
+            "circle.speed_m_s is too fast for circle.radius_m at limits.max_tilt_deg",
+        ),
+        (
+            "circle" in flown and 2.0 * circle.radius_m > limits.fence_radius_m,
+            "the circle (twice circle.radius_m away) leaves limits.fence_radius_m",
+        ),
+    ]

@@ -2,6 +2,7 @@
 
 import difflib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +48,32 @@ def parse(text: str, name: str) -> Config:
     if not isinstance(data, dict):
         raise ConfigError(f"{name}: expected sections such as `link:` at the top level")
     data = {key: ({} if value is None else value) for key, value in data.items()}
+    return _validated(data, name)
+
+
+def _validated(data: dict[str, Any], name: str) -> Config:
     try:
         return Config.model_validate(data)
     except ValidationError as error:
         lines = [_explain(detail["loc"], detail) for detail in error.errors()]
         raise ConfigError(f"{name}: " + "; ".join(lines)) from error
+
+
+def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:
+    """The configuration with some keys changed, checked anew.
+
+    Args:
+        config: to start from.
+        changes: new values by section and key.
+        name: stands for the changes in errors.
+
+    Raises:
+        ConfigError: the result holds together no more.
+    """
+    data = config.model_dump()
+    for section, values in changes.items():
+        data[section].update(values)
+    return _validated(data, name)
 
 
 def json_schema() -> str:
@@ -60,9 +82,11 @@ def json_schema() -> str:
 
 
 def _explain(location: tuple[int | str, ...], detail: Any) -> str:
-    where = ".".join(str(part) for part in location) or "top level"
+    where = ".".join(str(part) for part in location)
     if detail["type"] != "extra_forbidden":
         message = detail["msg"].removeprefix("Value error, ")
+        if not where:
+            return str(message)
         value = "" if isinstance(detail["input"], dict) else f" (got {detail['input']!r})"
         return f"`{where}`: {message[:1].lower()}{message[1:]}{value}"
     known = _keys_beside(location)

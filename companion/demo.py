@@ -14,6 +14,10 @@ _LOCAL_PORT_OFFSET = 40
 """The vehicle sends from this many ports above the one it sends to."""
 
 
+class VehicleStoppedError(Exception):
+    """The bundled vehicle ended before the flight did."""
+
+
 def default_config() -> Path:
     """The configuration that ships with the program: in the repository, or where pip put it.
 
@@ -67,7 +71,7 @@ def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> It
     handed back to its autopilot.
 
     Raises:
-        ConfigError: at the end, if the vehicle had stopped by itself; with its last words.
+        VehicleStoppedError: at the end, if the vehicle had stopped by itself; with its last words.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--port", str(port), *(["--lockstep"] if lockstep else [])]
@@ -75,10 +79,10 @@ def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> It
         process = subprocess.Popen(command, stdout=words, stderr=words, start_new_session=True)
         try:
             yield
+        finally:
             if process.poll() is not None:
                 last = log.read_text(errors="replace").strip().rpartition("\n")[2]
-                raise ConfigError(f"the bundled vehicle stopped by itself, see {log}: {last}")
-        finally:
+                raise VehicleStoppedError(f"the bundled vehicle stopped, see {log}: {last}")
             process.terminate()
             try:
                 process.wait(timeout=5.0)

@@ -95,27 +95,28 @@ class Server:
             self._wait_for_time()
         self._handle_collected()
         self._autopilot.tick()
-        self._flush()
         if self._settings.lockstep.enabled:
-            self._send_beacon()
+            self._flush(self._new_beacon())
             if self._lockstep:
                 self._await_answer()
+        else:
+            self._flush()
         if self._status is not None:
             self._status.show(self._autopilot)
 
     # Lockstep
 
-    def _send_beacon(self) -> None:
+    def _new_beacon(self) -> bytes:
         self._beacon = self._autopilot.beacon()
         self._answered = False
-        self._companion.send([self._beacon])
+        return self._beacon
 
     def _await_client(self) -> None:
         """Before the time 0 nothing flies: send the beacon until somebody answers.
 
         A client that speaks but does not answer has ``patience_s``.
         """
-        self._send_beacon()
+        self._companion.send([self._new_beacon()])
         heard_at: float | None = None
         while not self._answered:
             self._collect(BEACON_FIRST_S)
@@ -276,11 +277,13 @@ class Server:
             datagram, sender = request
             control.send_to(reply(self._autopilot, datagram), sender)
 
-    def _flush(self) -> None:
-        """Send what waits on every link, the companion's through the faults."""
+    def _flush(self, beacon: bytes | None = None) -> None:
+        """Send what waits on every link, the companion's through the faults; a beacon last."""
         autopilot = self._autopilot
         for endpoint, link in self._endpoints.items():
             frames = link.take()
             if endpoint is self._companion and not self._pipe_out.is_clear(autopilot.faults.link):
                 frames = self._pipe_out.push(frames, autopilot.faults.link, autopilot.time_us)
+            if endpoint is self._companion and beacon is not None:
+                frames.append(beacon)
             endpoint.send(bundles(frames) if self._bundle else frames)

@@ -12,8 +12,7 @@ from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.guide import Guide
 from companion.flight.observer import Observer
-from companion.flight.phases import flight_phases
-from companion.flight.procedures import Procedures
+from companion.flight.rig import Rig
 from companion.flight.safety import Fence, SafetyMonitors
 from companion.flight.watch import Watch
 from companion.guidance import (
@@ -97,7 +96,7 @@ def hover_thrust(config: Config) -> HoverThrust:
 
 
 def position_hold(config: Config) -> PositionHold:
-    """The outer loop; it never asks for more tilt than half of what the limit allows to spare."""
+    """The outer loop; in a hover it asks for no more than the tilt limit gives."""
     gains, limits = config.guidance, config.limits
     return PositionHold(
         HoldGains(
@@ -118,21 +117,19 @@ class Assembled:
     """A flight ready to run over an open link, and what is read from it afterwards."""
 
     flight: Flight
-    loop: ControlLoop
-    guide: Guide
-    procedures: Procedures
+    rig: Rig
     trace: FlightTrace
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
-        loop = self.loop
+        loop = self.rig.loop
         return LoopCounts(
             samples=loop.samples,
             setpoints=loop.setpoints,
             missed_deadlines=loop.missed_deadlines,
             stale=loop.stale,
             refused=loop.refused,
-            rate_hz=self.procedures.rate_hz,
+            rate_hz=self.rig.rate_hz,
         )
 
 
@@ -168,25 +165,9 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
         link.state,
         Fence(limits.fence_radius_m, limits.fence_ceiling_m, limits.fence_floor_m),
         limits.min_battery_percent / 100.0,
+        clock,
     )
-    flown = programme(config)
-    procedures = Procedures(config, link, loop, guide, monitors, flown)
-    watch = Watch(
-        link,
-        loop,
-        guide,
-        monitors,
-        release=procedures.release,
-        silence_limit=deadman.silence_limit_ms * _MS,
-        clock=clock,
-    )
+    rig = Rig(config, link, loop, guide, monitors, programme(config))
+    watch = Watch(rig, silence_limit=deadman.silence_limit_ms * _MS, clock=clock)
     loop.ask_mode = watch.ask_mode
-    flight = Flight(
-        flight_phases(config.flight, flown.duration),
-        procedures,
-        guide,
-        watch,
-        observer,
-        ask_landing,
-    )
-    return Assembled(flight, loop, guide, procedures, trace)
+    return Assembled(Flight(rig, watch, observer, ask_landing), rig, trace)

@@ -14,7 +14,7 @@ from companion.mavlink.errors import InvalidSetpoint
 from companion.mavlink.samples import AttitudeSample
 from companion.recording.trace import FlightTrace
 
-SendSetpoint = Callable[[int, BodyRates, float], None]
+SendSetpoint = Callable[[int, BodyRates, float], bool]
 
 _LONGEST_STEP = 0.1
 """A planner never integrates over more than this, s."""
@@ -120,12 +120,13 @@ class ControlLoop:
                 thrust = self._hover_thrust.normalised(
                     specific_thrust(command.acceleration_down, cosine)
                 )
-                self._hover_thrust.sent(thrust, cosine)
-            self._send(sample.time_boot_ms, rates, thrust)
+            left = self._send(sample.time_boot_ms, rates, thrust)
         except (AttitudeError, InvalidSetpoint):
+            left = False
+        if not left:
             self.refused += 1
             return
-        self._account(sample, command)
+        self._account(sample, command, thrust)
 
     def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
         """Keep what the watch asks for; returns the sample period in s."""
@@ -145,8 +146,9 @@ class ControlLoop:
             self.ask_mode()
         return self.held_back
 
-    def _account(self, sample: AttitudeSample, command: Command) -> None:
+    def _account(self, sample: AttitudeSample, command: Command, thrust: float) -> None:
         self.setpoints += 1
+        self._hover_thrust.sent(thrust, cos_tilt(sample.q[1], sample.q[2]))
         self.last_answer = self._gap_from = sample.received
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9

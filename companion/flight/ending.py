@@ -6,11 +6,11 @@ from enum import Enum
 class Exit(Enum):
     """What we do with the vehicle when a phase fails; the value is how it is said."""
 
-    LEAVE = "nothing to undo"
+    LEAVE = "leaving the vehicle as it is"
     DISARM = "disarming"
     HOLD = "handing back: asking the autopilot to hold"
     LAND = "handing back: asking the autopilot to land"
-    LET_GO = "letting go: someone else has the vehicle"
+    LET_GO = "letting go: the vehicle is left to its pilot and its autopilot"
 
 
 class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops early ends

@@ -2,14 +2,12 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
-from contextlib import suppress
 from typing import Any
 
 from companion.flight.ending import Exit, FlightEnded
-from companion.flight.guide import Guide
 from companion.flight.observer import Observer
-from companion.flight.phases import Phase
-from companion.flight.procedures import Procedures
+from companion.flight.phases import Phase, exit_phases, flight_phases
+from companion.flight.rig import Rig
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
 
@@ -28,25 +26,18 @@ class Flight:
         events: what happened, as (time in s since the flight began, text).
 
     Args:
-        phases: in their order; "hand back", "land" and "disarm" also serve an early ending.
+        rig: the parts of the flight.
+        watch: judges while the phases run.
+        observer: is told what happens.
         ask_landing: asked after the user interrupted and the vehicle holds: land it?
     """
 
-    def __init__(
-        self,
-        phases: tuple[Phase, ...],
-        procedures: Procedures,
-        guide: Guide,
-        watch: Watch,
-        observer: Observer,
-        ask_landing: AskLanding,
-    ) -> None:
-        self.phase = phases[0]
+    def __init__(self, rig: Rig, watch: Watch, observer: Observer, ask_landing: AskLanding) -> None:
+        self._phases = flight_phases(rig.config.flight, rig.programme.duration)
+        self.phase = self._phases[0]
         self.failed_in: Phase | None = None
         self.events: list[tuple[float, str]] = []
-        self._phases = phases
-        self._procedures = procedures
-        self._guide = guide
+        self._rig = rig
         self._watch = watch
         self._observer = observer
         self._ask_landing = ask_landing
@@ -60,7 +51,7 @@ class Flight:
         """Fly; returns "ok" or the reason for which the flight ended."""
         helpers = [
             asyncio.create_task(self._guarded(work))
-            for work in (self._guide.run(), self._judge(), self._tell())
+            for work in (self._rig.guide.run, self._judge, self._tell)
         ]
         try:
             for phase in self._phases:
@@ -68,10 +59,10 @@ class Flight:
         except FlightEnded as ended:
             self.failed_in = self.phase
             self.note(ended.reason)
-            await self._leave(ended.exit or self.phase.on_failure)
+            await self._leave(ended.exit or self._usual_exit())
             return ended.reason
         finally:
-            self._procedures.release()
+            self._rig.release()
             for task in helpers:
                 await _cancelled(task)
         return "ok"
@@ -79,15 +70,19 @@ class Flight:
     def end(self, ended: FlightEnded) -> None:
         """End the running phase from outside it; only the first reason counts."""
         if ended.exit is Exit.LET_GO:
-            self._procedures.release()
+            self._rig.release()
         if not self._end.done():
             self._end.set_result(ended)
 
     def interrupt(self, reason: str) -> None:
-        """The user wants out: hold if we fly, else whatever the phase needs."""
+        """The user wants out: hold if we fly, else whatever the phase needs.
+
+        An ending that is under way goes on: it does what the vehicle needs.
+        """
         self._interrupted = True
-        flying = self.phase.on_failure is Exit.LAND
-        self.end(FlightEnded(reason, Exit.HOLD if flying else None))
+        if self.failed_in is None:
+            usual = self._usual_exit()
+            self.end(FlightEnded(reason, Exit.HOLD if usual is Exit.LAND else usual))
 
     def on_heartbeat(self) -> None:
         """Judge at once what the heartbeat that just came says."""
@@ -106,46 +101,62 @@ class Flight:
         """Run one phase to its end; whatever goes wrong becomes a `FlightEnded`."""
         self.phase, self._entered = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
-        procedure: Callable[[], Coroutine[Any, Any, None]] = getattr(
-            self._procedures, phase.name.replace(" ", "_")
-        )
-        task = asyncio.create_task(procedure())
+        if not self._end.done():
+            self._watch.judge(phase)  # before the phase commands anything
+            await self._race(phase.work(self._rig), phase.timeout)
+        if self._end.done():
+            raise self._end.result()
+
+    async def _race(self, work: Coroutine[Any, Any, Any], seconds: float | None) -> Any:
+        """Run `work` until it is done, the flight is ended, or the time is over."""
+        task = asyncio.create_task(work)
+        either: set[asyncio.Future[Any]] = {task, self._end}
         try:
-            either: set[asyncio.Future[Any]] = {task, self._end}
-            await asyncio.wait(either, timeout=phase.timeout, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(either, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
             if self._end.done():
-                raise self._end.result()
+                return None
             if not task.done():
                 raise FlightEnded(
-                    f"waited {phase.timeout:g} s for {phase.waits_for}: {self._procedures.detail}"
+                    f"waited {seconds:g} s for {self.phase.waits_for}: {self._rig.detail}"
                 )
-            task.result()
+            return task.result()
+        except (FlightEnded, asyncio.CancelledError):
+            raise
         except LinkError as error:
             raise FlightEnded(str(error)) from error
+        except Exception as error:
+            raise FlightEnded(f"internal error: {error!r}") from error
         finally:
             await _cancelled(task)
+
+    def _usual_exit(self) -> Exit:
+        phase = self.phase
+        if phase.on_failure_landed is not None and self._rig.link.state.landed:
+            return phase.on_failure_landed
+        return phase.on_failure
 
     async def _leave(self, exit_: Exit) -> None:
         """Do with the vehicle what the ending asks for; what fails here is told, not raised."""
         self.note(exit_.value)
         self._end = self._new_end()
+        config = self._rig.config.flight
         try:
-            if exit_ is Exit.HOLD:
-                await self._fly(self._named("hand back"))
-                if not (self._interrupted and await self._ask_landing()):
-                    return
-            if exit_ in (Exit.HOLD, Exit.LAND):
-                await self._fly(self._named("land"))
-            if exit_ in (Exit.HOLD, Exit.LAND, Exit.DISARM):
-                self._procedures.release()
-                await self._fly(self._named("disarm"))
+            for phase in exit_phases(config, exit_):
+                await self._fly(phase)
+            if exit_ is Exit.HOLD and self._interrupted and await self._told_to_land():
+                for phase in exit_phases(config, Exit.LAND):
+                    await self._fly(phase)
         except FlightEnded as ended:
             self.note(ended.reason)
 
-    async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
+    async def _told_to_land(self) -> bool:
+        """Ask the user; somebody else may take the vehicle while the answer is thought over."""
+        return bool(await self._race(_called(self._ask_landing), None))
+
+    async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run what runs beside the phases; a fault of ours there must not go unseen."""
         try:
-            await work
+            await work()
         except Exception as error:
             self.end(FlightEnded(f"internal error: {error!r}", Exit.LAND))
 
@@ -161,20 +172,20 @@ class Flight:
         while True:
             await asyncio.sleep(_TELL_PERIOD)
             elapsed = self._clock() - self._entered
-            self._observer.waiting(
-                self.phase.name, self._procedures.detail, elapsed, self.phase.timeout
-            )
-
-    def _named(self, name: str) -> Phase:
-        return next(phase for phase in self._phases if phase.name == name)
+            self._observer.waiting(self.phase.name, self._rig.detail, elapsed, self.phase.timeout)
 
     @staticmethod
     def _new_end() -> asyncio.Future[FlightEnded]:
         return asyncio.get_running_loop().create_future()
 
 
+async def _called(ask: AskLanding) -> bool:
+    return await ask()
+
+
 async def _cancelled(task: asyncio.Task[Any]) -> None:
     """Cancel a task and wait until it is gone; its outcome was read elsewhere."""
     task.cancel()
-    with suppress(asyncio.CancelledError, FlightEnded, LinkError):
-        await task
+    await asyncio.wait({task})
+    if not task.cancelled():
+        task.exception()

@@ -100,7 +100,9 @@ class Guide:
         if position is None or now - position.received > self._position_stale:
             self._hover_thrust.pause()
             return
-        if self._state.landed:
+        # In control a vehicle that says it has landed is the watch's matter: no thrust would make
+        # it true.
+        if self._state.landed and not self._loop.guarded:
             self._hover_thrust.pause()
             self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
             return
@@ -108,11 +110,11 @@ class Guide:
         reference = self._reference(now, motion)
         target, down = self._hold.command(reference, motion)
         self._loop.command = Command(target, down, now, is_step=reference.coefficients is not None)
-        if self.pose is None:
-            self._hover_thrust.pause()
-        else:
+        if self._loop.guarded:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
             self._note_tracking(now, reference, motion)
+        else:
+            self._hover_thrust.pause()  # nobody obeys our thrust: nothing to learn from it
 
     def _heading(self) -> float:
         return heading(self._q)

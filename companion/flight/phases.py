@@ -1,72 +1,119 @@
 """The flight as a table: its phases in order, how long each may take, and how each is left."""
 
-from typing import NamedTuple
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
 
 from companion.config import FlightConfig
+from companion.flight import preparation, procedures
 from companion.flight.ending import Exit
+from companion.flight.rig import Rig
 from companion.flight.roles import Role
 
+_AIRBORNE = frozenset({Role.TAKEOFF, Role.HOLD})
+_SHORT = 10.0
+"""For what the autopilot does at once or not at all, s."""
 
-class Phase(NamedTuple):
+
+@dataclass(frozen=True, slots=True)
+class Phase:
     """One phase.
 
     Attributes:
-        name: also the name of the method of `Procedures` that flies it, with underscores.
-        waits_for: what the user is told.
+        name: what the user sees.
+        waits_for: what the user is told it waits for.
+        work: what is done in it.
         timeout: s; then the phase has failed.
         on_failure: what is done with the vehicle if the phase fails.
+        on_failure_landed: the same while the vehicle still stands on the ground, if that differs.
         modes: the modes that the autopilot may be in; any other one means that someone else has
-            taken the vehicle. Empty: any.
+            taken the vehicle, and one that is not known any more is as bad. Empty: any.
         monitored: whether silence and the safety monitors end it; what follows a breach must not
             be ended by the same breach.
     """
 
     name: str
     waits_for: str
+    work: Callable[[Rig], Coroutine[Any, Any, None]]
     timeout: float
-    on_failure: Exit
+    on_failure: Exit = Exit.LEAVE
+    on_failure_landed: Exit | None = None
     modes: frozenset[Role] = frozenset()
     monitored: bool = False
 
 
 def flight_phases(config: FlightConfig, programme_duration: float) -> tuple[Phase, ...]:
-    """The phases of a flight; `programme_duration` in s."""
-    airborne = frozenset({Role.TAKEOFF, Role.HOLD})
+    """The phases of a flight, in order; `programme_duration` in s."""
     return (
-        Phase("connect", "a heartbeat", config.connect_timeout_s, Exit.LEAVE),
-        Phase("checks", "the vehicle to be ready", config.ready_timeout_s, Exit.LEAVE),
-        Phase("stream", "setpoints to flow", 10.0, Exit.LEAVE),
-        Phase("arm", "the vehicle to arm", config.arming_timeout_s, Exit.DISARM),
-        Phase("takeoff", "the height", config.takeoff_timeout_s, Exit.LAND, airborne),
+        # A second more than the link waits: its own words on why nothing came are the better ones.
+        Phase("connect", "a heartbeat", preparation.connect, config.connect_timeout_s + 1.0),
+        Phase("checks", "the vehicle to be ready", preparation.checks, config.ready_timeout_s),
+        Phase("stream", "setpoints to flow", preparation.stream, _SHORT),
+        Phase("arm", "the vehicle to arm", preparation.arm, config.arming_timeout_s, Exit.DISARM),
+        Phase(
+            "takeoff",
+            "the height",
+            procedures.takeoff,
+            config.takeoff_timeout_s,
+            Exit.LAND,
+            on_failure_landed=Exit.DISARM,
+            modes=_AIRBORNE,
+        ),
         Phase(
             "offboard",
             "the autopilot to take our rates",
-            10.0,
+            procedures.offboard,
+            _SHORT,
             Exit.LAND,
-            airborne | {Role.OFFBOARD},
+            modes=_AIRBORNE | {Role.OFFBOARD},
             monitored=True,
         ),
         Phase(
             "programme",
             "the programme to end",
+            procedures.programme,
             programme_duration + 10.0,
             Exit.LAND,
-            frozenset({Role.OFFBOARD}),
+            modes=frozenset({Role.OFFBOARD}),
             monitored=True,
         ),
-        Phase(
-            "hand back",
-            "the autopilot to hold",
-            10.0,
-            Exit.LAND,
-            airborne | {Role.OFFBOARD},
-        ),
-        Phase(
-            "land",
-            "touchdown",
-            config.landing_timeout_s,
-            Exit.LEAVE,
-            airborne | {Role.OFFBOARD, Role.LAND},
-        ),
-        Phase("disarm", "the motors to stop", 20.0, Exit.LEAVE),
+        _hand_back(),
+        _land(config),
+        _disarm(),
     )
+
+
+def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
+    """What is flown to leave the vehicle as `exit_` says."""
+    return {
+        Exit.LEAVE: (),
+        Exit.LET_GO: (),
+        Exit.DISARM: (Phase("disarm", "the motors to stop", preparation.undo_arming, _SHORT),),
+        Exit.HOLD: (_hand_back(),),
+        Exit.LAND: (_land(config), _disarm()),
+    }[exit_]
+
+
+def _hand_back() -> Phase:
+    return Phase(
+        "hand back",
+        "the autopilot to hold",
+        procedures.hand_back,
+        _SHORT,
+        Exit.LAND,
+        modes=_AIRBORNE | {Role.OFFBOARD},
+    )
+
+
+def _land(config: FlightConfig) -> Phase:
+    return Phase(
+        "land",
+        "touchdown",
+        procedures.land,
+        config.landing_timeout_s,
+        modes=_AIRBORNE | {Role.OFFBOARD, Role.LAND},
+    )
+
+
+def _disarm() -> Phase:
+    return Phase("disarm", "the motors to stop", procedures.disarm, 20.0)

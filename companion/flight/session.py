@@ -78,7 +78,7 @@ class Session:
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
-        flight, loop, guide = assembled.flight, assembled.loop, assembled.guide
+        flight, loop, guide = assembled.flight, assembled.rig.loop, assembled.rig.guide
 
         def on_attitude(sample: AttitudeSample) -> None:
             loop.on_sample(sample)

@@ -4,59 +4,49 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
-from companion.flight.control_loop import ControlLoop
 from companion.flight.ending import Exit, FlightEnded
-from companion.flight.guide import Guide
 from companion.flight.phases import Phase
+from companion.flight.rig import Rig
 from companion.flight.roles import Role, require_role, role_of
-from companion.flight.safety import SafetyMonitors
 from companion.mavlink.errors import LinkError
-from companion.mavlink.link import Link
+
+_HEARD = 0.3
+"""Nothing at all from the vehicle for this long, s: it would not be heard taking over, either."""
 
 
 class Watch:
     """Notices what the control loop cannot: that nothing comes, or that others fly the vehicle.
 
     Args:
-        release: ends control; called when it stood still too long, for it is not taken up again.
+        rig: the parts of the flight.
         silence_limit: how long control may stand still before it is given up, s.
         clock: our clock, s.
     """
 
-    def __init__(
-        self,
-        link: Link,
-        loop: ControlLoop,
-        guide: Guide,
-        monitors: SafetyMonitors,
-        *,
-        release: Callable[[], None],
-        silence_limit: float,
-        clock: Callable[[], float],
-    ) -> None:
-        self._link = link
-        self._loop = loop
-        self._guide = guide
-        self._monitors = monitors
-        self._release = release
+    def __init__(self, rig: Rig, *, silence_limit: float, clock: Callable[[], float]) -> None:
+        self._rig = rig
         self._silence_limit = silence_limit
         self._clock = clock
+        self._frames = 0
+        self._heard_at = clock()
         self._question: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
         """Judge once.
 
         Raises:
-            FlightEnded: control must end, with the reason and what is to be done.
+            FlightEnded: the phase must end, with the reason and what is to be done.
         """
-        self._judge_mode(phase)
-        if not (phase.monitored and self._loop.guarded):
-            return
-        if self._clock() - self._loop.last_answer > self._silence_limit:
-            reason = self._why_silent()
-            self._release()
-            raise FlightEnded(reason, Exit.HOLD)
-        self._monitors.check(self._guide.pose)
+        self._listen()
+        loop = self._rig.loop
+        if phase.modes:
+            require_role(self._rig.link, phase.modes)
+        if phase.monitored and loop.guarded:
+            if self._clock() - loop.last_answer > self._silence_limit:
+                self._give_up()
+            self._rig.monitors.check(self._rig.guide.pose)
+        if phase.modes:
+            self._judge_heartbeat()
 
     def on_heartbeat(self, phase: Phase) -> None:
         """A heartbeat came: it tells whether we may go on after a gap.
@@ -65,26 +55,44 @@ class Watch:
             FlightEnded: as `judge`.
         """
         self.judge(phase)
-        if self._loop.held_back and self._role() is Role.OFFBOARD:
-            self._loop.resume()
+        link = self._rig.link
+        if self._rig.loop.held_back and role_of(link.family, link.state.mode) is Role.OFFBOARD:
+            self._rig.loop.resume()
 
     def ask_mode(self) -> None:
-        """Ask for a heartbeat now rather than wait up to a second for the next one."""
+        """Ask for a heartbeat now rather than wait for the next one."""
         self._question = asyncio.create_task(self._ask())
 
     async def _ask(self) -> None:
         with suppress(LinkError):  # no answer: the silence limit decides
-            await self._link.request_message("HEARTBEAT")
+            await self._rig.fresh_heartbeat()
 
-    def _judge_mode(self, phase: Phase) -> None:
-        if phase.modes:
-            require_role(self._link, phase.modes)
+    def _listen(self) -> None:
+        frames = self._rig.link.stats.frames
+        if frames != self._frames:
+            self._frames, self._heard_at = frames, self._clock()
 
-    def _role(self) -> Role | None:
-        return role_of(self._link.family, self._link.state.mode)
+    def _judge_heartbeat(self) -> None:
+        heartbeat = self._rig.link.state.heartbeat
+        if heartbeat is None or self._clock() - heartbeat.received > self._rig.heartbeat_limit:
+            raise FlightEnded(
+                "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
+            )
+
+    def _give_up(self) -> None:
+        """Control stood still too long: it is not taken up again.
+
+        Raises:
+            FlightEnded: asks for hold while the vehicle is heard; else its failsafe must do, for
+                a pilot who took over could not be heard and would be overruled.
+        """
+        reason = self._why_silent()
+        self._rig.release()
+        heard = self._clock() - self._heard_at < _HEARD
+        raise FlightEnded(reason, Exit.HOLD if heard else Exit.LET_GO)
 
     def _why_silent(self) -> str:
-        now, limit, loop = self._clock(), self._silence_limit, self._loop
+        now, limit, loop = self._clock(), self._silence_limit, self._rig.loop
         if now - loop.last_sample > limit:
             return f"no attitude from the vehicle for {now - loop.last_sample:.1f} s"
         if now - loop.last_newer > limit:
@@ -95,4 +103,4 @@ class Watch:
             return "no position from the vehicle"
         if loop.held_back:
             return "after a gap in telemetry the autopilot did not confirm offboard"
-        return "attitude from the vehicle cannot be used"
+        return "attitude from the vehicle cannot be used, or setpoints cannot leave"

@@ -3,7 +3,7 @@
 from companion.guidance.reference import GRAVITY
 
 _MIN_COSINE = 0.5
-"""Below this (60° of tilt) height is given up rather than thrust raised without end."""
+"""Beyond 60° of tilt height is given up rather than thrust raised without end."""
 
 _WINDOW = 0.2
 """Velocity is differenced over at least this long, s: its noise is divided by the window."""
@@ -16,8 +16,15 @@ _PLAUSIBLE = (0.5 * GRAVITY, 2.0 * GRAVITY)
 
 
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
-    """T = (g − a_D)/cos(tilt) in m/s², with the tilt there is."""
-    return max(0.0, GRAVITY - acceleration_down) / max(cos_tilt, _MIN_COSINE)
+    """T = (g − a_D)/cos(tilt) in m/s², with the tilt there is.
+
+    Beyond 60° of tilt thrust fades instead, to none at 90°: upside down it would push the vehicle
+    to the ground.
+    """
+    wanted = max(0.0, GRAVITY - acceleration_down)
+    if cos_tilt < _MIN_COSINE:
+        return wanted * max(0.0, cos_tilt) / (_MIN_COSINE * _MIN_COSINE)
+    return wanted / cos_tilt
 
 
 class HoverThrust:

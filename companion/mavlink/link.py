@@ -154,7 +154,7 @@ class Link:
     def on_error(self, callback: Callable[[Exception], None] | None) -> None:
         self._router.on_error = callback
 
-    def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
+    def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send body rates and thrust, once and now. It never blocks.
 
         In lockstep a setpoint that answers the open step closes it, and so leaves last.
@@ -164,13 +164,16 @@ class Link:
             rates: rad/s about body x, y, z (FRD).
             thrust: Collective thrust, 0..1.
 
+        Returns:
+            Whether it left; false if the connection is down or the kernel does not take it.
+
         Raises:
             InvalidSetpoint: Not finite or out of range (`NonFiniteSetpoint`); nothing was sent.
         """
         if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)
-        else:
-            self._outbox.setpoint(time_boot_ms, rates, thrust)
+            return True
+        return self._outbox.setpoint(time_boot_ms, rates, thrust)
 
     # --- conversation
 

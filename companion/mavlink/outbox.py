@@ -35,9 +35,13 @@ class Outbox:
         self._latched: tuple[int, BodyRates, float] | None = None
         self.transport: Transport | None = None
 
-    def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
-        """Send SET_ATTITUDE_TARGET now. Raises `InvalidSetpoint` before anything is sent."""
-        self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+    def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
+        """Send SET_ATTITUDE_TARGET now; false if it could not leave.
+
+        Raises:
+            InvalidSetpoint: Nothing was sent.
+        """
+        return self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""

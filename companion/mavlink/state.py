@@ -135,7 +135,9 @@ class VehicleState(_Values):
     def _on_heartbeat(self, message: Message) -> None:
         if message.autopilot == _AUTOPILOT_INVALID:
             return  # some other part of the vehicle, under the autopilot's own id
-        if self.family is None or self.family.autopilot != message.autopilot:
+        if self.family is not None and self.family.autopilot != message.autopilot:
+            return  # an autopilot does not change its kind; this is some other part of the vehicle
+        if self.family is None:
             try:
                 self.family, self.unsupported = family_for(message.autopilot), None
             except UnsupportedAutopilot as error:

@@ -127,8 +127,8 @@ def test_leaving_the_fence_hands_back_and_lands(tmp_path):
         summary = fly(
             mock,
             tmp_path / "log",
-            flight={"programme": ["circle"]},
-            limits={"fence_radius_m": 2.0},
+            flight={"programme": ["steps"]},
+            limits={"fence_radius_m": 0.8},
         )
         state = mock.state()
     assert "beyond limits.fence_radius_m" in summary.result

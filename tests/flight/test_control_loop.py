@@ -21,18 +21,24 @@ class Bench:
 
     def __init__(self):
         self.sent = []
+        self.connected = True
         self.asked = 0
         self.time = 10.0
         self.loop = ControlLoop(
             make_planner("first-order", limits=Limits(0.6, 1.5, 1.0)),
             HoverThrust(0.5, 0.4, 1.5, 0.1, 0.9),
-            lambda stamp, rates, thrust: self.sent.append((stamp, rates, thrust)),
+            self.send,
             Deadlines(telemetry_stale=0.1, target_stale=0.15, deadline=0.004),
             FlightTrace(),
         )
         self.loop.ask_mode = self.ask
         self.loop.on = True
         self.refresh()
+
+    def send(self, stamp, rates, thrust):
+        if self.connected:
+            self.sent.append((stamp, rates, thrust))
+        return self.connected
 
     def ask(self):
         self.asked += 1
@@ -122,6 +128,16 @@ def test_an_unusable_attitude_is_refused_and_counted(q):
     bench = Bench()
     bench.run(3, q=q)
     assert (bench.sent, bench.loop.refused) == ([], 3)
+
+
+def test_a_setpoint_that_could_not_leave_is_no_answer():
+    bench = Bench()
+    bench.run(3)
+    last = bench.loop.last_answer
+    bench.connected = False
+    bench.run(3)
+    assert (bench.loop.setpoints, bench.loop.refused) == (3, 3)
+    assert bench.loop.last_answer == last
 
 
 def test_idle_sends_neither_rates_nor_thrust():

@@ -72,7 +72,9 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
 def test_thrust_grows_with_tilt_and_never_without_end():
     assert specific_thrust(0.0, 1.0) == pytest.approx(GRAVITY)
     assert specific_thrust(0.0, math.cos(0.6)) * math.cos(0.6) == pytest.approx(GRAVITY)
-    assert specific_thrust(0.0, -1.0) == specific_thrust(0.0, 0.5)
+    assert specific_thrust(0.0, 0.5 - 1e-9) == pytest.approx(specific_thrust(0.0, 0.5))
+    assert specific_thrust(0.0, 0.25) == pytest.approx(GRAVITY)
+    assert specific_thrust(0.0, 0.0) == specific_thrust(0.0, -1.0) == 0.0
     assert specific_thrust(20.0, 1.0) == 0.0
 
 

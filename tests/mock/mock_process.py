@@ -102,21 +102,22 @@ class Client:
         """Answer beacons up to a time; `act(t)` says what to say, True = it has answered itself.
 
         Returns:
-            every datagram that is no beacon, in order.
+            every datagram but beacons that came again, in order.
         """
         datagrams: list[bytes] = []
         now = -1
         while now < until_ms:
             datagram = self.receive()
             messages = decode(datagram)
-            if not (messages and messages[0].get_type() == "SYSTEM_TIME"):
+            if not (messages and messages[-1].get_type() == "SYSTEM_TIME"):
                 datagrams.append(datagram)
                 continue
-            beacon = messages[0].time_boot_ms
+            beacon = messages[-1].time_boot_ms
             if beacon <= now:
                 self.answer(beacon)
                 continue
             now = beacon
+            datagrams.append(datagram)
             if not act(now):
                 self.answer(now)
         return datagrams

@@ -139,8 +139,8 @@ def test_link_faults_spare_the_beacon(tmp_path):
     with Client(port) as client, mock_process(*arguments):
         early = client.lockstep(500, lambda _: False)
         late = client.lockstep(2000, lambda _: False)
-    assert early
-    assert late == []
+    assert max(len(decode(datagram)) for datagram in early) > 1
+    assert {m.get_type() for d in late for m in decode(d)} == {"SYSTEM_TIME"}
 
 
 def test_telemetry_goes_to_the_first_sender_and_a_second_is_obeyed_in_silence():

@@ -1,0 +1,110 @@
+"""What is done on the ground, one coroutine a phase, and how arming is undone."""
+
+from companion.flight.ending import Exit, FlightEnded
+from companion.flight.rig import Rig
+from companion.flight.roles import Role, mode_name, role_of
+
+_HEARTBEATS_MISSED = 3
+_SHORTEST_HEARTBEAT_LIMIT = 0.8
+
+
+async def connect(rig: Rig) -> None:
+    """Wait for the autopilot's heartbeat."""
+    rig.detail = f"no heartbeat yet on {rig.config.link.endpoint}"
+    await rig.link.wait_connected(rig.config.flight.connect_timeout_s)
+
+
+async def checks(rig: Rig) -> None:
+    """Ask for the telemetry we fly on, wait for readiness, and measure what arrives."""
+    link, config = rig.link, rig.config
+    rig.detail = "asking for telemetry"
+    wanted = {
+        **link.family.wanted_rates,
+        "ATTITUDE_QUATERNION": config.link.attitude_rate_hz,
+        "LOCAL_POSITION_NED": config.link.position_rate_hz,
+    }
+    await link.set_rates(wanted, window_s=0.1)
+    await rig.until(lambda: _ready(rig))
+    # Measured only now: a position is not sent before the estimator has one.
+    rig.detail = "measuring the telemetry that arrives"
+    achieved = await link.measure_rates(wanted, 1.0)
+    for message, least, key in (
+        ("ATTITUDE_QUATERNION", config.link.min_attitude_rate_hz, "min_attitude_rate_hz"),
+        ("LOCAL_POSITION_NED", config.link.min_position_rate_hz, "min_position_rate_hz"),
+    ):
+        if achieved[message] < least:
+            raise FlightEnded(
+                f"{message} arrives at {achieved[message]:.0f} Hz, less than "
+                f"link.{key} = {least:g}; raise the link's speed or lower the limit"
+            )
+    if achieved["HEARTBEAT"] > 0.0:
+        limit = _HEARTBEATS_MISSED / achieved["HEARTBEAT"]
+        rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, limit)
+    _check_delay(rig)
+
+
+async def stream(rig: Rig) -> None:
+    """Begin to answer samples, idle, and see that setpoints really flow."""
+    rig.loop.on = True
+    enough = rig.loop.setpoints + round(rig.config.link.min_attitude_rate_hz)
+    await rig.until(lambda: rig.loop.setpoints >= enough, "setpoints to flow")
+
+
+async def arm(rig: Rig) -> None:
+    """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
+    if rig.config.flight.arm:
+        rig.detail = "the autopilot to accept arming"
+        rig.arm_sent = True
+        await rig.link.command(*rig.link.family.arm())
+        await rig.until(rig.armed, "the vehicle to be armed")
+        return
+    await rig.until(rig.armed, "the pilot to arm (flight.arm is false, --arm was not given)")
+    hold = mode_name(rig.link.family, Role.HOLD)
+    await rig.until(
+        lambda: _handed_over(rig), f"the pilot to hand over, by switching to {hold} on the ground"
+    )
+
+
+async def undo_arming(rig: Rig) -> None:
+    """Disarm if it was us who armed; an arming of the pilot's is the pilot's."""
+    rig.release()
+    if not rig.arm_sent:
+        return
+    rig.detail = "the autopilot to accept disarming"
+    # The heartbeat may be older than our arming, so it is not asked whether this is needed.
+    await rig.link.command(*rig.link.family.disarm())
+    await rig.fresh_heartbeat()
+    await rig.until(lambda: not rig.armed())
+
+
+def _ready(rig: Rig) -> bool:
+    state = rig.link.state
+    if state.armed:
+        raise FlightEnded("the vehicle is already armed; land and disarm it first")
+    battery = state.battery.remaining if state.battery else None
+    least = rig.config.limits.min_battery_percent / 100.0
+    if battery is not None and battery < least:
+        raise FlightEnded(
+            f"battery at {100 * battery:.0f} %, below limits.min_battery_percent; charge it"
+        )
+    missing = rig.link.family.not_ready(state.readiness)
+    rig.detail = missing or ""
+    return missing is None
+
+
+def _check_delay(rig: Rig) -> None:
+    """A delay that is always there cannot be seen from the samples, but from TIMESYNC."""
+    round_trip, limit = rig.link.timesync.round_trip_s, rig.config.deadman.telemetry_stale_ms / 1e3
+    if round_trip is not None and round_trip > limit:
+        raise FlightEnded(
+            f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
+            "deadman.telemetry_stale_ms; use a faster link"
+        )
+
+
+def _handed_over(rig: Rig) -> bool:
+    if not rig.armed():
+        raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
+    if not rig.link.state.landed:
+        raise FlightEnded("the pilot took off", Exit.LET_GO)
+    return role_of(rig.link.family, rig.link.state.mode) is Role.HOLD

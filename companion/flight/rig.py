@@ -1,0 +1,62 @@
+"""What every phase and the watch work with."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from companion.config import Config
+from companion.flight.control_loop import ControlLoop
+from companion.flight.guide import Guide
+from companion.flight.safety import SafetyMonitors
+from companion.guidance import Sequence
+from companion.mavlink.link import Link
+
+_POLL = 0.02
+"""How often a condition is looked at, s; telemetry that changes it is slower."""
+
+_SLOWEST_HEARTBEAT = 3.0
+
+
+@dataclass(slots=True)
+class Rig:
+    """The parts of one flight, and the little that its phases tell each other.
+
+    Attributes:
+        detail: what the running phase waits for just now, for the user.
+        rate_hz: setpoints a second while the programme was flown.
+        heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
+            from the rate at which heartbeats really come.
+        arm_sent: whether we asked the autopilot to arm.
+    """
+
+    config: Config
+    link: Link
+    loop: ControlLoop
+    guide: Guide
+    monitors: SafetyMonitors
+    programme: Sequence
+    detail: str = ""
+    rate_hz: float = 0.0
+    heartbeat_limit: float = _SLOWEST_HEARTBEAT
+    arm_sent: bool = False
+
+    def release(self) -> None:
+        """Stop answering samples: from here on nothing is sent that steers."""
+        self.loop.on = False
+        self.loop.guarded = False
+        self.guide.stand_by()
+
+    async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
+        """Wait for a condition of the telemetry."""
+        if detail is not None:
+            self.detail = detail
+        while not condition():  # noqa: ASYNC110 - telemetry sets no events
+            await asyncio.sleep(_POLL)
+
+    async def fresh_heartbeat(self) -> None:
+        """Wait for a heartbeat that is newer than this call."""
+        await self.link.request_message("HEARTBEAT")
+
+    def armed(self) -> bool:
+        """Whether the autopilot says that it is armed."""
+        return self.link.state.armed is True
