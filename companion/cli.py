@@ -7,7 +7,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, get_args
@@ -27,7 +27,7 @@ from companion.mavlink.errors import EndpointError, LinkError, SigningError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
-from companion.terminal import TerminalObserver
+from companion.terminal import FlightConsole, TerminalObserver
 
 EXIT_OK, EXIT_FLIGHT, EXIT_USAGE = 0, 1, 2
 
@@ -174,7 +174,7 @@ def _flight_folder(config: Config) -> Path:
 
 
 def _fly_in(folder: Path, config: Config, text: str, options: argparse.Namespace) -> int:
-    console = Console(stderr=options.json, highlight=False)
+    console = FlightConsole(stderr=options.json, highlight=False)
     observer = TerminalObserver(console)
     session = Session(config, text, folder, observer, observer.ask_landing)
     run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
@@ -182,8 +182,9 @@ def _fly_in(folder: Path, config: Config, text: str, options: argparse.Namespace
         stack.callback(observer.close)
         summary = run(_interruptible(session))
     # From here on the vehicle is in other hands, and all is on the disk.
-    console.print(flight_table(summary))
-    console.print(f"Recorded in {folder}", soft_wrap=True)
+    with suppress(OSError):
+        console.print(flight_table(summary))
+        console.print(f"Recorded in {folder}", soft_wrap=True)
     if options.json:
         print(summary.as_json())
     return EXIT_OK if summary.result == "ok" else EXIT_FLIGHT

@@ -48,8 +48,16 @@ class _Speaker:
                 continue
             try:
                 line()
-            except (OSError, ValueError, SystemExit):  # rich leaves by SystemExit on a broken pipe
+            except (OSError, ValueError):  # gone, or closed
                 broken = True
+
+
+class FlightConsole(Console):
+    """A console whose reader may go away: rich would end the program, and silence stdout."""
+
+    def on_broken_pipe(self) -> None:
+        """Let whoever printed deal with it."""
+        raise BrokenPipeError
 
 
 class TerminalObserver:

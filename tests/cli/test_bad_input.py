@@ -35,6 +35,18 @@ def config(tmp_path, text):
         ("planner: {name: so4}", "unknown planner 'so4'"),
         ("planner: {gain_per_s: .nan}", "finite"),
         ("flight: {programme: [loop]}", "`flight.programme.0`"),
+        ("flight: {programme: []}", "`flight.programme`"),
+        ("steps: {settle_s: .inf}", "`steps.settle_s`"),
+        ("deadman: {silence_limit_ms: 10000}", "`deadman.silence_limit_ms`"),
+        ("deadman: {silence_limit_ms: 90}", "at least as long as the stale limits"),
+        ("deadman: {target_stale_ms: 30}", "two periods of guidance.rate_hz"),
+        ("link: {attitude_rate_hz: 40}", "min_attitude_rate_hz must not exceed"),
+        ("link: {source_component: 1}", "the autopilot's own"),
+        ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),
+        ("limits: {fence_floor_m: 4.8}", "fence_floor_m must be at least 0.5 m below"),
+        ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
+        ("circle: {radius_m: 1, speed_m_s: 4}", "too fast for circle.radius_m"),
+        ("circle: {radius_m: 26}", "leaves limits.fence_radius_m"),
         ("a: [", "not valid YAML"),
         ("link: 3", "`link`"),
         ("link: {endpoint: nonsense}", "nonsense"),
@@ -90,6 +102,22 @@ def test_an_unknown_programme_names_the_known(capsys, tmp_path):
     code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--programme", "loop")
     assert code == 2
     assert "known: hover, steps, circle" in err
+
+
+def test_check_config_reads_the_endpoint_and_the_key_too(capsys, tmp_path):
+    for text, words in (
+        ("link: {endpoint: nonsense}", "nonsense"),
+        ("link: {signing_key_file: /not/there}", "/not/there"),
+    ):
+        code, _, err = run(capsys, "check-config", config(tmp_path, text))
+        assert (code, words in err) == (2, True)
+
+
+def test_a_programme_from_the_command_line_must_fit_the_limits(capsys, tmp_path):
+    path = config(tmp_path, "limits: {max_tilt_deg: 10}\nflight: {programme: [hover]}")
+    code, _, err = run(capsys, "fly", "--config", path, "--programme", "steps")
+    assert code == 2
+    assert "the command line: steps.coefficient must not exceed" in err
 
 
 @pytest.mark.parametrize(

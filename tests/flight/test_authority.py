@@ -3,8 +3,10 @@
 import socket
 
 import pytest
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 
+from companion.flight.guide import Guide
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
 from tests.flight.fly import fly, mock_vehicle, session_for
@@ -27,6 +29,18 @@ class When(Silent):
 
     def _act(self, name):
         if name == self.wanted and self.action is not None:
+            action, self.action = self.action, None
+            action()
+
+
+class OnEvent(Silent):
+    """Calls `action` once, when an event with this text happens."""
+
+    def __init__(self, text, action):
+        self.text, self.action = text, action
+
+    def event(self, time, text):
+        if text == self.text and self.action is not None:
             action, self.action = self.action, None
             action()
 
@@ -68,27 +82,154 @@ def test_interrupted_on_the_ground_it_never_arms(tmp_path, phase):
     assert observer.phases[-1] == phase
 
 
-def test_interrupted_at_arming_it_disarms(tmp_path):
+def commands(summary):
+    """(time, command, first parameter) of each command that we sent."""
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    found = iter(lambda: log.recv_match(type=["COMMAND_LONG"]), None)
+    return [(m._timestamp, m.command, m.param1) for m in found if m.get_srcComponent() == 191]
+
+
+ARM, TAKEOFF, LAND, SET_MODE = 400, 22, 21, 176
+
+
+def test_interrupted_as_arming_begins_it_does_not_arm(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        _, observer = interrupted(mock, tmp_path / "log", "arm")
+        summary, _ = interrupted(mock, tmp_path / "log", "arm")
         assert not mock.state()["armed"]
-    assert observer.phases[-1] == "disarm"
+    assert ARM not in [command for _, command, _ in commands(summary)]
 
 
-def pilot_arms(mock):
-    """The pilot arms by another station: a second sender, which the vehicle obeys."""
+def test_interrupted_once_armed_it_disarms(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        observer = OnEvent("armed", lambda: session.interrupt("interrupted by the user"))
+        session = session_for(mock, tmp_path / "log", observer)
+        summary = lockstep.run(session.fly())
+        assert not mock.state()["armed"]
+    arming = [(command, value) for _, command, value in commands(summary) if command == ARM]
+    assert arming == [(ARM, 1.0), (ARM, 0.0)]
+    assert summary.result == "interrupted by the user"
+
+
+def test_interrupted_in_an_emergency_landing_it_goes_on_landing(tmp_path):
+    fault = {"kind": "low_battery", "remaining": 0.15, "after_offboard_s": 3.0}
+    with mock_vehicle(tmp_path, faults=[fault]) as mock:
+        summary, observer = interrupted(mock, tmp_path / "log", "land", after=0.0)
+        state = mock.state()
+    assert "battery at 15 %" in summary.result
+    assert observer.phases[-2:] == ["land", "disarm"]
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def test_an_error_of_ours_in_flight_hands_back_and_lands(tmp_path, monkeypatch):
+    def broken(guide, programme):
+        raise ZeroDivisionError("a fault of ours")
+
+    monkeypatch.setattr(Guide, "follow", broken)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        state = mock.state()
+    assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def test_a_false_landing_in_control_is_not_made_true(tmp_path):
+    """An autopilot that calls a flying vehicle landed must not get thrust 0 for it."""
+
+    def claim():
+        session._assembled.rig.link.state.landed_state = 1
+
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("programme", claim, after=2.0)
+        session = session_for(mock, tmp_path / "log", observer)
+        summary = lockstep.run(session.fly())
+        assert not mock.state()["crashed"]
+    assert summary.result == "the autopilot says that it has landed"
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    setpoints = iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None)
+    assert min(m.thrust for m in setpoints if m._timestamp > took_over) > 0.3
+
+
+def test_without_heartbeats_the_vehicle_is_let_go(tmp_path):
+    fault = {"kind": "stop_telemetry", "messages": ["HEARTBEAT"], "after_offboard_s": 2.0}
+    takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.5}
+    with mock_vehicle(tmp_path, faults=[fault, takeover]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert mock.state()["mode"] == "POSCTL"
+    assert "no heartbeat" in summary.result
+    took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    assert not [command for at, command, _ in commands(summary) if at > took_over + 1.0]
+
+
+def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
+    silence = {"kind": "drop", "direction": "to_companion", "after_offboard_s": 2.0}
+    takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.2}
+    with mock_vehicle(tmp_path, faults=[silence, takeover]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert mock.state()["mode"] == "POSCTL"
+    assert "no attitude" in summary.result
+    took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    assert {command for at, command, _ in commands(summary) if at > took_over + 1.0} <= {512}
+
+
+def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        cut = {"fault": {"kind": "drop", "direction": "to_companion"}}
+        observer = When("takeoff", lambda: mock.ask(cut), after=1.0)
+        summary = fly(mock, tmp_path / "log", observer)
+        assert mock.state()["armed"]
+    assert (summary.phase, "no heartbeat" in summary.result) == ("takeoff", True)
+    began = next(at for at, text in summary.events if "TAKEOFF" in text)
+    assert summary.events[-1][0] < began + 4.0
+
+
+def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("takeoff", lambda: station(mock, SET_MODE, 1, 4, 3), after=1.0)
+        summary = fly(mock, tmp_path / "log", observer, flight={"takeoff_height_m": 20.0})
+        assert mock.state()["mode"] == "LOITER"
+    assert "the climb was stopped" in summary.result
+    assert [command for _, command, _ in commands(summary)][-1] == TAKEOFF
+
+
+def test_a_link_that_is_always_late_is_refused_before_takeoff(tmp_path):
+    late = {"kind": "delay", "delay_ms": 300.0, "direction": "to_companion"}
+    with mock_vehicle(tmp_path, faults=[late]) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert not mock.state()["armed"]
+    assert summary.phase == "checks"
+    assert "round trip" in summary.result
+
+
+def station(mock, command, *parameters):
+    """Another station commands: a second sender, which the vehicle obeys."""
     sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
-    frame = common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0).pack(sender)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-        station.sendto(frame, ("127.0.0.1", mock.port + 40))
+    padded = [*parameters, *[0] * (7 - len(parameters))]
+    frame = common.MAVLink_command_long_message(1, 1, command, 0, *padded).pack(sender)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
+        channel.sendto(frame, ("127.0.0.1", mock.port + 40))
 
 
 def test_without_being_told_to_it_waits_for_the_pilot_to_arm(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("arm", lambda: pilot_arms(mock), after=3.0)
+        observer = When("arm", lambda: station(mock, ARM, 1), after=3.0)
         summary = fly(mock, tmp_path / "log", observer, flight={"arm": False})
     assert summary.result == "ok", summary.events
     assert next(at for at, text in summary.events if text == "armed") > 5.0
+
+
+def test_a_pilot_who_arms_in_another_mode_is_waited_for_and_not_taken_off_with(tmp_path):
+    def arm_and_keep():
+        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        station(mock, ARM, 1)
+
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("arm", arm_and_keep, after=1.0)
+        changes = {"arm": False, "arming_timeout_s": 6.0}
+        summary = fly(mock, tmp_path / "log", observer, flight=changes)
+        assert mock.state()["mode"] == "POSCTL"
+    assert "by switching to AUTO.LOITER" in summary.result
+    assert {command for _, command, _ in commands(summary)} <= {511, 512}
 
 
 def test_if_the_pilot_does_not_arm_nothing_happens(tmp_path):
