@@ -1,5 +1,6 @@
 """One vehicle on its sockets: the only place with sockets and wall time."""
 
+import os
 import select
 import time
 
@@ -150,6 +151,7 @@ class Server:
         self._poll(0.0)
         while not self._answered and time.monotonic() - began < SPIN_S:
             self._collect_companion()
+            os.sched_yield()  # whoever else wants this core may have it
         while not self._answered:
             left = began + timeout_s - time.monotonic()
             if left <= 0.0:

@@ -7,6 +7,7 @@ so a flight is the same to the bit each time, and as fast as both can compute.
 """
 
 import asyncio
+import os
 import time
 from collections.abc import Callable, Coroutine
 from contextvars import Context
@@ -19,6 +20,8 @@ Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
 """Wall time without any I/O after which the vehicle counts as gone and time goes on without it."""
+
+_SPIN_S = 0.0005
 
 _TIMERS_IN_ORDER = 1_000_000
 _TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
@@ -91,10 +94,23 @@ class _SteppingSelector(HotSelector):
         left = None if timeout == 0 else self._clock.patience()
         if left is None:
             return super().select(timeout)
-        ready = super().select(left)
+        ready = self._spin()
+        if not ready and self._when_idle is None:
+            ready = super().select(left)
         if self._when_idle is None and self._clock.patience() == 0.0:
             self._clock.go_on_alone()
         return ready
+
+
+    def _spin(self) -> Ready:
+        """Look for the next beacon without sleeping: to be woken costs more than to look."""
+        give_up = time.perf_counter() + _SPIN_S
+        while time.perf_counter() < give_up:
+            ready = super().select(0)
+            if ready or self._when_idle is not None:
+                return ready
+            os.sched_yield()  # whoever else wants this core may have it
+        return []
 
 
 class LockstepEventLoop(LinkEventLoop):
