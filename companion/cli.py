@@ -3,12 +3,14 @@
 import argparse
 import asyncio
 import json
+import shutil
 import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args
 
@@ -28,6 +30,8 @@ from companion.recording.figure import FigureError, draw_flight
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
 from companion.terminal import FlightConsole, TerminalObserver
+
+_PACKAGE = "mavlink-companion"
 
 EXIT_OK, EXIT_FLIGHT, EXIT_USAGE = 0, 1, 2
 
@@ -69,13 +73,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--debug", action="store_true", help="show where an internal error happened"
     )
+    parser.add_argument("--version", action="version", version=f"companion {version(_PACKAGE)}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     fly = commands.add_parser("fly", help="fly the vehicle that the configuration names")
-    fly.add_argument("--config", type=Path, required=True, metavar="FILE")
+    fly.add_argument(
+        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
+    )
     fly.set_defaults(run=_fly)
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
-    show.add_argument("--config", type=Path, metavar="FILE", help="default: configs/mock-px4.yaml")
+    show.add_argument(
+        "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
+    )
     show.set_defaults(run=_demo)
     for command in (fly, show):
         command.add_argument(
@@ -92,8 +101,8 @@ def _parser() -> argparse.ArgumentParser:
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
     link = benches.add_parser("link", help="sample in → setpoint out: echo, companion, MAVSDK")
-    link.add_argument("--seconds", type=float, default=20.0, help="for each of the three")
-    link.add_argument("--rate", type=float, default=250.0, help="samples a second")
+    link.add_argument("--seconds", type=float, default=20.0, help="for each of the three (20)")
+    link.add_argument("--rate", type=float, default=250.0, help="samples a second (250)")
     link.add_argument("--json", action="store_true", help="print the figures as one JSON line")
     link.set_defaults(run=_bench_link)
 
@@ -123,7 +132,7 @@ def _programmes(text: str) -> tuple[str, ...]:
 def _fly(options: argparse.Namespace) -> int:
     config = _changed(load(options.config), options)
     folder = _flight_folder(config)
-    return _fly_in(folder, config, options.config.read_text(encoding="utf-8"), options)
+    return _fly_in(folder, config, options)
 
 
 def _demo(options: argparse.Namespace) -> int:
@@ -134,7 +143,7 @@ def _demo(options: argparse.Namespace) -> int:
     demo.check_mock(path)
     folder = _flight_folder(config)
     with demo.bundled_vehicle(path, port, folder / "mock.log", lockstep=config.link.lockstep):
-        return _fly_in(folder, config, path.read_text(encoding="utf-8"), options)
+        return _fly_in(folder, config, options)
 
 
 def _changed(config: Config, options: argparse.Namespace) -> Config:
@@ -173,14 +182,18 @@ def _flight_folder(config: Config) -> Path:
     raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
 
 
-def _fly_in(folder: Path, config: Config, text: str, options: argparse.Namespace) -> int:
+def _fly_in(folder: Path, config: Config, options: argparse.Namespace) -> int:
     console = FlightConsole(stderr=options.json, highlight=False)
     observer = TerminalObserver(console)
-    session = Session(config, text, folder, observer, observer.ask_landing)
+    session = Session(config, folder, observer, observer.ask_landing)
     run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
     with ExitStack() as stack:
         stack.callback(observer.close)
-        summary = run(_interruptible(session))
+        try:
+            summary = run(_interruptible(session))
+        except (EndpointError, SigningError):
+            shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
+            raise
     # From here on the vehicle is in other hands, and all is on the disk.
     with suppress(OSError):
         console.print(flight_table(summary))

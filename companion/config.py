@@ -8,7 +8,7 @@ from math import radians, sin, tan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from companion.attitude import PLANNER_NAMES
 from companion.guidance.reference import GRAVITY
@@ -42,7 +42,7 @@ class LinkConfig(Section):
     """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
     signing_key_file: Path | None = None
     """File whose first line is the passphrase: sign what we send, refuse what is not signed."""
-    lockstep: bool = False
+    lockstep: StrictBool = False
     """Run on the bundled vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
     """Asked of the autopilot for ATTITUDE_QUATERNION; the loop runs at what really arrives."""
@@ -59,6 +59,8 @@ class LinkConfig(Section):
             raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
         if self.min_position_rate_hz > self.position_rate_hz:
             raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
+        if self.lockstep and not self.endpoint.startswith("udp"):
+            raise ValueError("lockstep is for the bundled vehicle, over a udp endpoint")
         ours, theirs = self.source_component, self.target_component
         if (self.source_system, ours) == (self.target_system, theirs):
             raise ValueError("source_system and source_component are the autopilot's own")
@@ -182,7 +184,7 @@ class FlightConfig(Section):
         "circle",
     )
     """Flown in this order."""
-    arm: bool = False
+    arm: StrictBool = False
     """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
     connect_timeout_s: Seconds = 30.0
     """Wait this long for a heartbeat."""

@@ -12,6 +12,19 @@ from pydantic import BaseModel, ValidationError
 from companion.config import Config
 
 
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML in which a key stands once; plain YAML takes the last one in silence."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for (key_node, _), key in zip(node.value, keys, strict=True):
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key {key!r} stands there twice", problem_mark=key_node.start_mark
+                )
+        return super().construct_mapping(node, deep)
+
+
 class ConfigError(Exception):
     """The configuration cannot be used; the message is complete and meant for the user."""
 
@@ -38,7 +51,7 @@ def parse(text: str, name: str) -> Config:
         ConfigError: as `load`.
     """
     try:
-        data = yaml.safe_load(text)
+        data = yaml.load(text, _UniqueKeys)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f"{name}, line {mark.line + 1}" if mark else name

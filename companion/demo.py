@@ -5,13 +5,17 @@ import subprocess
 import sys
 import sysconfig
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from companion.config_file import ConfigError
 
 _LOCAL_PORT_OFFSET = 40
 """The vehicle sends from this many ports above the one it sends to."""
+
+
+_START = 0.7
+"""A vehicle that cannot start has said so by then, s."""
 
 
 class VehicleStoppedError(Exception):
@@ -71,21 +75,28 @@ def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> It
     handed back to its autopilot.
 
     Raises:
-        VehicleStoppedError: at the end, if the vehicle had stopped by itself; with its last words.
+        VehicleStoppedError: it stopped by itself, at once or meanwhile; with its last words.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
-    command += ["--port", str(port), *(["--lockstep"] if lockstep else [])]
+    # No ground station's link: its port is a fixed one, and may be somebody else's.
+    command += ["--port", str(port), "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
     with log.open("wb") as words:
         process = subprocess.Popen(command, stdout=words, stderr=words, start_new_session=True)
         try:
+            _check_running(process, log, _START)
             yield
         finally:
-            if process.poll() is not None:
-                last = log.read_text(errors="replace").strip().rpartition("\n")[2]
-                raise VehicleStoppedError(f"the bundled vehicle stopped, see {log}: {last}")
+            _check_running(process, log, 0.0)
             process.terminate()
             try:
                 process.wait(timeout=5.0)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def _check_running(process: "subprocess.Popen[bytes]", log: Path, patience: float) -> None:
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(timeout=patience)
+        last = log.read_text(errors="replace").strip().rpartition("\n")[2]
+        raise VehicleStoppedError(f"the bundled vehicle stopped, see {log}: {last}")

@@ -112,7 +112,8 @@ class Guide:
         self._loop.command = Command(target, down, now, is_step=reference.coefficients is not None)
         if self._loop.guarded:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
-            self._note_tracking(now, reference, motion)
+            measured_at = position.vehicle_time + (now - position.received)
+            self._note_tracking(measured_at, reference, motion)
         else:
             self._hover_thrust.pause()  # nobody obeys our thrust: nothing to learn from it
 
@@ -138,8 +139,10 @@ class Guide:
             return Reference(self.pose.position_ned, heading=self.pose.heading)
         return self._programme.at(now - self.begun_at, self.pose)
 
-    def _note_tracking(self, now: float, reference: Reference, motion: VehicleMotion) -> None:
+    def _note_tracking(
+        self, vehicle_time: float, reference: Reference, motion: VehicleMotion
+    ) -> None:
         north, east, down = reference.position_ned
         if reference.coefficients is not None:
             north = east = nan  # open loop: only the height is meant
-        self._trace.add_tracking(now, (north, east, down), motion.position_ned)
+        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

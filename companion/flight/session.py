@@ -5,6 +5,8 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+import yaml
+
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, link_settings
 from companion.flight.chronicle import Chronicle
@@ -22,7 +24,6 @@ class Session:
 
     Args:
         config: what to fly.
-        config_text: the YAML as it was read, kept beside the recording.
         folder: an existing folder for this flight's files.
         observer: is told what happens.
         ask_landing: asked after an interrupt, when the vehicle holds.
@@ -31,13 +32,11 @@ class Session:
     def __init__(
         self,
         config: Config,
-        config_text: str,
         folder: Path,
         observer: Observer,
         ask_landing: AskLanding,
     ) -> None:
         self._config = config
-        self._config_text = config_text
         self._folder = folder
         self._observer = observer
         self._ask_landing = ask_landing
@@ -58,7 +57,8 @@ class Session:
             OSError: the folder cannot be written; nothing was sent.
         """
         settings = link_settings(self._config)
-        (self._folder / "config.yaml").write_text(self._config_text, encoding="utf-8")
+        flown = yaml.safe_dump(self._config.model_dump(mode="json"), sort_keys=False)
+        (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         loop = asyncio.get_running_loop()
         epoch = 0.0 if settings.lockstep else time.time() - loop.time()
 

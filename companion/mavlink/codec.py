@@ -184,7 +184,13 @@ def encode_system_time(time_boot_ms: int) -> bytes:
     return _SYSTEM_TIME.pack(0, time_boot_ms)
 
 
-def decode_system_time(payload: bytes) -> int:
-    """`time_boot_ms` of a SYSTEM_TIME payload."""
-    time_boot_ms: int = _SYSTEM_TIME.unpack_from(payload.ljust(_SYSTEM_TIME.size, b"\0"))[1]
-    return time_boot_ms
+def decode_beacon(payload: bytes) -> int | None:
+    """`time_boot_ms` of a SYSTEM_TIME payload that is a lockstep beacon: it has no wall-clock time.
+
+    Returns:
+        None for any other SYSTEM_TIME, such as a vehicle out of lockstep sends once a second.
+    """
+    padded = payload.ljust(_SYSTEM_TIME.size, b"\0")
+    fields: tuple[int, int] = _SYSTEM_TIME.unpack_from(padded)
+    unix_usec, time_boot_ms = fields
+    return None if unix_usec else time_boot_ms

@@ -11,7 +11,7 @@ from companion.mavlink.codec import (
     CRC_EXTRA,
     SYSTEM_TIME,
     decode_attitude,
-    decode_system_time,
+    decode_beacon,
 )
 from companion.mavlink.framing import V2, Frame, FrameScanner
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
@@ -113,9 +113,11 @@ class Inbox:
                 continue
             accepted = True
             if self.lockstep is not None and frame.message_id == SYSTEM_TIME:
-                # Beacons are no telemetry: they have running numbers of their own.
-                self.lockstep.beacon(decode_system_time(frame.payload))
-                continue
+                beacon = decode_beacon(frame.payload)
+                if beacon is not None:
+                    # Beacons are no telemetry: they have running numbers of their own.
+                    self.lockstep.beacon(beacon)
+                    continue
             self._count(frame.message_id, frame.sequence)
             if self.lockstep is None:
                 sample = self._pass_on(frame, received_ns)

@@ -101,7 +101,6 @@ class _SteppingSelector(HotSelector):
             self._clock.go_on_alone()
         return ready
 
-
     def _spin(self) -> Ready:
         """Look for the next beacon without sleeping: to be woken costs more than to look."""
         give_up = time.perf_counter() + _SPIN_S

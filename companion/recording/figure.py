@@ -1,6 +1,7 @@
 """A flight as a picture: response, straightness and tracking; needs the extra `plot`."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,7 @@ def draw_flight(folder: Path, out: Path) -> None:
 
     Raises:
         MissingExtraError: matplotlib is missing.
-        FigureError: the folder holds no response or tracking.
+        FigureError: the folder holds nothing to draw, or `out` is of an unknown kind.
         OSError: the picture cannot be written.
     """
     require("matplotlib", "plot", "drawing")
@@ -38,25 +39,47 @@ def draw_flight(folder: Path, out: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    response, tracking, gain = _load(folder)
-    figure, (steps, plane, ground) = plt.subplots(1, 3, figsize=(13.5, 4.2), layout="constrained")
-    _draw_steps(steps, response, gain)
-    _draw_plane(plane, response)
-    _draw_ground(ground, tracking)
-    figure.savefig(out, dpi=120)
-    plt.close(figure)
-
-
-def _load(folder: Path) -> tuple[Floats, Floats, float]:
+    response, tracking = _rows(folder / "response.csv"), _rows(folder / "tracking.csv")
+    panels: list[Callable[[Axes], None]] = []
+    if response is not None:
+        rows, gain = response, _gain(folder)
+        panels += [lambda axes: _draw_steps(axes, rows, gain), lambda axes: _draw_plane(axes, rows)]
+    if tracking is not None:
+        track = tracking
+        panels.append(lambda axes: _draw_ground(axes, track))
+    if not panels:
+        raise FigureError(f"{folder}: no flight with anything to draw is recorded there")
+    figure, grid = plt.subplots(
+        1, len(panels), figsize=(4.5 * len(panels), 4.2), layout="constrained", squeeze=False
+    )
+    for axes, draw in zip(grid[0], panels, strict=True):
+        draw(axes)
     try:
-        response = np.loadtxt(folder / "response.csv", delimiter=",", skiprows=1, ndmin=2)
-        tracking = np.loadtxt(folder / "tracking.csv", delimiter=",", skiprows=1, ndmin=2)
-        gain: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["gain_per_s"]
+        figure.savefig(out, dpi=120)
+    except ValueError as error:  # an ending that matplotlib does not know
+        raise FigureError(f"{out}: {error}") from error
+    finally:
+        plt.close(figure)
+
+
+def _rows(path: Path) -> Floats | None:
+    """The numbers of a CSV file; None where the flight wrote none."""
+    if not path.is_file():
+        return None
+    try:
+        return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except ValueError as error:
+        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
+
+
+def _gain(folder: Path) -> float:
+    try:
+        summary: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return float(summary["gain_per_s"])
     except (OSError, ValueError, KeyError) as error:
         raise FigureError(
-            f"{folder}: no flight with the programme `steps` is recorded there ({error})"
+            f"{folder / 'summary.json'}: not as a flight writes it: {error}"
         ) from error
-    return response, tracking, float(gain)
 
 
 def _coefficients(rows: Floats) -> Floats:
@@ -73,7 +96,9 @@ def _draw_steps(axes: "Axes", response: Floats, gain: float) -> None:
     axes.plot(time, target @ along, color=_TARGET, label="target")
     axes.plot(time, ideal @ along, "--", color=_IDEAL, label=f"ideal, 1/p = {1 / gain:.2g} s")
     axes.plot(time, measured @ along, color=_MEASURED, label="measured")
-    axes.set(title="Response to a doublet", xlabel="time, s", ylabel="acceleration / thrust")
+    axes.set(
+        title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
+    )
     axes.legend(loc="upper center", fontsize="small")
     axes.grid(alpha=0.3)
 
@@ -83,12 +108,19 @@ def _draw_plane(axes: "Axes", response: Floats) -> None:
     for number, rows in enumerate(split_doublets(response)):
         c = _coefficients(rows)
         style = _STYLES[number % len(_STYLES)]
-        axes.plot(c[:, 1], c[:, 0], style, color=_MEASURED, label=f"doublet {number + 1}")
+        axes.plot(c[:, 1], c[:, 0], style, color=_MEASURED, label=_direction(rows))
         axes.plot(rows[:, 6], rows[:, 5], "o", color=_TARGET, markersize=4)
     axes.set(title="Straightness", xlabel="east: $a_E$", ylabel="north: $a_N$")
     axes.set_aspect("equal")
     axes.legend(loc="upper right", fontsize="small")
     axes.grid(alpha=0.3)
+
+
+def _direction(rows: Floats) -> str:
+    """Where the first step of a doublet points, in words."""
+    north, east = np.sign(np.round(rows[0, 5:7], 6))
+    words = {-1.0: "south", 1.0: "north"}.get(north), {-1.0: "west", 1.0: "east"}.get(east)
+    return "-".join(word for word in words if word)
 
 
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:

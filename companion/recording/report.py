@@ -11,7 +11,14 @@ from companion.recording.summary import Summary
 
 def flight_table(summary: Summary) -> RenderableType:
     """The table that `companion fly` ends with."""
-    return Group(_verdict(summary), _response(summary), _tracking(summary), _loop(summary))
+    parts: list[RenderableType] = [_verdict(summary)]
+    if len(summary.trace.response):
+        parts.append(_response(summary))
+    if len(summary.trace.tracking):
+        parts.append(_tracking(summary))
+    if summary.counts.setpoints:
+        parts += [_loop(summary), _loop_words(summary)]
+    return Group(*parts)
 
 
 def _verdict(summary: Summary) -> Text:
@@ -31,7 +38,7 @@ def _table(title: str, *columns: str) -> Table:
 def _response(summary: Summary) -> RenderableType:
     response = summary.response()
     if response is None:
-        return Text("no acceleration step was flown, so no response was measured", style="dim")
+        return Text("no acceleration step was flown to its end", style="dim")
     ideal = 1.0 / summary.gain
     table = _table("Acceleration response to steps", "measured", "ideal (1/p)")
     for axis, value in (
@@ -59,21 +66,23 @@ def _tracking(summary: Summary) -> RenderableType:
 
 
 def _loop(summary: Summary) -> RenderableType:
-    counts, latency = summary.counts, summary.latency_us()
+    latency = summary.latency_us()
     table = _table("Control loop", "p50", "p99", "largest")
     table.add_row(
         "sample in → setpoint out",
         *(_number(latency[key], "µs", 0) for key in ("p50", "p99", "max")),
     )
-    link = summary.link
-    table.caption = (
-        f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz; "
-        f"{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
+    return table
+
+
+def _loop_words(summary: Summary) -> Text:
+    counts, link = summary.counts, summary.link
+    return Text(
+        f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
+        f"in the programme\n{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite"
     )
-    table.caption_justify = "left"
-    return table
 
 
 def _number(value: float, unit: str, digits: int) -> str:

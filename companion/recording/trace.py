@@ -14,7 +14,7 @@ _MAX_SAMPLES = 500_000
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (
-    "time_s",
+    "vehicle_time_s",
     *(f"reference_{axis}_m" for axis in ("north", "east", "down")),
     *(f"measured_{axis}_m" for axis in ("north", "east", "down")),
 )
@@ -26,7 +26,7 @@ class FlightTrace:
 
     Attributes:
         response: rows (vehicle time s, w, x, y, z, target north, target east), of steps only.
-        tracking: rows (time s, reference north, east, down, measured north, east, down).
+        tracking: rows (vehicle time s, reference north, east, down, measured north, east, down).
         latencies_ns: sample in → setpoint out inside this process, ns.
     """
 
@@ -41,13 +41,13 @@ class FlightTrace:
 
     def add_tracking(
         self,
-        time: float,
+        vehicle_time: float,
         reference: tuple[float, float, float],
         measured: tuple[float, float, float],
     ) -> None:
         """Note where the vehicle ought to be and where it is (NED, m)."""
         if len(self.tracking) < len(_TRACKING) * _MAX_SAMPLES:
-            self.tracking.extend((time, *reference, *measured))
+            self.tracking.extend((vehicle_time, *reference, *measured))
 
     def add_latency(self, nanoseconds: int) -> None:
         """Note how long one answer took."""

@@ -48,6 +48,9 @@ def config(tmp_path, text):
         ("circle: {radius_m: 1, speed_m_s: 4}", "too fast for circle.radius_m"),
         ("circle: {radius_m: 26}", "leaves limits.fence_radius_m"),
         ("a: [", "not valid YAML"),
+        ("flight: {arm: 'yes'}", "`flight.arm`"),
+        ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
+        ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
         ("link: 3", "`link`"),
         ("link: {endpoint: nonsense}", "nonsense"),
         ("link: {endpoint: 'udpin://0.0.0.0:port'}", "port"),
@@ -137,7 +140,7 @@ def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arg
 def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):
     code, _, err = run(capsys, "plot", tmp_path)
     assert code == 2
-    assert "no flight with the programme `steps` is recorded there" in err
+    assert "no flight with anything to draw is recorded there" in err
 
 
 @pytest.mark.parametrize("arguments", [(), ("fly",), ("bench",), ("check-config",), ("hover",)])

@@ -96,7 +96,7 @@ def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
         )
     )
     folder.mkdir(exist_ok=True)
-    return Session(parse(text, "test"), text, folder, observer or Silent(), ask_landing or decline)
+    return Session(parse(text, "test"), folder, observer or Silent(), ask_landing or decline)
 
 
 async def decline():

@@ -14,7 +14,7 @@ from companion.mavlink.codec import (
     SetpointEncoder,
     decode,
     decode_attitude,
-    decode_system_time,
+    decode_beacon,
     encode,
     encode_system_time,
     message_id,
@@ -126,7 +126,8 @@ def test_system_time_is_the_lockstep_answer():
     assert encode_system_time(123456).rstrip(b"\0") == payload_of(
         dialect.MAVLink_system_time_message(0, 123456)
     )
-    assert decode_system_time(encode_system_time(123456).rstrip(b"\0")) == 123456
+    assert decode_beacon(encode_system_time(123456).rstrip(b"\0")) == 123456
+    assert decode_beacon(b"\1" + encode_system_time(123456)[1:]) is None
 
 
 def test_unknown_names_are_told():

@@ -1,0 +1,61 @@
+"""`companion demo` and `companion plot`, as a user calls them, with the shortest programme."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from companion import demo
+from companion.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Flights go to a folder of their own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def companion(folder, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "companion", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_demo_flies_shows_and_can_be_drawn(folder):
+    done = companion(folder, "demo", "--lockstep", "--programme", "steps", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "flight ok" in done.stderr
+    assert "time constant north" in done.stderr
+    result = json.loads(done.stdout)
+    assert (result["result"], result["phase"]) == ("ok", "disarm")
+    drawn = companion(folder, "plot", result["log"])
+    assert drawn.returncode == 0, drawn.stderr
+    picture = folder / result["log"] / "flight.png"
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert picture.stat().st_size > 20_000
+    bad = companion(folder, "plot", result["log"], "--out", "flight.zzz")
+    assert (bad.returncode, "zzz" in bad.stderr, "Traceback" in bad.stderr) == (2, True, False)
+
+
+def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypatch, capsys):
+    port = demo.free_port()
+    monkeypatch.setattr(demo, "free_port", lambda: port)
+    (folder / "log").mkdir()
+    with demo.bundled_vehicle(demo.default_config(), port, folder / "log" / "a", lockstep=True):
+        assert main(["demo", "--lockstep"]) == 1
+    assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
+
+
+def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
+    port = demo.free_port()
+    (folder / "mine.yaml").write_text(f"link: {{endpoint: 'udpin://127.0.0.1:{port}'}}")
+    with demo.bundled_vehicle(demo.default_config(), port, folder / "log", lockstep=False):
+        code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
+    assert code == 1
+    assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())
