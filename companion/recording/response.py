@@ -47,9 +47,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     for t, c, d in zip(times, measured, targets, strict=True):
         ideal = first_order(t, d, c[0], 1.0 / gain)
         deviation = max(deviation, float(np.hypot(*(c - ideal).T).max()))
-        along = d[0] / np.hypot(*d[0])
-        across = (c - c[0]) @ np.array([-along[1], along[0]])
-        cross = max(cross, float(np.abs(across).max()))
+        cross = max(cross, _cross_axis(c, d))
     north, east = (
         _fit_time_constant(
             [
@@ -61,6 +59,21 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         for axis in (0, 1)
     )
     return StepResponse(north, east, cross, deviation)
+
+
+def _cross_axis(measured: Floats, target: Floats) -> float:
+    """Largest distance from the straight lines on which the steps ought to run.
+
+    Each step has its own: from where the vehicle was when the target changed, which in wind is not
+    level, to the target.
+    """
+    changes = np.flatnonzero(np.any(np.diff(target, axis=0), axis=1)) + 1
+    largest = 0.0
+    for c, d in zip(np.split(measured, changes), np.split(target, changes), strict=True):
+        way = d[0] - c[0]
+        across = (c - c[0]) @ np.array([-way[1], way[0]]) / max(float(np.hypot(*way)), 1e-9)
+        largest = max(largest, float(np.abs(across).max()))
+    return largest
 
 
 def split_doublets(rows: Floats) -> list[Floats]:

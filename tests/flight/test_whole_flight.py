@@ -71,3 +71,16 @@ def test_the_log_holds_both_directions_and_every_setpoint(twice):
     assert {answer.time_boot_ms for answer in answers} <= stamps
     assert {answer.type_mask for answer in answers} == {128}
     assert all(0.0 <= answer.thrust <= 0.9 for answer in answers)
+
+
+def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
+    settings = {
+        "wind": {"speed_m_s": 2.0, "from_deg": 40.0, "gust_m_s": 0.7, "vertical_gust_m_s": 0.3},
+        "battery": {"initial_remaining": 0.5},
+    }
+    with mock_vehicle(tmp_path, **settings) as mock:
+        summary = fly(mock, tmp_path / "log", **PROGRAMME)
+        assert not mock.state()["crashed"]
+    assert summary.result == "ok", summary.events
+    assert summary.response().cross_axis_max < 0.02
+    assert summary.tracking()["height_rms_m"] < 0.3

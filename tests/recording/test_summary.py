@@ -43,7 +43,7 @@ def test_time_constants_are_recovered(tau):
 
 def test_deviation_and_cross_axis_are_seen():
     response = measure_response(trace_of(0.3, bend=0.02).response_rows(), gain=5.0)
-    assert response.cross_axis_max == pytest.approx(0.02, rel=0.01)
+    assert response.cross_axis_max == pytest.approx(0.02, rel=0.05)
     assert 0.03 < response.model_deviation_max < 0.1
 
 
