@@ -100,8 +100,10 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
-    link = benches.add_parser("link", help="sample in → setpoint out: echo, companion, MAVSDK")
-    link.add_argument("--seconds", type=float, default=20.0, help="for each of the three (20)")
+    link = benches.add_parser(
+        "link", help="sample in → setpoint out: ours, echo, pymavlink, MAVSDK"
+    )
+    link.add_argument("--seconds", type=float, default=20.0, help="for each program (20)")
     link.add_argument("--rate", type=float, default=250.0, help="samples a second (250)")
     link.add_argument("--json", action="store_true", help="print the figures as one JSON line")
     link.set_defaults(run=_bench_link)

@@ -1,7 +1,8 @@
 """`companion bench link`: how long a sample takes to become a setpoint, ours and others'.
 
-One sender plays the vehicle to three programs in turn, in short rounds, so that all of them meet
-the same state of the machine: a bare echo in Python (the floor), this program, and MAVSDK.
+One sender plays the vehicle to four programs in turn, in short rounds, so that all of them meet
+the same state of the machine: a bare echo in Python (the floor), this program, what one writes
+oneself on pymavlink, and MAVSDK.
 """
 
 import gc
@@ -20,6 +21,7 @@ from companion.extras import require
 _ROUND_S = 1.0
 _NO_WRAP = 2**32
 _YAW_RATE_WRAP = 8192
+_OWN_LOOP = "companion.bench.pymavlink_program"
 
 
 class _Entry(NamedTuple):
@@ -33,12 +35,13 @@ class _Entry(NamedTuple):
 _ENTRIES = (
     _Entry("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
     _Entry("companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP),
+    _Entry("pymavlink", "blocking pymavlink", _OWN_LOOP, stamp_by_time, _NO_WRAP),
     _Entry("mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 
 
 def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
-    """Measure all three, in interleaved rounds of about a second.
+    """Measure all of them, in interleaved rounds of about a second.
 
     Args:
         seconds: How long each of them is measured.
@@ -46,9 +49,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         as_json: Print nothing; the caller prints what is returned.
 
     Returns:
-        For `echo`, `companion` and `mavsdk`: `p50_us`, `p99_us`, `max_us`, `cpu_percent` (of one
-        core), `samples` and `unanswered`; and `ratio` with `companion_to_echo` and
-        `companion_to_mavsdk` of the p50.
+        For `echo`, `companion`, `pymavlink` and `mavsdk`: `p50_us`, `p99_us`, `max_us`,
+        `cpu_percent` (of one core), `samples` and `unanswered`; and `ratio` of the p50s,
+        `companion_to_…` each of the others.
 
     Raises:
         MissingExtraError: MAVSDK is not installed.
@@ -70,7 +73,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         figures = {key: _figures(sender) for key, sender in senders.items()}
     figures["ratio"] = {
         f"companion_to_{other}": round(figures["companion"]["p50_us"] / figures[other]["p50_us"], 3)
-        for other in ("echo", "mavsdk")
+        for other in ("echo", "pymavlink", "mavsdk")
     }
     if not as_json:
         _show(figures, rate_hz)
@@ -133,6 +136,7 @@ def _show(figures: dict[str, Any], rate_hz: float) -> None:
     console.print(table)
     console.print(
         f"p50 of companion: {ratio['companion_to_echo']:.2f} × echo, "
+        f"{ratio['companion_to_pymavlink']:.2f} × pymavlink, "
         f"{ratio['companion_to_mavsdk']:.2f} × MAVSDK",
         highlight=False,
     )

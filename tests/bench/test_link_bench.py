@@ -24,7 +24,7 @@ def test_stamps_are_read_where_pymavlink_puts_them():
     ] == list(range(8192))
 
 
-@pytest.mark.parametrize("module", ["echo_program", "companion_program"])
+@pytest.mark.parametrize("module", ["echo_program", "companion_program", "pymavlink_program"])
 def test_every_sample_is_answered_and_its_time_taken(module):
     contestant = Contestant(module, f"companion.bench.{module}")
     sender = Sender(contestant, stamp_by_time, 2**32)
@@ -64,10 +64,10 @@ def test_senseless_arguments_are_refused(seconds, rate):
         link.run(seconds, rate, as_json=True)
 
 
-def test_all_three_in_one_go(capsys):
+def test_all_of_them_in_one_go(capsys):
     pytest.importorskip("mavsdk")
     figures = link.run(1.0, 100.0, as_json=False)
-    for key in ("echo", "companion", "mavsdk"):
+    for key in ("echo", "companion", "pymavlink", "mavsdk"):
         row = figures[key]
         assert 0.0 < row["p50_us"] <= row["p99_us"] <= row["max_us"]
         assert row["cpu_percent"] > 0.0

@@ -1,0 +1,37 @@
+"""What one writes oneself: a blocking socket, pymavlink, and the same law in a loop.
+
+No link, no deadman, no thrust, no recording: just decode, plan, encode.
+"""
+
+import socket
+import sys
+
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.attitude import Target
+from companion.config import Config
+from companion.flight.assembly import planner
+
+_RATES_AND_THRUST = 128  # ATTITUDE_TARGET_TYPEMASK: ignore the attitude
+_HOVER = 0.5
+
+
+def main(port: int) -> None:
+    """Answer until killed."""
+    law, target, mavlink = planner(Config()), Target(0.1, 0.0, 0.0), dialect.MAVLink(None, 1, 191)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
+        opened.bind(("127.0.0.1", port))
+        while True:
+            data, sender = opened.recvfrom(2048)
+            for sample in mavlink.parse_buffer(data) or ():
+                if sample.get_type() != "ATTITUDE_QUATERNION":
+                    continue
+                rates = law.rates((sample.q1, sample.q2, sample.q3, sample.q4), target, 0.004)
+                setpoint = dialect.MAVLink_set_attitude_target_message(
+                    sample.time_boot_ms, 1, 1, _RATES_AND_THRUST, [1, 0, 0, 0], *rates, _HOVER
+                )
+                opened.sendto(setpoint.pack(mavlink), sender)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))
