@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from companion.config import Config
@@ -9,6 +10,7 @@ from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
 from companion.flight.safety import SafetyMonitors
 from companion.guidance import Sequence
+from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
 
 _POLL = 0.02
@@ -54,8 +56,16 @@ class Rig:
             await asyncio.sleep(_POLL)
 
     async def fresh_heartbeat(self) -> None:
-        """Wait for a heartbeat that is newer than this call."""
-        await self.link.request_message("HEARTBEAT")
+        """Wait for a heartbeat that is newer than this call; asked for, or the next one due."""
+        began = asyncio.get_running_loop().time()
+        with suppress(LinkError):  # an autopilot that does not send it on demand sends it anyway
+            await self.link.request_message("HEARTBEAT")
+
+        def newer() -> bool:
+            heartbeat = self.link.state.heartbeat
+            return heartbeat is not None and heartbeat.received >= began
+
+        await self.until(newer)
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

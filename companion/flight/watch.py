@@ -2,13 +2,11 @@
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.phases import Phase
 from companion.flight.rig import Rig
 from companion.flight.roles import Role, require_role, role_of
-from companion.mavlink.errors import LinkError
 
 _HEARD = 0.3
 """Nothing at all from the vehicle for this long, s: it would not be heard taking over, either."""
@@ -61,11 +59,8 @@ class Watch:
 
     def ask_mode(self) -> None:
         """Ask for a heartbeat now rather than wait for the next one."""
-        self._question = asyncio.create_task(self._ask())
-
-    async def _ask(self) -> None:
-        with suppress(LinkError):  # no answer: the silence limit decides
-            await self._rig.fresh_heartbeat()
+        # Without an answer the silence limit decides.
+        self._question = asyncio.create_task(self._rig.fresh_heartbeat())
 
     def _listen(self) -> None:
         frames = self._rig.link.stats.frames

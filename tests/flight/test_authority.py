@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import common
 from companion.flight.guide import Guide
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
+from companion.mavlink.errors import CommandRefused
+from companion.mavlink.link import Link
 from tests.flight.fly import fly, mock_vehicle, session_for
 
 
@@ -275,3 +277,14 @@ def test_leaving_the_fence_hands_back_and_lands(tmp_path):
     assert "beyond limits.fence_radius_m" in summary.result
     assert summary.events[-1][1] == "disarmed"
     assert (state["on_ground"], state["crashed"]) == (True, False)
+
+
+def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, monkeypatch):
+    async def refuse(link, name, *, timeout_s=1.0):
+        raise CommandRefused("MAV_CMD_REQUEST_MESSAGE", 3, "UNSUPPORTED", ())
+
+    monkeypatch.setattr(Link, "request_message", refuse)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert not mock.state()["crashed"]
+    assert summary.result == "ok", summary.events
