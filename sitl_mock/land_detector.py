@@ -7,8 +7,6 @@ LANDED_AFTER_US = 1_100_000
 """Contact with little thrust for this long is a landing (measured 1.1 s)."""
 LOW_THRUST_SHARE = 0.3
 """Little thrust: below this share of the hover thrust."""
-TAKEOFF_MARGIN_M = 0.5
-"""TAKEOFF counts as climbing until this close to its end."""
 
 
 class LandDetector:

@@ -1,6 +1,6 @@
 """`first-order`: Algorithm 1 of the paper, made safe over the whole sphere of attitudes."""
 
-from math import atan2, cos, inf, pi, radians, sin, sqrt
+from math import atan2, cos, inf, radians, sin, sqrt
 
 from companion.attitude.errors import InvalidTargetError
 from companion.attitude.kinematics import (
@@ -11,7 +11,7 @@ from companion.attitude.kinematics import (
     to_body,
 )
 from companion.attitude.limits import Limits
-from companion.attitude.representation import normalised
+from companion.attitude.representation import normalised, wrap_angle
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 RECOVERY_ANGLE = radians(75.0)
@@ -120,9 +120,7 @@ class FirstOrderPlanner:
 
     def _yaw_rate(self, b: float, z: float, target: Target) -> float:
         """Heading control on the yaw part alone, the short way round."""
-        error = (target.heading - 2.0 * atan2(z, b)) % (2.0 * pi)
-        if error > pi:
-            error -= 2.0 * pi
+        error = wrap_angle(target.heading - 2.0 * atan2(z, b))
         rate = self._yaw_gain * error + target.heading_rate
         if not -inf < rate < inf:
             raise InvalidTargetError(f"target heading is not finite: {target}")

@@ -9,10 +9,14 @@ from companion.attitude.types import Coefficients, Quaternion, TiltYaw
 NORM_TOLERANCE = 1e-3
 
 
+def _norm(q: Quaternion) -> float:
+    w, x, y, z = q
+    return sqrt(w * w + x * x + y * y + z * z)
+
+
 def is_unit(q: Quaternion) -> bool:
     """Whether a planner would take `q`: finite, its norm within 1e-3 of one."""
-    w, x, y, z = q
-    return abs(sqrt(w * w + x * x + y * y + z * z) - 1.0) <= NORM_TOLERANCE
+    return abs(_norm(q) - 1.0) <= NORM_TOLERANCE  # false for NaN, too
 
 
 def normalised(q: Quaternion) -> Quaternion:
@@ -22,7 +26,7 @@ def normalised(q: Quaternion) -> Quaternion:
         InvalidQuaternionError: the norm is off by more than 1e-3, or a component is not finite.
     """
     w, x, y, z = q
-    norm = sqrt(w * w + x * x + y * y + z * z)
+    norm = _norm(q)
     if not abs(norm - 1.0) <= NORM_TOLERANCE:  # written so that NaN is refused too
         raise InvalidQuaternionError(
             f"attitude quaternion {q} has norm {norm:.6g}; expected 1 within {NORM_TOLERANCE:g}"

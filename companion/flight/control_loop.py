@@ -111,12 +111,12 @@ class ControlLoop:
         ):
             self.stale += 1
             return
+        cosine = cos_tilt(sample.q[1], sample.q[2])
         try:
             if command.idle:
                 rates, thrust = BodyRates(0.0, 0.0, 0.0), 0.0
             else:
                 rates = self._planner.rates(sample.q, command.target, dt, sample.body_rates)
-                cosine = cos_tilt(sample.q[1], sample.q[2])
                 thrust = self._hover_thrust.normalised(
                     specific_thrust(command.acceleration_down, cosine)
                 )
@@ -126,7 +126,7 @@ class ControlLoop:
         if not left:
             self.refused += 1
             return
-        self._account(sample, command, thrust)
+        self._account(sample, command, thrust * cosine)
 
     def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
         """Keep what the watch asks for; returns the sample period in s."""
@@ -146,9 +146,9 @@ class ControlLoop:
             self.ask_mode()
         return self.held_back
 
-    def _account(self, sample: AttitudeSample, command: Command, thrust: float) -> None:
+    def _account(self, sample: AttitudeSample, command: Command, vertical: float) -> None:
         self.setpoints += 1
-        self._hover_thrust.sent(thrust, cos_tilt(sample.q[1], sample.q[2]))
+        self._hover_thrust.sent(vertical)
         self.last_answer = self._gap_from = sample.received
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9

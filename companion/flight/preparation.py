@@ -81,7 +81,7 @@ def _ready(rig: Rig) -> bool:
     state = rig.link.state
     if state.armed:
         raise FlightEnded("the vehicle is already armed; land and disarm it first")
-    battery = state.battery.remaining if state.battery else None
+    battery = state.battery_remaining
     least = rig.config.limits.min_battery_percent / 100.0
     if battery is not None and battery < least:
         raise FlightEnded(

@@ -63,7 +63,7 @@ class SafetyMonitors:
             raise FlightEnded("the autopilot reports a failsafe", Exit.LET_GO)
         if state.battery is not None and self._clock() - state.battery.received > _STATUS_STALE:
             raise FlightEnded("the battery's state is not reported any more", Exit.LAND)
-        battery = state.battery.remaining if state.battery else None
+        battery = state.battery_remaining
         if battery is not None and battery < self._min_battery:
             raise FlightEnded(
                 f"battery at {100 * battery:.0f} %, below "

@@ -63,9 +63,9 @@ class HoverThrust:
         """Normalised thrust for a specific thrust in m/s², inside the bounds."""
         return min(max(self.hover * thrust / GRAVITY, self._lowest), self._highest)
 
-    def sent(self, thrust: float, cos_tilt: float) -> None:
-        """Note a normalised thrust that was really sent, and the tilt at which it acted."""
-        self._sum += thrust * cos_tilt
+    def sent(self, vertical: float) -> None:
+        """Note the vertical part of a normalised thrust that was really sent: u·cos(tilt)."""
+        self._sum += vertical
         self._count += 1
 
     def observe(self, time: float, velocity_down: float) -> None:

@@ -102,13 +102,9 @@ class FrameScanner:
         message_id = low | high << 16
         check_at = at + _V2_HEADER_LENGTH + size
         end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
-        extra = self._crc_extra.get(message_id)
-        if extra is None:
-            return self._unknown_frame(data, at, end)
-        if end > len(data):
-            return _INCOMPLETE
-        if not self._intact(data, at, check_at, extra):
-            return _NOT_A_FRAME
+        fault = self._fault(data, at, check_at, end, message_id)
+        if fault is not None:
+            return fault
         payload = data[at + _V2_HEADER_LENGTH : check_at]
         raw = data[at:end]
         frames.append(
@@ -122,6 +118,17 @@ class FrameScanner:
         _, size, sequence, system, component, message_id = data[at : at + _V1_HEADER_LENGTH]
         check_at = at + _V1_HEADER_LENGTH + size
         end = check_at + 2
+        fault = self._fault(data, at, check_at, end, message_id)
+        if fault is not None:
+            return fault
+        payload = data[at + _V1_HEADER_LENGTH : check_at]
+        frames.append(
+            Frame(message_id, system, component, sequence, payload, data[at:end], signed=False)
+        )
+        return end - at
+
+    def _fault(self, data: bytes, at: int, check_at: int, end: int, message_id: int) -> int | None:
+        """What is done instead of taking the frame at `at`..`end`; None if it is intact."""
         extra = self._crc_extra.get(message_id)
         if extra is None:
             return self._unknown_frame(data, at, end)
@@ -129,11 +136,7 @@ class FrameScanner:
             return _INCOMPLETE
         if not self._intact(data, at, check_at, extra):
             return _NOT_A_FRAME
-        payload = data[at + _V1_HEADER_LENGTH : check_at]
-        frames.append(
-            Frame(message_id, system, component, sequence, payload, data[at:end], signed=False)
-        )
-        return end - at
+        return None
 
     def _intact(self, data: bytes, at: int, check_at: int, extra: bytes) -> bool:
         stated = data[check_at] | data[check_at + 1] << 8

@@ -27,9 +27,6 @@ _AUTOPILOT_INVALID = 8
 _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
 LANDED_ON_GROUND = 1
-LANDED_IN_AIR = 2
-LANDED_TAKEOFF = 3
-LANDED_LANDING = 4
 
 
 @dataclass
@@ -104,6 +101,11 @@ class VehicleState(_Values):
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground; unknown is not landed."""
         return self.landed_state == LANDED_ON_GROUND
+
+    @property
+    def battery_remaining(self) -> float | None:
+        """Remaining charge as a share, 0..1; `None` if it is not told."""
+        return self.battery.remaining if self.battery else None
 
     @property
     def height(self) -> float | None:

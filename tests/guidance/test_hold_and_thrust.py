@@ -85,7 +85,7 @@ def test_hover_thrust_is_learned_from_vertical_acceleration(true_hover):
     velocity = 0.0
     for k in range(500):
         u = thrust.normalised(specific_thrust(0.5 * velocity, 0.95))
-        thrust.sent(u, 0.95)
+        thrust.sent(u * 0.95)
         velocity += 0.02 * (GRAVITY - u * GRAVITY / true_hover * 0.95)
         thrust.observe(k * 0.02, velocity + rng.normal(0.0, 0.02))
     assert thrust.hover == pytest.approx(true_hover, rel=0.02)
@@ -94,12 +94,12 @@ def test_hover_thrust_is_learned_from_vertical_acceleration(true_hover):
 def test_hover_thrust_stays_in_its_bounds_and_learns_nothing_implausible():
     thrust = HoverThrust(0.5, 0.2, 0.5, 0.1, 0.9)
     for k in range(200):
-        thrust.sent(0.9, 1.0)
+        thrust.sent(0.9)
         thrust.observe(k * 0.05, 0.0)
     assert thrust.hover == pytest.approx(0.6)
     before = thrust.hover
     for k in range(200):  # free fall
-        thrust.sent(0.9, 1.0)
+        thrust.sent(0.9)
         thrust.observe(100.0 + k * 0.05, 9.8 * k * 0.05)
     assert thrust.hover == before
     assert thrust.normalised(1e9) == 0.9
@@ -108,12 +108,12 @@ def test_hover_thrust_stays_in_its_bounds_and_learns_nothing_implausible():
 
 def test_a_pause_and_a_gap_are_not_learned_from():
     thrust = HoverThrust(0.5, 0.4, 0.5, 0.1, 0.9)
-    thrust.sent(0.9, 1.0)
+    thrust.sent(0.9)
     thrust.observe(0.0, 0.0)
     thrust.pause()
-    thrust.sent(0.9, 1.0)
+    thrust.sent(0.9)
     thrust.observe(0.3, 0.0)
     assert thrust.hover == 0.5
-    thrust.sent(0.9, 1.0)
+    thrust.sent(0.9)
     thrust.observe(9.0, 0.0)
     assert thrust.hover == 0.5
