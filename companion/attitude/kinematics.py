@@ -1,10 +1,11 @@
 """The tilt-yaw split of an attitude, and the body rates that move it (paper, equations 9 to 28).
 
 Every formula stands here once, as arithmetic on plain floats: no branches on containers, no arrays,
-so that it costs a flight well under a microsecond and can be compiled for batches unchanged.
+so that it costs a flight well under a microsecond and is compiled for batches unchanged. Most of
+them need a², a·x and a·y only, and so neither a root nor a division.
 """
 
-from math import sqrt
+from math import atan, sqrt
 
 
 def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
@@ -23,35 +24,37 @@ def cos_tilt(x: float, y: float) -> float:
     return 1.0 - 2.0 * (x * x + y * y)
 
 
-def tilt_rates(
-    a: float, x: float, y: float, e_x: float, e_y: float, cosine: float
+def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """(a², a·x, a·y) of the split; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (10)."""
+    return w * w + z * z, w * x - z * y, z * x + w * y
+
+
+def body_rates(
+    w: float,
+    z: float,
+    ax: float,
+    ay: float,
+    inverse: float,
+    steepness: float,
+    e_x: float,
+    e_y: float,
 ) -> tuple[float, float, float]:
-    """Rates (R_x, R_y, R_z) in the tilt frame that give d(2ax)/dt = e_x, d(2ay)/dt = e_y.
+    """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
 
-    Equations 21 to 24; R_z keeps the heading still. `cosine` is cos(tilt), or its floor where the
-    caller has to keep the inverse bounded. Rates in rad/s.
+    Equations 21 to 24, their common term (y·e_x − x·e_y) taken out, then 28. `inverse` is 1/a²;
+    `steepness` is 1/cos(tilt), or its bound where the caller has to keep the rates bounded.
     """
-    r_x = ((1.0 - 2.0 * y * y) * e_x + 2.0 * x * y * e_y) / cosine
-    r_y = ((1.0 - 2.0 * x * x) * e_y + 2.0 * x * y * e_x) / cosine
-    return r_x, r_y, (y * r_x - x * r_y) / a
+    across = 2.0 * inverse * (ay * e_x - ax * e_y)
+    r_x = steepness * (e_x - ay * across)
+    r_y = steepness * (e_y + ax * across)
+    cosine = (w * w - z * z) * inverse
+    sine = 2.0 * w * z * inverse
+    return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x, (ay * r_x - ax * r_y) * inverse
 
 
-def to_body(b: float, z: float, r_x: float, r_y: float) -> tuple[float, float]:
-    """Turn horizontal rates from the tilt frame into the body frame (equation 28)."""
-    cosine = b * b - z * z
-    sine = 2.0 * b * z
-    return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x
+def heading_of(a: float, w: float, z: float) -> float:
+    """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π], equal for q and −q; a² = w² + z².
 
-
-def shortest_arc_axis(w: float, x: float, y: float, z: float) -> tuple[float, float]:
-    """Body axis (horizontal part, unit length) about which the thrust axis comes up soonest.
-
-    It is body z × world down, seen from the body, and needs no division by cos(tilt) or by a, so it
-    holds up to the inverted attitude; there every axis is as short, and roll is taken.
+    By the half angle, so that the arctangent is that of a number between −1 and 1.
     """
-    down_x = 2.0 * (x * z - w * y)
-    down_y = 2.0 * (y * z + w * x)
-    length = sqrt(down_x * down_x + down_y * down_y)
-    if length < 1e-9:
-        return 1.0, 0.0
-    return -down_y / length, down_x / length
+    return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))

@@ -3,9 +3,22 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from companion.attitude.first_order import FirstOrderPlanner
+from companion.attitude.body_error import quaternion, so3
+from companion.attitude.constants import Constants, make_constants
+from companion.attitude.euler import euler
+from companion.attitude.exact import exact
+from companion.attitude.first_order import first_order
 from companion.attitude.limits import Limits
+from companion.attitude.representation import normalised
+from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Quaternion, Target
+
+Law = Callable[
+    [float, float, float, float, float, float, float, float, float, Constants],
+    tuple[float, float, float],
+]
+"""A control law as arithmetic on scalars: (w, x, y, z) of a unit quaternion, (north, east, heading,
+heading_rate) of an admissible target, dt, constants → body rates (roll, pitch, yaw) in rad/s."""
 
 
 class Planner(Protocol):
@@ -18,9 +31,54 @@ class Planner(Protocol):
         ...
 
 
-_PLANNERS: dict[str, Callable[..., Planner]] = {"first-order": FirstOrderPlanner}
+class LawPlanner:
+    """A planner without memory: checks what comes in, and applies one law.
 
-PLANNER_NAMES = tuple(_PLANNERS)
+    Attributes:
+        law: the scalar formula, which a batch compiles (`companion.batch`).
+        constants: what it is computed with.
+    """
+
+    __slots__ = ("_admitted", "_asked", "constants", "law")
+
+    def __init__(self, law: Law, constants: Constants) -> None:
+        self.law = law
+        self.constants = constants
+        self._asked: Target | None = None
+        self._admitted = Target(0.0, 0.0, 0.0)
+
+    def rates(
+        self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
+    ) -> BodyRates:
+        """Body rates in rad/s that answer attitude `q`.
+
+        Raises:
+            InvalidQuaternionError: `q` is not a unit quaternion.
+            InvalidTargetError: a value of `target` is not finite.
+        """
+        if target is not self._asked:  # a target stands for many samples; it cannot change
+            self._admitted = admissible(target, self.constants.longest_target)
+            self._asked = target
+        w, x, y, z = normalised(q)
+        north, east, heading, heading_rate = self._admitted
+        return _rates_of(
+            BodyRates, self.law(w, x, y, z, north, east, heading, heading_rate, dt, self.constants)
+        )
+
+
+_rates_of = tuple.__new__
+"""BodyRates of a plain tuple, without the NamedTuple's own constructor: half its cost."""
+
+
+_LAWS: dict[str, Law] = {
+    "first-order": first_order,
+    "exact": exact,
+    "quaternion": quaternion,
+    "so3": so3,
+    "euler": euler,
+}
+
+PLANNER_NAMES = tuple(_LAWS)
 
 
 def make_planner(
@@ -35,13 +93,14 @@ def make_planner(
     Args:
         name: one of `PLANNER_NAMES`.
         gain: p in 1/s, the inverse of the time constant asked for.
-        yaw_gain: gain of the heading error, 1/s.
+        yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
+            heading too, as the paper does.
         limits: bounds on tilt and rates.
-        options: what the named planner takes beyond these.
+        options: what the named planner takes beyond these: `recovery_angle`, rad.
 
     Raises:
         ValueError: unknown name, or a value out of range.
     """
-    if name not in _PLANNERS:
+    if name not in _LAWS:
         raise ValueError(f"unknown planner {name!r}; known: {', '.join(PLANNER_NAMES)}")
-    return _PLANNERS[name](gain=gain, yaw_gain=yaw_gain, limits=limits, **options)
+    return LawPlanner(_LAWS[name], make_constants(gain, yaw_gain, limits, **options))

@@ -1,9 +1,10 @@
 """Attitude as a user sees it: coefficients and heading, and the way back to a quaternion."""
 
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, pi, sqrt
 
 from companion.attitude.errors import InvalidQuaternionError
 from companion.attitude.kinematics import split
+from companion.attitude.rotation import attitude_of
 from companion.attitude.types import Coefficients, Quaternion, TiltYaw
 
 NORM_TOLERANCE = 1e-3
@@ -26,7 +27,7 @@ def normalised(q: Quaternion) -> Quaternion:
         InvalidQuaternionError: the norm is off by more than 1e-3, or a component is not finite.
     """
     w, x, y, z = q
-    norm = _norm(q)
+    norm = sqrt(w * w + x * x + y * y + z * z)
     if not abs(norm - 1.0) <= NORM_TOLERANCE:  # written so that NaN is refused too
         raise InvalidQuaternionError(
             f"attitude quaternion {q} has norm {norm:.6g}; expected 1 within {NORM_TOLERANCE:g}"
@@ -78,12 +79,6 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
         ValueError: the coefficients are longer than 1 or not finite, so no attitude has them.
     """
     north, east = coefficients
-    square = north * north + east * east
-    if not square <= 1.0:
+    if not north * north + east * east <= 1.0:
         raise ValueError(f"no attitude has acceleration coefficients {coefficients}: longer than 1")
-    a = sqrt((1.0 + sqrt(1.0 - square)) / 2.0)
-    x = east / (2.0 * a)
-    y = -north / (2.0 * a)
-    b = cos(heading / 2.0)
-    z = sin(heading / 2.0)
-    return a * b, x * b + y * z, y * b - x * z, a * z
+    return attitude_of(north, east, heading)

@@ -1,0 +1,36 @@
+"""`euler`: the paper's section 4.2 on roll, pitch and yaw of the sequence Z-Y-X."""
+
+from math import cos, sin
+
+from companion.attitude.constants import Constants
+from companion.attitude.rotation import attitude_of, euler_angles, short_way, within_limits
+
+
+def euler(
+    w: float,
+    x: float,
+    y: float,
+    z: float,
+    north: float,
+    east: float,
+    heading: float,
+    heading_rate: float,
+    dt: float,
+    constants: Constants,
+) -> tuple[float, float, float]:
+    """Body rates p·M(φ, θ)·(wrapped error of the angles); the response depends on the heading."""
+    gain, _, max_tilt_rate, max_yaw_rate, *_ = constants
+    goal = attitude_of(north, east, heading)
+    roll, pitch, yaw = euler_angles(w, x, y, z)
+    roll_d, pitch_d, yaw_d = euler_angles(*goal)
+    e_roll = gain * short_way(roll_d - roll)
+    e_pitch = gain * short_way(pitch_d - pitch)
+    e_yaw = gain * short_way(yaw_d - yaw)
+    turning = e_yaw * cos(pitch)
+    return within_limits(
+        e_roll - e_yaw * sin(pitch),
+        e_pitch * cos(roll) + turning * sin(roll),
+        turning * cos(roll) - e_pitch * sin(roll) + heading_rate,
+        max_tilt_rate,
+        max_yaw_rate,
+    )

@@ -1,0 +1,102 @@
+"""The linear models that the coefficients should follow, exact at any sample rate.
+
+Each is the closed solution over one sample with the target held, so that it has no discretisation
+of its own: what differs from it is the response's fault alone.
+"""
+
+from dataclasses import dataclass
+from math import cos, cosh, exp, inf, sin, sinh, sqrt
+
+from companion.attitude.types import Coefficients
+
+
+def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> float:
+    """What is left of a distance to the target after `dt` seconds, first order with a top speed.
+
+    d' = −min(gain·d, max_speed): at the top speed (equation 33) until gain·d falls below it, from
+    there on exponentially.
+    """
+    beyond = gain * distance - max_speed
+    if beyond > 0.0:
+        full_speed = beyond / (gain * max_speed)  # s
+        if full_speed >= dt:
+            return distance - max_speed * dt
+        return max_speed / gain * exp(-gain * (dt - full_speed))
+    return distance * exp(-gain * dt)
+
+
+@dataclass(frozen=True, slots=True)
+class FirstOrderReference:
+    """ċ = p·(c_d − c), its length at most `max_speed`.
+
+    Attributes:
+        gain: p, 1/s.
+        max_speed: 1/s; W_M·cos(max_tilt) is the paper's (equation 33).
+    """
+
+    gain: float
+    max_speed: float = inf
+
+    def after(self, c: Coefficients, target: Coefficients, dt: float) -> Coefficients:
+        """The coefficients `dt` seconds later, on the straight line from `c` to `target`."""
+        north, east = target.north - c.north, target.east - c.east
+        distance = sqrt(north * north + east * east)
+        if distance == 0.0:
+            return target
+        left = distance_left(distance, self.gain, self.max_speed, dt) / distance
+        return Coefficients(target.north - left * north, target.east - left * east)
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrderReference:
+    """c̈ = ω²·(c_d − c) − 2ζω·ċ.
+
+    Attributes:
+        frequency: ω, rad/s.
+        damping: ζ; 1 is critical.
+    """
+
+    frequency: float
+    damping: float = 1.0
+
+    @classmethod
+    def with_lag(cls, gain: float, lag: float) -> "SecondOrderReference":
+        """First order with gain p (1/s) behind a lag τ (s): c̈ = (p·(c_d − c) − ċ)/τ."""
+        return cls(sqrt(gain / lag), 0.5 / sqrt(gain * lag))
+
+    def after(
+        self, c: Coefficients, speed: Coefficients, target: Coefficients, dt: float
+    ) -> tuple[Coefficients, Coefficients]:
+        """Coefficients and their speed (1/s) `dt` seconds later."""
+        still, moved, slope, kept = self._transition(dt)
+        north, east = c.north - target.north, c.east - target.east
+        return (
+            Coefficients(
+                target.north + still * north + moved * speed.north,
+                target.east + still * east + moved * speed.east,
+            ),
+            Coefficients(
+                slope * north + kept * speed.north,
+                slope * east + kept * speed.east,
+            ),
+        )
+
+    def _transition(self, dt: float) -> tuple[float, float, float, float]:
+        """The matrix exponential over `dt`: (c, ċ) from (c − c_d, ċ), row by row."""
+        decay = self.damping * self.frequency
+        square = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
+        if square > 0.0:
+            root = sqrt(square)
+            even, odd = cos(root * dt), sin(root * dt) / root
+        elif square < 0.0:
+            root = sqrt(-square)
+            even, odd = cosh(root * dt), sinh(root * dt) / root
+        else:
+            even, odd = 1.0, dt
+        fading = exp(-decay * dt)
+        return (
+            fading * (even + decay * odd),
+            fading * odd,
+            -fading * self.frequency * self.frequency * odd,
+            fading * (even - decay * odd),
+        )

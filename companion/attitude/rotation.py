@@ -1,0 +1,112 @@
+"""Rotations on plain floats: products, logarithm, Euler angles, and a body rate held for a while.
+
+Like `kinematics`, every formula is arithmetic on scalars, so that a flight calls it as it stands
+and a batch compiles it unchanged.
+"""
+
+from math import asin, atan2, cos, pi, sin, sqrt
+
+TWO_PI = 2.0 * pi
+
+_SMALL = 1e-12
+"""Below this half angle (rad) sin(h)/h is 1 to double precision."""
+
+
+def attitude_of(north: float, east: float, heading: float) -> tuple[float, float, float, float]:
+    """The upright attitude with these acceleration coefficients (at most 1 long) and heading."""
+    a = sqrt((1.0 + sqrt(1.0 - north * north - east * east)) / 2.0)
+    x = east / (2.0 * a)
+    y = -north / (2.0 * a)
+    b = cos(heading / 2.0)
+    z = sin(heading / 2.0)
+    return a * b, x * b + y * z, y * b - x * z, a * z
+
+
+def body_error(
+    w: float, x: float, y: float, z: float, w_d: float, x_d: float, y_d: float, z_d: float
+) -> tuple[float, float, float, float]:
+    """q⁻¹ ⊗ q_d, the rotation still to be made as the body sees it, the short way (w ≥ 0)."""
+    w_e = w * w_d + x * x_d + y * y_d + z * z_d
+    sign = 1.0 if w_e >= 0.0 else -1.0
+    return (
+        sign * w_e,
+        sign * (w * x_d - x * w_d - y * z_d + z * y_d),
+        sign * (w * y_d - y * w_d - z * x_d + x * z_d),
+        sign * (w * z_d - z * w_d - x * y_d + y * x_d),
+    )
+
+
+def angle_per_sine(w: float, sine: float) -> float:
+    """θ/sin(θ/2) of a rotation with scalar part w ≥ 0 and vector part of length `sine`.
+
+    It turns the vector part of a unit quaternion into the rotation vector: Log(q) = θ/sin(θ/2)·v.
+    """
+    if sine < _SMALL:
+        return 2.0
+    return 2.0 * atan2(sine, w) / sine
+
+
+def cos_and_sinc(square: float) -> tuple[float, float]:
+    """cos(h) and sin(h)/h of an angle h in rad, given as h²."""
+    h = sqrt(square)
+    return cos(h), sin(h) / h if h > _SMALL else 1.0
+
+
+def turned(
+    w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float, dt: float
+) -> tuple[float, float, float, float]:
+    """The attitude after the body rates (rad/s) were held for `dt` seconds: q ⊗ exp(ω·dt/2)."""
+    i = 0.5 * dt * roll
+    j = 0.5 * dt * pitch
+    k = 0.5 * dt * yaw
+    c, s = cos_and_sinc(i * i + j * j + k * k)
+    i *= s
+    j *= s
+    k *= s
+    return (
+        w * c - x * i - y * j - z * k,
+        x * c + w * i + y * k - z * j,
+        y * c + w * j + z * i - x * k,
+        z * c + w * k + x * j - y * i,
+    )
+
+
+def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Roll, pitch, yaw in rad of the sequence Z-Y-X, as autopilots report them."""
+    sine = 2.0 * (w * y - z * x)
+    sine = 1.0 if sine > 1.0 else -1.0 if sine < -1.0 else sine
+    return (
+        atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        asin(sine),
+        atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def within(value: float, bound: float) -> float:
+    """`value`, or the nearer of ±`bound` (not negative) where it lies beyond."""
+    if value > bound:
+        return bound
+    if value < -bound:
+        return -bound
+    return value
+
+
+def within_limits(
+    roll: float, pitch: float, yaw: float, max_tilt_rate: float, max_yaw_rate: float
+) -> tuple[float, float, float]:
+    """Body rates with roll and pitch scaled together to the one limit, yaw clipped to the other."""
+    rate = sqrt(roll * roll + pitch * pitch)
+    if rate > max_tilt_rate:
+        scale = max_tilt_rate / rate
+        roll *= scale
+        pitch *= scale
+    return roll, pitch, within(yaw, max_yaw_rate)
+
+
+def short_way(angle: float) -> float:
+    """An angle between −2π and 2π, such as a difference of two headings, brought to (−π, π]."""
+    if angle > pi:
+        return angle - TWO_PI
+    if angle <= -pi:
+        return angle + TWO_PI
+    return angle
