@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from typing import Any, get_args
 
@@ -18,7 +19,7 @@ from rich.console import Console
 
 from companion import demo
 from companion.config import Config, FlightConfig
-from companion.config_file import ConfigError, changed, json_schema, load
+from companion.config_file import changed, json_schema, load
 from companion.extras import MissingExtraError
 from companion.flight.assembly import link_settings
 from companion.flight.session import Session
@@ -29,7 +30,10 @@ from companion.mavlink.errors import EndpointError, LinkError, SigningError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
+from companion.study import needs
+from companion.study.names import STUDY_NAMES
 from companion.terminal import FlightConsole, TerminalObserver
+from companion.yaml_file import ConfigError
 
 _PACKAGE = "mavlink-companion"
 
@@ -107,6 +111,22 @@ def _parser() -> argparse.ArgumentParser:
     link.add_argument("--rate", type=float, default=250.0, help="samples a second (250)")
     link.add_argument("--json", action="store_true", help="print the figures as one JSON line")
     link.set_defaults(run=_bench_link)
+    step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
+    step.add_argument("--seconds", type=_seconds, default=5.0, help="of measuring (5)")
+    step.add_argument("--json", action="store_true", help="print the figures as one JSON line")
+    step.set_defaults(run=_bench_planner)
+
+    study = commands.add_parser(
+        "study", help="the paper's experiments, as figures, tables and a page (extra `study`)"
+    )
+    study.add_argument("name", choices=STUDY_NAMES, metavar="NAME", help=", ".join(STUDY_NAMES))
+    study.add_argument(
+        "--case", type=Path, metavar="FILE", help="for custom: such as configs/study-case.yaml"
+    )
+    study.add_argument(
+        "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
+    )
+    study.set_defaults(run=_study)
 
     plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
@@ -129,6 +149,13 @@ def _programmes(text: str) -> tuple[str, ...]:
             f"unknown programme {unknown[0]!r}; known: {', '.join(_PROGRAMMES)}"
         )
     return names
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < inf:
+        raise argparse.ArgumentTypeError("must be above 0 and finite")
+    return seconds
 
 
 def _fly(options: argparse.Namespace) -> int:
@@ -229,6 +256,25 @@ def _bench_link(options: argparse.Namespace) -> int:
     figures = link.run(options.seconds, options.rate, options.json)
     if options.json:
         print(json.dumps(figures))
+    return EXIT_OK
+
+
+def _bench_planner(options: argparse.Namespace) -> int:
+    from companion.bench import planner  # noqa: PLC0415  no other command needs it
+
+    figures = planner.run(options.seconds, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
+def _study(options: argparse.Namespace) -> int:
+    needs.check()
+    from companion.study import runner  # noqa: PLC0415  needs the extra
+
+    console = Console()
+    page = runner.run(options.name, options.case, options.out, console)
+    console.print(f"Open {page}", soft_wrap=True, highlight=False)
     return EXIT_OK
 
 

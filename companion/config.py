@@ -70,12 +70,14 @@ class LinkConfig(Section):
 class PlannerConfig(Section):
     """The attitude law."""
 
-    name: str = PLANNER_NAMES[0]
-    """Which planner: first-order is Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727)."""
+    name: Annotated[str, Field(json_schema_extra={"enum": list(PLANNER_NAMES)})] = "first-order"
+    """first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
+    error of discretisation. quaternion, so3, euler: what they compare it with."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
     """p: acceleration approaches its target with the time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
-    """Heading approaches its target with the time constant 1/yaw_gain."""
+    """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
+    use gain_per_s for it."""
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
@@ -96,7 +98,7 @@ class LimitsConfig(Section):
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
-    """Beyond this tilt the thrust axis is first brought up along the shortest arc."""
+    """Beyond this tilt first-order and exact first bring the thrust axis up, the shortest way."""
     min_thrust: Share = 0.1
     """Smallest normalised thrust sent in flight."""
     max_thrust: Share = 0.9

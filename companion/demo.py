@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from companion.config_file import ConfigError
+from companion.yaml_file import ConfigError
 
 _LOCAL_PORT_OFFSET = 40
 """The vehicle sends from this many ports above the one it sends to."""

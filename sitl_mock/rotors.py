@@ -92,6 +92,12 @@ class Rotors:
             return self._slope * throttle + self._offset
         return self._low * throttle
 
+    def throttle(self, thrust: float) -> float:
+        """Inverse of `steady`: the throttle for a thrust (N) of one rotor, at most 1."""
+        if thrust >= self.steady(self._linear):
+            return min((thrust - self._offset) / self._slope, 1.0)
+        return thrust / self._low
+
     def step(self, throttles: Four, sag: float) -> Four:
         """One step towards the throttles.
 

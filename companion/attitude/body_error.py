@@ -23,12 +23,16 @@ def quaternion(
     constants: Constants,
 ) -> tuple[float, float, float]:
     """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), the short way round."""
-    gain, _, max_tilt_rate, max_yaw_rate, *_ = constants
+    gain = constants.gain
     goal = attitude_of(north, east, heading)
     _, e_x, e_y, e_z = body_error(w, x, y, z, *goal)
     scale = 2.0 * gain
     return within_limits(
-        scale * e_x, scale * e_y, scale * e_z + heading_rate, max_tilt_rate, max_yaw_rate
+        scale * e_x,
+        scale * e_y,
+        scale * e_z + heading_rate,
+        constants.max_tilt_rate,
+        constants.max_yaw_rate,
     )
 
 
@@ -45,10 +49,14 @@ def so3(
     constants: Constants,
 ) -> tuple[float, float, float]:
     """Body rates ω = p·Log(q⁻¹ ⊗ q_d)."""
-    gain, _, max_tilt_rate, max_yaw_rate, *_ = constants
+    gain = constants.gain
     goal = attitude_of(north, east, heading)
     e_w, e_x, e_y, e_z = body_error(w, x, y, z, *goal)
     scale = gain * angle_per_sine(e_w, sqrt(e_x * e_x + e_y * e_y + e_z * e_z))
     return within_limits(
-        scale * e_x, scale * e_y, scale * e_z + heading_rate, max_tilt_rate, max_yaw_rate
+        scale * e_x,
+        scale * e_y,
+        scale * e_z + heading_rate,
+        constants.max_tilt_rate,
+        constants.max_yaw_rate,
     )

@@ -19,7 +19,7 @@ def euler(
     constants: Constants,
 ) -> tuple[float, float, float]:
     """Body rates p·M(φ, θ)·(wrapped error of the angles); the response depends on the heading."""
-    gain, _, max_tilt_rate, max_yaw_rate, *_ = constants
+    gain = constants.gain
     goal = attitude_of(north, east, heading)
     roll, pitch, yaw = euler_angles(w, x, y, z)
     roll_d, pitch_d, yaw_d = euler_angles(*goal)
@@ -31,6 +31,6 @@ def euler(
         e_roll - e_yaw * sin(pitch),
         e_pitch * cos(roll) + turning * sin(roll),
         turning * cos(roll) - e_pitch * sin(roll) + heading_rate,
-        max_tilt_rate,
-        max_yaw_rate,
+        constants.max_tilt_rate,
+        constants.max_yaw_rate,
     )

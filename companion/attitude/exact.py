@@ -98,7 +98,8 @@ def _rotation(
             r_w, r_x, r_y, r_z = -r_w, -r_x, -r_y, -r_z
         before = f
         f = angle_per_sine(r_w, sqrt(r_x * r_x + r_y * r_y + r_z * r_z))
-        if abs(f - before) < _SETTLED or (reached == part and max_yaw_angle == inf):
+        free = reached == part and max_yaw_angle == inf
+        if abs(f - before) < _SETTLED or (free and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle):
             break
     return f * r_x, f * r_y, f * r_z
 

@@ -4,6 +4,8 @@ The inverse of the kinematics grows as 1/cos(tilt), so from the recovery angle o
 is faded, over 10°, into a plain rotation towards level.
 """
 
+from companion.attitude.rotation import first_is_negative
+
 SMALLEST_A = 1e-12
 """a = cos(tilt/2) below this counts as this: exactly inverted."""
 
@@ -22,9 +24,10 @@ def levelling_rates(
     """Body rates (roll, pitch) of 2·gain·sin(tilt/2), rad/s, about the axis of the tilt itself.
 
     `inverse` is 1/a². They need no division by cos(tilt), so they hold up to the inverted
-    attitude, where every axis is as short as any other.
+    attitude, where every axis is as short as any other; the same is taken for q and −q.
     """
     if a <= SMALLEST_A:
-        return -2.0 * gain * x, -2.0 * gain * y
+        scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain
+        return scale * x, scale * y
     scale = -2.0 * gain * a * inverse
     return scale * (w * x + z * y), scale * (w * y - z * x)

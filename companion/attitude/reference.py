@@ -5,7 +5,7 @@ of its own: what differs from it is the response's fault alone.
 """
 
 from dataclasses import dataclass
-from math import cos, cosh, exp, inf, sin, sinh, sqrt
+from math import cos, exp, expm1, inf, sin, sqrt
 
 from companion.attitude.types import Coefficients
 
@@ -86,17 +86,19 @@ class SecondOrderReference:
         decay = self.damping * self.frequency
         square = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
         if square > 0.0:
-            root = sqrt(square)
-            even, odd = cos(root * dt), sin(root * dt) / root
+            root, fading = sqrt(square), exp(-decay * dt)
+            even, odd = fading * cos(root * dt), fading * sin(root * dt) / root
         elif square < 0.0:
             root = sqrt(-square)
-            even, odd = cosh(root * dt), sinh(root * dt) / root
+            slow = exp((root - decay) * dt)  # the slower of the two: nothing here overflows
+            even = 0.5 * slow * (1.0 + exp(-2.0 * root * dt))
+            odd = -0.5 * slow * expm1(-2.0 * root * dt) / root
         else:
-            even, odd = 1.0, dt
-        fading = exp(-decay * dt)
+            even = exp(-decay * dt)
+            odd = even * dt
         return (
-            fading * (even + decay * odd),
-            fading * odd,
-            -fading * self.frequency * self.frequency * odd,
-            fading * (even - decay * odd),
+            even + decay * odd,
+            odd,
+            -self.frequency * self.frequency * odd,
+            even - decay * odd,
         )

@@ -25,15 +25,22 @@ def attitude_of(north: float, east: float, heading: float) -> tuple[float, float
 def body_error(
     w: float, x: float, y: float, z: float, w_d: float, x_d: float, y_d: float, z_d: float
 ) -> tuple[float, float, float, float]:
-    """q⁻¹ ⊗ q_d, the rotation still to be made as the body sees it, the short way (w ≥ 0)."""
+    """q⁻¹ ⊗ q_d, the rotation still to be made as the body sees it, the short way (w ≥ 0).
+
+    Both ways of an exact half turn are as short; the same is taken for q and −q.
+    """
     w_e = w * w_d + x * x_d + y * y_d + z * z_d
-    sign = 1.0 if w_e >= 0.0 else -1.0
-    return (
-        sign * w_e,
-        sign * (w * x_d - x * w_d - y * z_d + z * y_d),
-        sign * (w * y_d - y * w_d - z * x_d + x * z_d),
-        sign * (w * z_d - z * w_d - x * y_d + y * x_d),
-    )
+    x_e = w * x_d - x * w_d - y * z_d + z * y_d
+    y_e = w * y_d - y * w_d - z * x_d + x * z_d
+    z_e = w * z_d - z * w_d - x * y_d + y * x_d
+    if w_e < 0.0 or (w_e == 0.0 and first_is_negative(x_e, y_e, z_e)):
+        return -w_e, -x_e, -y_e, -z_e
+    return w_e, x_e, y_e, z_e
+
+
+def first_is_negative(x: float, y: float, z: float) -> bool:
+    """Whether the first component that is not zero is below it: true of v or of −v, not both."""
+    return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 
 
 def angle_per_sine(w: float, sine: float) -> float:
@@ -63,12 +70,15 @@ def turned(
     i *= s
     j *= s
     k *= s
-    return (
+    w, x, y, z = (
         w * c - x * i - y * j - z * k,
         x * c + w * i + y * k - z * j,
         y * c + w * j + z * i - x * k,
         z * c + w * k + x * j - y * i,
     )
+    # One Newton step of 1/√: rounding moves the norm always the same way, by 1e-12 in 2000 steps.
+    scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
+    return w * scale, x * scale, y * scale, z * scale
 
 
 def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:

@@ -1,10 +1,11 @@
-"""An independent judge of the planners: SciPy rotations driven by body rates, no shared maths."""
+"""Ideal kinematics for the planners: SciPy rotations driven by their body rates."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import Coefficients, Quaternion, Target
 from companion.attitude.planner import Planner
+from tests.attitude.independent import attitudes, coefficients_of, sampled
 
 
 def rotation(q: Quaternion) -> Rotation:
@@ -16,27 +17,32 @@ def quaternion(r: Rotation) -> Quaternion:
     return (float(w), float(x), float(y), float(z))
 
 
-def coefficients_of(r: Rotation) -> np.ndarray:
-    """Horizontal part of the thrust direction (−body z seen from the world)."""
-    return -r.as_matrix()[:2, 2]
-
-
 def tilt_of(r: Rotation) -> float:
     return float(np.arccos(np.clip(r.as_matrix()[2, 2], -1.0, 1.0)))
 
 
 def upright(c: Coefficients, heading: float) -> Rotation:
-    """The attitude with these coefficients and tilt-yaw heading, built from a rotation vector."""
-    sine = float(np.hypot(*c))
-    axis = np.array([c.east, -c.north, 0.0]) / sine if sine > 0 else np.zeros(3)
-    tilt = Rotation.from_rotvec(np.arcsin(sine) * axis)
-    return tilt * Rotation.from_rotvec([0.0, 0.0, heading])
+    """The attitude with these coefficients and tilt-yaw heading."""
+    return attitudes(c, heading)[0]
+
+
+def answers(planner: Planner, r: Rotation, targets: list[Target], dt: float) -> np.ndarray:
+    """The planner's rates (N, 3) for a stack of N attitudes, each with its own target."""
+    q = np.roll(r.as_quat(), 1, axis=1).tolist()
+    return np.array([planner.rates(q_i, t, dt) for q_i, t in zip(q, targets, strict=True)])
+
+
+def fly_all(
+    planner: Planner, start: Rotation, targets: list[Target], seconds: float, dt: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """N flights, rates held over each sample: coefficients (S + 1, N, 2), rates (S, N, 3)."""
+    return sampled(lambda r: answers(planner, r, targets, dt), start, seconds, dt)
 
 
 def fly(
     planner: Planner, start: Rotation, target: Target, seconds: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray, Rotation]:
-    """Ideal kinematics, rates held over each sample: (coefficients, rates, last attitude)."""
+    """One flight: (coefficients, rates, last attitude)."""
     r = start
     path, rates = [coefficients_of(r)], []
     for _ in range(round(seconds / dt)):

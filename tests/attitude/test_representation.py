@@ -17,7 +17,8 @@ from companion.attitude import (
     heading,
     wrap_angle,
 )
-from tests.attitude.simulate import coefficients_of, quaternion, rotation, upright
+from tests.attitude.independent import coefficients_of
+from tests.attitude.simulate import quaternion, rotation, upright
 
 angles = st.floats(-math.pi, math.pi)
 unit_quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(
@@ -45,6 +46,11 @@ def test_coefficients_are_the_horizontal_thrust_direction_whatever_the_sign(v):
     q = unit(v)
     assert coefficients(q) == pytest.approx(coefficients_of(rotation(q)), abs=1e-12)
     assert coefficients(tuple(-c for c in q)) == coefficients(q)
+
+
+def test_coefficients_agree_with_the_rotation_upside_down():
+    c = coefficients((0.0, 1.0, 0.0, 0.0))
+    assert c == pytest.approx(coefficients_of(rotation((0.0, 1.0, 0.0, 0.0))), abs=1e-12)
 
 
 @given(unit_quaternions)

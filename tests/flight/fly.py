@@ -11,11 +11,12 @@ from pathlib import Path
 
 import yaml
 
-from companion.config_file import parse
+from companion.config import Config
 from companion.demo import free_port
 from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
+from companion.yaml_file import parse
 
 QUICK_MOCK = {
     "gcs_port": 0,
@@ -96,7 +97,9 @@ def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
         )
     )
     folder.mkdir(exist_ok=True)
-    return Session(parse(text, "test"), folder, observer or Silent(), ask_landing or decline)
+    return Session(
+        parse(text, "test", Config), folder, observer or Silent(), ask_landing or decline
+    )
 
 
 async def decline():

@@ -84,6 +84,12 @@ def test_thrust_below_the_line_falls_to_zero_without_a_jump():
     assert rotors.steady(0.0) == 0.0
 
 
+@pytest.mark.parametrize("throttle", [0.0, 0.1, 0.15, 0.49, 1.0])
+def test_the_throttle_for_a_thrust_settles_at_that_thrust(throttle):
+    rotors = Rotors(AIRFRAME, 1e-3)
+    assert rotors.throttle(rotors.steady(throttle)) == pytest.approx(throttle, abs=1e-12)
+
+
 def test_lag_is_first_order_whatever_the_step():
     for dt in (1e-3, 1e-4):
         rotors = Rotors(AIRFRAME, dt)

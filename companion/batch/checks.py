@@ -1,0 +1,92 @@
+"""Arrays made fit for a law, as a planner makes one sample fit; the rules are the planner's own."""
+
+from functools import cache
+from math import inf, pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from companion.attitude.errors import InvalidQuaternionError, InvalidTargetError
+from companion.attitude.representation import NORM_TOLERANCE, normalised
+from companion.attitude.target import admissible
+from companion.attitude.types import Target
+from companion.batch.compiler import Compiler
+from companion.batch.loops import Array
+
+_AS_GOOD_AS_ONE = 1e-14
+"""A squared norm this close to 1 need not be divided by: nothing that matters would change."""
+
+
+def as_rows(values: ArrayLike, name: str) -> Array:
+    """`values` as a C-contiguous float array (4, n).
+
+    Raises:
+        ValueError: the shape is another; `name` is how the message calls it.
+    """
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] != 4:
+        raise ValueError(f"{name} must have the shape (4, n), not {array.shape}")
+    return array
+
+
+@cache
+def compiled_look() -> Any:
+    """`all_fit`, compiled: the checks below, in numpy, would take as long as a compiled law."""
+    return Compiler({}).loop(all_fit)
+
+
+def all_fit(q: Array, targets: Array, longest: float) -> bool:
+    """Whether every vehicle may go to the law as it is, (4, n) and (4, n).
+
+    Conditions are joined by `&` and counted, so that nothing branches and the loop is vectorised.
+    """
+    unfit = 0
+    for i in range(q.shape[1]):
+        norm_square = q[0, i] * q[0, i] + q[1, i] * q[1, i] + q[2, i] * q[2, i] + q[3, i] * q[3, i]
+        length_square = targets[0, i] * targets[0, i] + targets[1, i] * targets[1, i]
+        fit = (
+            (abs(norm_square - 1.0) <= _AS_GOOD_AS_ONE)
+            & (length_square <= longest * longest)
+            & (abs(targets[2, i]) < pi)
+            & (abs(targets[3, i]) < inf)
+        )
+        unfit += 0 if fit else 1
+    return unfit == 0
+
+
+def unit_quaternions(q: Array) -> Array:
+    """`q` (4, n) with unit norm.
+
+    Raises:
+        InvalidQuaternionError: a norm is off by more than 1e-3, or a component is not finite.
+    """
+    norm: Array = np.sqrt(np.einsum("ij,ij->j", q, q))
+    for i in np.flatnonzero(~(np.abs(norm - 1.0) <= NORM_TOLERANCE)):
+        w, x, y, z = q[:, i].tolist()
+        try:
+            normalised((w, x, y, z))
+        except InvalidQuaternionError as error:
+            raise InvalidQuaternionError(f"vehicle {i}: {error}") from None
+    return q / norm
+
+
+def admissible_targets(targets: Array, longest: float) -> Array:
+    """`targets` (4, n), each as `admissible` makes it.
+
+    What is asked within the limits is passed in bulk; what is not is treated one by one.
+
+    Raises:
+        InvalidTargetError: a value is not finite.
+    """
+    north, east, heading, heading_rate = targets
+    with np.errstate(over="ignore", invalid="ignore"):  # then it is not fit, and refused by name
+        fit = north * north + east * east <= longest * longest
+    fit &= (heading > -pi) & (heading <= pi) & np.isfinite(heading_rate)
+    admitted = targets.copy()
+    for i in np.flatnonzero(~fit):
+        try:
+            admitted[:, i] = admissible(Target(*targets[:, i].tolist()), longest)
+        except InvalidTargetError as error:
+            raise InvalidTargetError(f"vehicle {i}: {error}") from None
+    return admitted

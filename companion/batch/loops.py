@@ -1,0 +1,119 @@
+"""The loops over vehicles and samples around a law: as Python, or compiled.
+
+Compiled, the inner loops are vectorised. For that they run over whole C-contiguous arrays, from 0
+to the end, and write to other arrays than they read; and law and turn are two loops, since one
+loop with both needs more registers than there are.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.attitude import rotation
+from companion.attitude.constants import Constants
+from companion.attitude.planner import Law
+from companion.batch import series
+from companion.batch.compiler import Compiler, Substitutes
+
+Array = NDArray[np.float64]
+
+_ARCTANGENT: Substitutes = {math.atan: series.arctangent}
+_ALL_SERIES: Substitutes = {**_ARCTANGENT, rotation.cos_and_sinc: series.cos_and_sinc}
+
+_Apply = Callable[[Array, Array, Array, float, Constants], None]
+_Turn = Callable[[Array, Array, Array, float], None]
+
+
+class Loops(NamedTuple):
+    """One law over many vehicles."""
+
+    apply: _Apply
+    """(q, targets, rates, dt, constants): fills rates (3, n)."""
+    advance: Callable[[Array, Array, Array, Array, float, Constants, int], None]
+    """(q, spare, targets, rates, dt, constants, steps): q and spare (4, n) hold the attitudes by
+    turns, q the even steps."""
+    record: Callable[[Array, Array, Array, float, Constants], None]
+    """(q, targets, rates, dt, constants): fills q (steps + 1, 4, n) from q[0] on, and rates
+    (steps, 3, n)."""
+    any_angle: bool
+    """Whether turns of more than 1 rad a sample are right, too."""
+
+
+@cache
+def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
+    """`law` compiled; unless `any_angle`, only for turns up to 1 rad a sample, which is quicker."""
+    compiler = Compiler(_ARCTANGENT if any_angle else _ALL_SERIES)
+    one_law, turned = compiler.function(law), compiler.function(rotation.turned)
+
+    def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
+        for i in range(q.shape[1]):
+            rates[0, i], rates[1, i], rates[2, i] = one_law(
+                q[0, i],
+                q[1, i],
+                q[2, i],
+                q[3, i],
+                targets[0, i],
+                targets[1, i],
+                targets[2, i],
+                targets[3, i],
+                dt,
+                constants,
+            )
+
+    def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
+        for i in range(q.shape[1]):
+            after[0, i], after[1, i], after[2, i], after[3, i] = turned(
+                q[0, i], q[1, i], q[2, i], q[3, i], rates[0, i], rates[1, i], rates[2, i], dt
+            )
+
+    return _over_samples(compiler.loop(apply), compiler.loop(turn), compiler.loop, any_angle)
+
+
+@cache
+def plain_loops(law: Law) -> Loops:
+    """`law` called for one vehicle after the other, on floats as a flight does."""
+    one_law: Any = law
+    turned: Any = rotation.turned
+
+    def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
+        vehicles = zip(*q.tolist(), *targets.tolist(), strict=True)
+        rates[...] = np.transpose([one_law(*vehicle, dt, constants) for vehicle in vehicles])
+
+    def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
+        vehicles = zip(*q.tolist(), *rates.tolist(), strict=True)
+        after[...] = np.transpose([turned(*vehicle, dt) for vehicle in vehicles])
+
+    return _over_samples(apply, turn, lambda loop: loop, any_angle=True)
+
+
+def _over_samples(apply: _Apply, turn: _Turn, made: Callable[[Any], Any], any_angle: bool) -> Loops:
+    """The loops over samples around those over vehicles, as `made` makes them."""
+
+    def advance(
+        q: Array,
+        spare: Array,
+        targets: Array,
+        rates: Array,
+        dt: float,
+        constants: Constants,
+        steps: int,
+    ) -> None:
+        for _ in range(steps // 2):
+            apply(q, targets, rates, dt, constants)
+            turn(q, rates, spare, dt)
+            apply(spare, targets, rates, dt, constants)
+            turn(spare, rates, q, dt)
+        if steps % 2:
+            apply(q, targets, rates, dt, constants)
+            turn(q, rates, spare, dt)
+
+    def record(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
+        for k in range(rates.shape[0]):
+            apply(q[k], targets, rates[k], dt, constants)
+            turn(q[k], rates[k], q[k + 1], dt)
+
+    return Loops(apply, made(advance), made(record), any_angle)

@@ -1,0 +1,201 @@
+"""`companion bench planner`: what one step of a planner costs, in a flight and in a batch.
+
+Times are the best of many short repeats, garbage collection off: what the machine can do while
+nothing disturbs it. The baselines, a bare Python call and a copy of the same arrays, are measured
+in between, so that they meet the same state of the machine.
+"""
+
+from collections.abc import Callable
+from time import perf_counter
+from timeit import Timer
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from companion import batch
+from companion.attitude import PLANNER_NAMES, Limits, Target, make_planner
+from companion.attitude.planner import LawPlanner
+
+BATCHES = (1, 1_000, 10_000)
+VEHICLES = 1_000
+RATE_HZ = 1_000.0
+
+_LIMITS = Limits(max_tilt=0.6, max_tilt_rate=1.5, max_yaw_rate=1.0)
+_REPEAT_S = 2e-3  # short enough to fall between two disturbances
+_STEPS, _STEPS_IN_PYTHON = 4_000, 10  # of `advance` in a repeat
+
+
+class _Case(NamedTuple):
+    """Something to be timed: where its figure goes, and how many steps one run of it makes."""
+
+    group: str
+    key: str
+    timer: Timer
+    steps: int
+
+
+class _Fleet(NamedTuple):
+    q: NDArray[np.float64]
+    targets: NDArray[np.float64]
+
+
+def run(seconds: float, as_json: bool) -> dict[str, Any]:
+    """Measure every planner, interleaved with the baselines.
+
+    Args:
+        seconds: How long is measured, at least one round; compiling comes on top.
+        as_json: Print nothing; the caller prints what is returned.
+
+    Returns:
+        `compiled`: whether numba compiled the batches. `flight_ns`: a step of `planner.rates` on
+        plain floats, by planner, and `baseline`, a Python function that returns its argument.
+        `batch_ns`: a step in `batch.rates`, its checks included, by planner and number of
+        vehicles, and `baseline`, a copy of the same attitudes and targets. `flight_ratio`,
+        `batch_ratio`: the same in baselines. `simulated`: `seconds_per_second` of `vehicles` at
+        `rate_hz` under `first-order`, by `batch.advance`.
+    """
+    compiled = batch.can_compile()
+    cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
+    groups = _best(cases, seconds)
+    flight, batches = groups["flight"], _by_count(groups)
+    step = groups["advance"]["first-order"]
+    figures = {
+        "compiled": compiled,
+        "flight_ns": _rounded(flight),
+        "flight_ratio": _ratios(flight),
+        "batch_ns": {count: _rounded(group) for count, group in batches.items()},
+        "batch_ratio": {count: _ratios(group) for count, group in batches.items()},
+        "simulated": {
+            "vehicles": VEHICLES,
+            "rate_hz": RATE_HZ,
+            "step_ns": round(step, 2),
+            "seconds_per_second": round(1e9 / (step * VEHICLES * RATE_HZ), 3),
+        },
+    }
+    if not as_json:
+        _show(figures)
+    return figures
+
+
+def _flight_cases() -> list[_Case]:
+    vehicle = _fleet(1)
+    known: dict[str, Any] = {
+        "q": tuple(vehicle.q[:, 0].tolist()),
+        "target": Target(*vehicle.targets[:, 0].tolist()),
+    }
+    asked: dict[str, Callable[..., Any]] = {"baseline": _answered}
+    asked |= {name: _planner(name).rates for name in PLANNER_NAMES}
+    return [
+        _Case("flight", key, Timer("f(q, target, 0.004)", globals={**known, "f": function}), 1)
+        for key, function in asked.items()
+    ]
+
+
+def _answered(q: Any, target: Any, dt: float) -> Any:
+    return q
+
+
+def _batch_cases(compiled: bool) -> list[_Case]:
+    cases = []
+    for count in BATCHES:
+        fleet = _fleet(count)
+        known: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
+        copy = Timer("q.copy(), targets.copy()", globals=known)
+        cases.append(_Case(str(count), "baseline", copy, count))
+        for name in PLANNER_NAMES:
+            known = {**known, "rates": batch.rates, "planner": _planner(name)}
+            timer = Timer("rates(planner, q, targets, 0.004, compiled)", globals=known)
+            cases.append(_Case(str(count), name, timer, count))
+    return cases
+
+
+def _advance_case(compiled: bool) -> _Case:
+    q, targets = _fleet(VEHICLES)
+    planner = _planner("first-order")
+    steps = _STEPS if compiled else _STEPS_IN_PYTHON
+    timer = Timer(lambda: batch.advance(planner, q, targets, 1.0 / RATE_HZ, steps, compiled))
+    return _Case("advance", "first-order", timer, VEHICLES * steps)
+
+
+def _planner(name: str) -> LawPlanner:
+    planner = make_planner(name, limits=_LIMITS)
+    assert isinstance(planner, LawPlanner)
+    return planner
+
+
+def _fleet(count: int) -> _Fleet:
+    """Vehicles at every heading, some of them far tilted, and targets within the limits."""
+    random = np.random.default_rng(1)
+    q = random.normal(size=(4, count))
+    q[0] = 1.5 + np.abs(q[0])
+    q /= np.linalg.norm(q, axis=0)
+    return _Fleet(q, random.uniform(-0.39, 0.39, size=(4, count)))
+
+
+def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
+    """The least time in ns of a step, by group and key of the cases."""
+    runs = []
+    for case in cases:
+        case.timer.timeit(1)  # compiles
+        runs.append(max(1, int(_REPEAT_S / case.timer.timeit(1))))
+    best: dict[str, dict[str, float]] = {case.group: {} for case in cases}
+    end = perf_counter() + seconds
+    while True:
+        for case, number in zip(cases, runs, strict=True):
+            ns = 1e9 * case.timer.timeit(number) / (number * case.steps)
+            best[case.group][case.key] = min(ns, best[case.group].get(case.key, ns))
+        if perf_counter() >= end:
+            return best
+
+
+def _by_count(groups: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    return {str(count): groups[str(count)] for count in BATCHES}
+
+
+def _rounded(group: dict[str, float]) -> dict[str, float]:
+    return {key: round(ns, 2) for key, ns in group.items()}
+
+
+def _ratios(group: dict[str, float]) -> dict[str, float]:
+    return {key: round(ns / group["baseline"], 2) for key, ns in group.items() if key != "baseline"}
+
+
+def _show(figures: dict[str, Any]) -> None:
+    means = "compiled by numba" if figures["compiled"] else "in Python"
+    table = Table(
+        title=f"ns a step (× baseline), the best of many; batches {means}",
+        caption="baseline: a bare Python call; for batches, a copy of their attitudes and targets",
+    )
+    table.add_column("")
+    for heading in ("flight", *(f"batch {count:,}" for count in BATCHES)):
+        table.add_column(heading, justify="right", no_wrap=True)
+    columns = [(figures["flight_ns"], figures["flight_ratio"])]
+    columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCHES]
+    for key in ("baseline", *PLANNER_NAMES):
+        table.add_row(key, *(_cell(ns[key], ratio.get(key)) for ns, ratio in columns))
+    simulated = figures["simulated"]
+    console = Console()
+    console.print(table)
+    console.print(
+        f"{simulated['seconds_per_second']:.3g} simulated seconds a second on one core: "
+        f"{VEHICLES:,} vehicles at {RATE_HZ:g} Hz, first-order",
+        highlight=False,
+    )
+    if not figures["compiled"]:
+        console.print(
+            "Batches are far quicker with numba: pip install 'mavlink-companion[study]'",
+            markup=False,
+            highlight=False,
+        )
+
+
+def _cell(ns: float, ratio: float | None) -> str:
+    shown = _short(ns)
+    return shown if ratio is None else f"{shown} ({_short(ratio)}×)"
+
+
+def _short(number: float) -> str:
+    return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"

@@ -1,0 +1,70 @@
+"""What all figures share: their size, their axes, the lines of a method."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from companion.study.methods import REFERENCE, Line, Method
+from companion.study.step import Floats
+
+_MOST_POINTS = 400
+"""A line is drawn with no more; a page of full ones would weigh megabytes."""
+
+STYLE: Any = {  # matplotlib types the keys as a literal of three hundred
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.alpha": 0.3,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "svg.hashsalt": "companion",  # the same numbers give the same file
+}
+
+
+def new_figure(
+    rows: int, columns: int, height: float = 3.4, width: float = 4.6
+) -> tuple[Figure, Any]:
+    """A figure and its (rows, columns) array of axes, `height` and `width` inches each."""
+    figure = Figure(figsize=(width * columns, height * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
+    """A line, thinned to what can be seen."""
+    stride = max(1, len(x) // _MOST_POINTS)
+    keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
+    axes.plot(x[keep], y[keep], **line, label=label or None)
+
+
+def draw_response(
+    north: Axes, east: Axes, time: Floats, curves: Iterable[tuple[Method, str, Floats]]
+) -> None:
+    """Both coefficients over time; `curves` are (method, label, (n, 2) coefficients)."""
+    for method, label, c in curves:
+        for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
+            draw(axes, time, values, method.line, label)
+    north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
+    east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
+
+
+def draw_reference(
+    north: Axes, east: Axes, time: Floats, reference: Floats, label: str = "first-order reference"
+) -> None:
+    """A reference model, over the curves that should follow it."""
+    draw(north, time, reference[:, 0], REFERENCE, label)
+    draw(east, time, reference[:, 1], REFERENCE, label)
+
+
+def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
+    """Paths in the plane of the coefficients; `ends` are (2, 2): start and target."""
+    for method, label, c in curves:
+        draw(axes, c[:, 1], c[:, 0], method.line, label)
+    axes.plot(ends[:, 1], ends[:, 0], **REFERENCE)
+    axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
+    axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)
+    axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")

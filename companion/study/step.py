@@ -1,0 +1,119 @@
+"""A step of the wanted coefficients, and what a planner makes of it."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion import batch
+from companion.attitude import Coefficients, Target, attitude
+from companion.attitude.kinematics import tilt_products
+from companion.attitude.planner import LawPlanner
+from companion.attitude.reference import FirstOrderReference
+from companion.study.inner_loop import InnerLoop
+
+Floats = NDArray[np.float64]
+
+ALL_HEADINGS = tuple(k * pi / 36.0 for k in range(-35, 37))
+"""Every π/36, as in the paper's figure 3; rad."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step from one steady tilt to another, flown at several headings.
+
+    Attributes:
+        start, target: acceleration coefficients.
+        gain: p of the planners and of the first-order reference, 1/s.
+        rate_hz: of the planner.
+        seconds: how long it is watched.
+        headings: tilt-yaw headings, rad; each is kept during the step.
+    """
+
+    start: Coefficients
+    target: Coefficients
+    gain: float = 5.0
+    rate_hz: float = 1000.0
+    seconds: float = 2.0
+    headings: tuple[float, ...] = ALL_HEADINGS
+
+    @property
+    def samples(self) -> int:
+        """How many samples the planner answers."""
+        return round(self.seconds * self.rate_hz)
+
+    @property
+    def time(self) -> Floats:
+        """(samples + 1,) s, from the step on."""
+        return np.arange(self.samples + 1) / self.rate_hz
+
+    def reference(self, model: FirstOrderReference | None = None) -> Floats:
+        """(samples + 1, 2) coefficients of the first-order reference; `gain` alone by default."""
+        model = model or FirstOrderReference(self.gain)
+        return np.array([model.after(self.start, self.target, float(t)) for t in self.time])
+
+
+FIGURE_2 = Step(Coefficients(-0.4, -0.5), Coefficients(0.4, -0.5))
+"""The step of the paper's figures 2, 3 and 5."""
+FIGURE_4 = Step(Coefficients(-0.5, 0.0), Coefficients(0.0, 0.5))
+"""The step of the paper's figure 4, which the rate limit shapes."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """What one planner made of a step, sample by sample.
+
+    Attributes:
+        step: the step that was flown.
+        coefficients: (samples + 1, 2, headings), measured from the attitude.
+        rates: (samples, 3, headings) body rates commanded, rad/s.
+    """
+
+    step: Step
+    coefficients: Floats
+    rates: Floats
+
+    @property
+    def tilt_rate(self) -> Floats:
+        """(samples, headings) √(ω_x² + ω_y²) commanded, rad/s."""
+        return np.hypot(self.rates[:, 0], self.rates[:, 1])
+
+    def at(self, heading: int) -> Floats:
+        """(samples + 1, 2) coefficients at one heading, by its index."""
+        return self.coefficients[:, :, heading]
+
+
+def fly(planner: LawPlanner, step: Step) -> Response:
+    """Fly a step with body rates that follow at once, as the paper's section 4 assumes."""
+    starts = [attitude(step.start, heading) for heading in step.headings]
+    targets = [(*step.target, heading, 0.0) for heading in step.headings]
+    history = batch.simulate(
+        planner, np.array(starts).T, np.array(targets).T, 1.0 / step.rate_hz, step.samples
+    )
+    return Response(step, _coefficients(history.q), history.rates)
+
+
+def fly_inner_loop(planner: LawPlanner, step: Step, inner_loop: InnerLoop) -> Response:
+    """Fly a step with the complete inner loop between the body rates and the attitude."""
+    flights = [
+        inner_loop.fly(
+            planner,
+            attitude(step.start, heading),
+            Target(*step.target, heading),
+            seconds=step.seconds,
+            rate_hz=step.rate_hz,
+        )
+        for heading in step.headings
+    ]
+    return Response(
+        step,
+        _coefficients(np.stack([flight.q for flight in flights], axis=-1)),
+        np.stack([flight.commanded for flight in flights], axis=-1),
+    )
+
+
+def _coefficients(q: Floats) -> Floats:
+    """(n, 2, headings) coefficients of (n, 4, headings) attitudes (equation 10)."""
+    _, ax, ay = tilt_products(*np.moveaxis(q, 1, 0))
+    return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=1)

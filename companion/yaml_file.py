@@ -1,0 +1,108 @@
+"""Reading YAML into a typed model, with errors that say what, where and how to mend it."""
+
+import difflib
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_origin
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class ConfigError(Exception):
+    """What the user configured cannot be used; the message is complete and meant for the user."""
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML in which a key stands once; plain YAML takes the last one in silence."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for (key_node, _), key in zip(node.value, keys, strict=True):
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key {key!r} stands there twice", problem_mark=key_node.start_mark
+                )
+        return super().construct_mapping(node, deep)
+
+
+def load(path: Path, model: type[Model]) -> Model:
+    """Read and check a YAML file.
+
+    Raises:
+        ConfigError: the file is missing, not YAML, or holds an unknown key or a bad value.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot read the configuration: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: not a text file in UTF-8") from error
+    return parse(text, str(path), model)
+
+
+def parse(text: str, name: str, model: type[Model]) -> Model:
+    """Check YAML text; `name` stands for it in errors.
+
+    Raises:
+        ConfigError: as `load`.
+    """
+    try:
+        data = yaml.load(text, _UniqueKeys)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"{name}, line {mark.line + 1}" if mark else name
+        raise ConfigError(f"{where}: not valid YAML: {getattr(error, 'problem', error)}") from error
+    if data is None:
+        data = {}
+    if not isinstance(data, dict):
+        first = next(iter(model.model_fields))
+        raise ConfigError(f"{name}: expected keys such as `{first}:` at the top level")
+    return validated({key: _filled(key, value, model) for key, value in data.items()}, name, model)
+
+
+def _filled(key: Any, value: Any, model: type[BaseModel]) -> Any:
+    """`value`, or an empty section where nothing but the section's name was written."""
+    field = model.model_fields.get(key)
+    if value is not None or field is None:
+        return value
+    kinds = (field.annotation, *get_args(field.annotation))
+    sections = [kind for kind in kinds if isinstance(get_origin(kind) or kind, type)]
+    has_keys = any(issubclass(get_origin(kind) or kind, (BaseModel, dict)) for kind in sections)
+    return {} if has_keys else None
+
+
+def validated(data: dict[str, Any], name: str, model: type[Model]) -> Model:
+    """Check data already read; `name` stands for it in errors.
+
+    Raises:
+        ConfigError: an unknown key or a bad value.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        lines = [_explain(detail["loc"], detail, model) for detail in error.errors()]
+        raise ConfigError(f"{name}: " + "; ".join(lines)) from error
+
+
+def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel]) -> str:
+    where = ".".join(str(part) for part in location)
+    if detail["type"] != "extra_forbidden":
+        message = detail["msg"].removeprefix("Value error, ")
+        if not where:
+            return str(message)
+        value = "" if isinstance(detail["input"], dict) else f" (got {detail['input']!r})"
+        return f"`{where}`: {message[:1].lower()}{message[1:]}{value}"
+    known = _keys_beside(location, model)
+    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
+    hint = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
+    return f"`{where}` is not a known key; {hint}"
+
+
+def _keys_beside(location: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
+    for part in location[:-1]:
+        field = model.model_fields[str(part)].annotation
+        if isinstance(field, type) and issubclass(field, BaseModel):
+            model = field
+    return list(model.model_fields)

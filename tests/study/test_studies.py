@@ -1,0 +1,252 @@
+"""`companion study` as a user runs it: its numbers, its files, its page, its errors."""
+
+import csv
+import importlib.util
+import math
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+from rich.console import Console
+
+from companion.cli import main
+from companion.study import runner
+from companion.study.custom import Case
+from companion.study.names import PAPER_STUDIES
+from companion.yaml_file import ConfigError
+
+ROOT = Path(__file__).parents[2]
+CASE = ROOT / "configs" / "study-case.yaml"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """All studies, once; and how often each of them ticked."""
+    out = tmp_path_factory.mktemp("study")
+    ticks = Counter()
+    tick = runner._tick
+
+    def counting(progress, task, study, part):
+        ticks[study] += 1
+        tick(progress, task, study, part)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "_tick", counting)
+        page = runner.run("all", None, out, Console(quiet=True))
+    return out, page, ticks
+
+
+def rows(results, name):
+    with (results[0] / f"{name}.csv").open(newline="") as file:
+        header, *body = csv.reader(file)
+    return {row[0]: dict(zip(header[1:], row[1:], strict=True)) for row in body}
+
+
+def number(table, row, column):
+    (key,) = [key for key in table[row] if key.startswith(column)]
+    return float(table[row][key])
+
+
+@pytest.mark.parametrize(
+    ("method", "deviation", "cross_track"),
+    [
+        ("proposed", 8.2e-4, 1.2e-4),
+        ("quaternion", 2.41e-2, 2.37e-2),
+        ("SO(3)", 2.37e-2, 2.37e-2),
+        ("Euler Z-Y-X, best at -90°", 6.3e-3, None),
+        ("Euler Z-Y-X, worst at 0°", 4.57e-2, None),
+    ],
+)
+def test_the_table_of_figure_2_has_the_known_numbers(results, method, deviation, cross_track):
+    table = rows(results, "fig2")
+    assert number(table, method, "largest deviation") == pytest.approx(deviation, rel=0.02)
+    if cross_track is not None:
+        assert number(table, method, "cross-track") == pytest.approx(cross_track, rel=0.02)
+        assert number(table, method, "difference between headings") < 1e-9
+
+
+def test_the_table_of_figure_3_is_of_period_pi_and_spans_that_of_figure_2(results):
+    away = {
+        int(angle): float(next(iter(row.values()))) for angle, row in rows(results, "fig3").items()
+    }
+    assert len(away) == 72
+    for angle in range(-175, 1, 5):
+        assert away[angle] == pytest.approx(away[angle + 180], rel=1e-6)
+    assert min(away.values()) == pytest.approx(6.3e-3, rel=0.02)
+    assert max(away.values()) == pytest.approx(4.57e-2, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("method", "rate", "time"),
+    [
+        ("proposed", math.pi / 2, 0.692),
+        ("proposed, paper's limit", 1.30, 0.771),
+        ("SO(3)", math.pi / 2, 0.685),
+    ],
+)
+def test_the_table_of_figure_4_has_the_known_numbers(results, method, rate, time):
+    table = rows(results, "fig4")
+    assert number(table, method, "largest √") == pytest.approx(rate, rel=0.02)
+    assert number(table, method, "time to 5 %") == pytest.approx(time, rel=0.02)
+
+
+def test_exact_is_exact_at_every_rate_and_the_paper_is_not(results):
+    table = rows(results, "rates")
+    assert list(table) == ["1000", "500", "250", "100", "50"]
+    for hz in table:
+        assert number(table, hz, "exact: deviation") <= 1e-12
+    assert number(table, "1000", "proposed: deviation") == pytest.approx(8.2e-4, rel=0.02)
+    assert number(table, "50", "proposed: deviation") == pytest.approx(1.7e-2, rel=0.03)
+
+
+@pytest.mark.parametrize(("tilt", "k"), [("30", 1.333), ("45", 2.0), ("60", 4.0)])
+def test_k_max_is_that_of_appendix_a(results, tilt, k):
+    table = rows(results, "kmax")
+    assert number(table, tilt, "K_max computed") == pytest.approx(k, rel=1e-3)
+    assert number(table, tilt, "1/(1") == pytest.approx(k, rel=1e-3)
+
+
+def test_a_slow_inner_loop_takes_the_straight_line_from_the_proposed_method(results):
+    table = rows(results, "fig5-quickness")
+    quickest, slowest = min(table, key=float), max(table, key=float)
+    assert number(table, quickest, "proposed") < 0.2 * number(table, quickest, "quaternion")
+    assert number(table, slowest, "proposed") > number(table, slowest, "quaternion")
+
+
+def test_every_study_writes_its_figure_and_its_tables(results):
+    out, page, _ = results
+    names = {path.name for path in out.iterdir()}
+    for study in PAPER_STUDIES:
+        assert {f"{study}.{ending}" for ending in ("svg", "png", "csv", "md")} <= names
+        assert (out / f"{study}.png").read_bytes().startswith(b"\x89PNG")
+        assert f'id="{study}"' in page.read_text()
+    for path in out.glob("*.md"):
+        table = path.read_text().strip().split("\n\n")[1].splitlines()
+        assert len({line.count("|") for line in table}) == 1, path.name
+
+
+def test_the_page_stands_alone_and_states_what_did_not_hold(results):
+    text = results[1].read_text()
+    links = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\')>\s]+)', text)
+    assert links
+    assert all(link.startswith(("#", "data:image/svg+xml;base64,")) for link in links)
+    assert "<script" not in text
+    verdicts = re.findall(r'class="(holds|fails)">', text)
+    assert {"holds", "fails"} == set(verdicts)
+    for words in ("nan", "None", "inf<"):
+        assert f">{words}" not in text
+
+
+def test_the_progress_bar_ends_full(results):
+    assert dict(results[2]) == {name: study.parts for name, study in runner._PAPERS.items()}
+
+
+def test_the_same_study_gives_the_same_files(results, tmp_path):
+    runner.run("kmax", None, tmp_path, Console(quiet=True))
+    for name in ("kmax.svg", "kmax.csv", "kmax.md", "kmax.png"):
+        assert (tmp_path / name).read_bytes() == (results[0] / name).read_bytes(), name
+
+
+def custom(tmp_path, capsys, **changes):
+    data = yaml.safe_load(CASE.read_text()) | changes
+    case = tmp_path / "case.yaml"
+    case.write_text(yaml.safe_dump(data))
+    code = main(["study", "custom", "--case", str(case), "--out", str(tmp_path / "out")])
+    return code, " ".join(capsys.readouterr().err.split())
+
+
+def test_the_shipped_case_is_right_and_marks_what_differs_from_the_defaults():
+    shown, default = yaml.safe_load(CASE.read_text()), Case(start=(0, 0), target=(0.1, 0))
+    assert list(shown) == list(Case.model_fields)
+    assert list(shown["limits"]) == list(type(default.limits).model_fields)
+    for line in CASE.read_text().splitlines():
+        pair, _, marked = line.partition("  # default: ")
+        key = pair.partition(":")[0]
+        if line.lstrip().startswith("#") or key.strip() in ("", "start", "target", "limits"):
+            continue
+        holder, given = (default.limits, shown["limits"]) if key[0] == " " else (default, shown)
+        standard = getattr(holder, key.strip())
+        standard = list(standard) if isinstance(standard, tuple) else standard
+        assert (yaml.safe_load(marked) if marked else given[key.strip()]) == standard, line
+
+
+def test_a_case_of_ones_own(tmp_path, capsys):
+    code, _ = custom(tmp_path, capsys, rates_hz=[100.0, 50.0], seconds=1.0)
+    assert code == 0
+    with (tmp_path / "out" / "custom.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == 10
+    exact = [row for row in table if row["method"] == "exact"]
+    for row in exact:
+        assert float(row["cross-track"]) < 1e-12
+        assert float(row["largest √(ω_x²+ω_y²), rad/s"]) <= math.pi / 2 * (1 + 1e-12)
+    assert "no limits" not in (tmp_path / "out" / "study.html").read_text()
+
+
+def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsys):
+    limits = {"max_tilt_deg": 40.0, "max_tilt_rate_deg_s": 90.0, "rate_limit": "paper"}
+    changes = {"limits": limits, "headings_deg": [0.0], "seconds": 0.4}
+    methods = {"methods": ["first-order"]}
+    assert custom(tmp_path, capsys, **changes, **methods)[0] == 0
+    ideal = (tmp_path / "out" / "custom.csv").read_text()
+    flown = {**methods, "inner_loop": True, "transport_delay_ms": 20.0}
+    assert custom(tmp_path, capsys, **changes, **flown)[0] == 0
+    assert (tmp_path / "out" / "custom.csv").read_text() != ideal
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"strat": [0, 0]}, "`strat` is not a known key; did you mean `start`?"),
+        ({"limits": {"max_tilt": 3}}, "`limits.max_tilt` is not a known key; did you mean"),
+        ({"methods": ["so4"]}, "unknown method 'so4'"),
+        ({"methods": ["so3", "so3"]}, "names one twice"),
+        ({"methods": []}, "`methods`"),
+        ({"start": [0.9, 0.9]}, "tilt below 75°"),
+        ({"start": [0.4, 0.3]}, "nothing to fly"),
+        ({"target": [0.7, 0.0]}, "beyond limits.max_tilt_deg"),
+        ({"limits": {"rate_limit": "paper"}}, "equation 33"),
+        ({"inner_loop": True, "rates_hz": [300]}, "must divide 1000"),
+        ({"transport_delay_ms": 5}, "needs inner_loop"),
+        ({"seconds": float("inf")}, "`seconds`"),
+    ],
+)
+def test_a_bad_case_is_one_clear_sentence(tmp_path, capsys, changes, words):
+    code, said = custom(tmp_path, capsys, **changes)
+    assert code == 2
+    assert words in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_custom_wants_a_case_and_the_others_have_theirs(tmp_path):
+    with pytest.raises(ConfigError, match="--case FILE"):
+        runner.run("custom", None, tmp_path, Console(quiet=True))
+    with pytest.raises(ConfigError, match="goes with study custom"):
+        runner.run("fig2", CASE, tmp_path, Console(quiet=True))
+
+
+def test_without_the_extra_one_sentence_says_what_to_install(tmp_path, capsys, monkeypatch):
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "matplotlib" else found(name)
+    )
+    assert main(["study", "kmax", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "pip install 'mavlink-companion[study]'" in said
+    assert said.count("\n") == 1
+
+
+def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert main(["study", "fig5", "--out", str(tmp_path / "file")]) == 2
+    assert "cannot write to" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_one_sentence(tmp_path, capsys):
+    (tmp_path / "kmax.png").symlink_to("/dev/full")
+    assert main(["study", "kmax", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert "No space left" in said
+    assert "Traceback" not in said
