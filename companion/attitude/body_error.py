@@ -8,24 +8,16 @@ from math import sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.rotation import angle_per_sine, attitude_of, body_error, within_limits
+from companion.attitude.types import Quaternion, Target
 
 
 def quaternion(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    north: float,
-    east: float,
-    heading: float,
-    heading_rate: float,
-    dt: float,
-    constants: Constants,
+    q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), the short way round."""
     gain = constants.gain
-    goal = attitude_of(north, east, heading)
-    _, e_x, e_y, e_z = body_error(w, x, y, z, *goal)
+    north, east, heading, heading_rate = target
+    _, e_x, e_y, e_z = body_error(q, attitude_of(north, east, heading))
     scale = 2.0 * gain
     return within_limits(
         scale * e_x,
@@ -37,21 +29,12 @@ def quaternion(
 
 
 def so3(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    north: float,
-    east: float,
-    heading: float,
-    heading_rate: float,
-    dt: float,
-    constants: Constants,
+    q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates ω = p·Log(q⁻¹ ⊗ q_d)."""
     gain = constants.gain
-    goal = attitude_of(north, east, heading)
-    e_w, e_x, e_y, e_z = body_error(w, x, y, z, *goal)
+    north, east, heading, heading_rate = target
+    e_w, e_x, e_y, e_z = body_error(q, attitude_of(north, east, heading))
     scale = gain * angle_per_sine(e_w, sqrt(e_x * e_x + e_y * e_y + e_z * e_z))
     return within_limits(
         scale * e_x,

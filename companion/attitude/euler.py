@@ -4,25 +4,17 @@ from math import cos, sin
 
 from companion.attitude.constants import Constants
 from companion.attitude.rotation import attitude_of, euler_angles, short_way, within_limits
+from companion.attitude.types import Quaternion, Target
 
 
 def euler(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    north: float,
-    east: float,
-    heading: float,
-    heading_rate: float,
-    dt: float,
-    constants: Constants,
+    q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates p·M(φ, θ)·(wrapped error of the angles); the response depends on the heading."""
     gain = constants.gain
-    goal = attitude_of(north, east, heading)
-    roll, pitch, yaw = euler_angles(w, x, y, z)
-    roll_d, pitch_d, yaw_d = euler_angles(*goal)
+    north, east, heading, heading_rate = target
+    roll, pitch, yaw = euler_angles(q)
+    roll_d, pitch_d, yaw_d = euler_angles(attitude_of(north, east, heading))
     e_roll = gain * short_way(roll_d - roll)
     e_pitch = gain * short_way(pitch_d - pitch)
     e_yaw = gain * short_way(yaw_d - yaw)

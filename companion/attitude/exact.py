@@ -7,6 +7,7 @@ from companion.attitude.kinematics import heading_of, split
 from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
 from companion.attitude.reference import distance_left
 from companion.attitude.rotation import angle_per_sine, short_way, within, within_limits
+from companion.attitude.types import Quaternion, Target
 
 SHORTEST_SAMPLE = 1e-4
 """s; a shorter sample is answered like this one: the rates differ from their limit by 1e-4·p."""
@@ -17,16 +18,7 @@ _PASSES = 20
 
 
 def exact(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    north: float,
-    east: float,
-    heading: float,
-    heading_rate: float,
-    dt: float,
-    constants: Constants,
+    q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """The one body rate that, held over the sample, ends where the first-order model ends.
 
@@ -37,6 +29,8 @@ def exact(
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE
+    w, x, y, z = q
+    north, east, heading, heading_rate = target
     a, b, tilt_x, tilt_y, yaw_z = split(w, x, y, z)
     cosine = 2.0 * a * a - 1.0
     share = 1.0 if cosine >= cos_recovery else share_of_law(cosine, cos_recovery, slope)

@@ -6,19 +6,11 @@ from companion.attitude.constants import Constants
 from companion.attitude.kinematics import body_rates, heading_of, tilt_products
 from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
 from companion.attitude.rotation import short_way, within
+from companion.attitude.types import Quaternion, Target
 
 
 def first_order(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    north: float,
-    east: float,
-    heading: float,
-    heading_rate: float,
-    dt: float,
-    constants: Constants,
+    q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates under which the acceleration coefficients follow ċ = p·(c_d − c).
 
@@ -28,6 +20,8 @@ def first_order(
     rotation towards level; heading is left alone there, for it means nothing upside down.
     """
     gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_low, slope = constants
+    w, x, y, z = q
+    north, east, heading, heading_rate = target
     square, ax, ay = tilt_products(w, x, y, z)
     cosine = 2.0 * square - 1.0
     share = 1.0

@@ -13,12 +13,9 @@ from companion.attitude.representation import normalised
 from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Quaternion, Target
 
-Law = Callable[
-    [float, float, float, float, float, float, float, float, float, Constants],
-    tuple[float, float, float],
-]
-"""A control law as arithmetic on scalars: (w, x, y, z) of a unit quaternion, (north, east, heading,
-heading_rate) of an admissible target, dt, constants → body rates (roll, pitch, yaw) in rad/s."""
+Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
+"""A control law as arithmetic on scalars: a unit quaternion, an admissible target, the sample
+period in s, constants → body rates (roll, pitch, yaw) in rad/s."""
 
 
 class Planner(Protocol):
@@ -59,11 +56,7 @@ class LawPlanner:
         if target is not self._asked:  # a target stands for many samples; it cannot change
             self._admitted = admissible(target, self.constants.longest_target)
             self._asked = target
-        w, x, y, z = normalised(q)
-        north, east, heading, heading_rate = self._admitted
-        return _rates_of(
-            BodyRates, self.law(w, x, y, z, north, east, heading, heading_rate, dt, self.constants)
-        )
+        return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
 
 
 _rates_of = tuple.__new__

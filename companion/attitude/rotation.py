@@ -6,13 +6,15 @@ and a batch compiles it unchanged.
 
 from math import asin, atan2, cos, pi, sin, sqrt
 
+from companion.attitude.types import Quaternion
+
 TWO_PI = 2.0 * pi
 
 _SMALL = 1e-12
 """Below this half angle (rad) sin(h)/h is 1 to double precision."""
 
 
-def attitude_of(north: float, east: float, heading: float) -> tuple[float, float, float, float]:
+def attitude_of(north: float, east: float, heading: float) -> Quaternion:
     """The upright attitude with these acceleration coefficients (at most 1 long) and heading."""
     a = sqrt((1.0 + sqrt(1.0 - north * north - east * east)) / 2.0)
     x = east / (2.0 * a)
@@ -22,13 +24,13 @@ def attitude_of(north: float, east: float, heading: float) -> tuple[float, float
     return a * b, x * b + y * z, y * b - x * z, a * z
 
 
-def body_error(
-    w: float, x: float, y: float, z: float, w_d: float, x_d: float, y_d: float, z_d: float
-) -> tuple[float, float, float, float]:
+def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
     """q⁻¹ ⊗ q_d, the rotation still to be made as the body sees it, the short way (w ≥ 0).
 
     Both ways of an exact half turn are as short; the same is taken for q and −q.
     """
+    w, x, y, z = q
+    w_d, x_d, y_d, z_d = goal
     w_e = w * w_d + x * x_d + y * y_d + z * z_d
     x_e = w * x_d - x * w_d - y * z_d + z * y_d
     y_e = w * y_d - y * w_d - z * x_d + x * z_d
@@ -59,10 +61,10 @@ def cos_and_sinc(square: float) -> tuple[float, float]:
     return cos(h), sin(h) / h if h > _SMALL else 1.0
 
 
-def turned(
-    w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float, dt: float
-) -> tuple[float, float, float, float]:
+def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
     """The attitude after the body rates (rad/s) were held for `dt` seconds: q ⊗ exp(ω·dt/2)."""
+    w, x, y, z = q
+    roll, pitch, yaw = rates
     i = 0.5 * dt * roll
     j = 0.5 * dt * pitch
     k = 0.5 * dt * yaw
@@ -81,8 +83,9 @@ def turned(
     return w * scale, x * scale, y * scale, z * scale
 
 
-def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def euler_angles(q: Quaternion) -> tuple[float, float, float]:
     """Roll, pitch, yaw in rad of the sequence Z-Y-X, as autopilots report them."""
+    w, x, y, z = q
     sine = 2.0 * (w * y - z * x)
     sine = 1.0 if sine > 1.0 else -1.0 if sine < -1.0 else sine
     return (

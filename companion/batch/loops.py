@@ -51,24 +51,15 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for i in range(q.shape[1]):
-            rates[0, i], rates[1, i], rates[2, i] = one_law(
-                q[0, i],
-                q[1, i],
-                q[2, i],
-                q[3, i],
-                targets[0, i],
-                targets[1, i],
-                targets[2, i],
-                targets[3, i],
-                dt,
-                constants,
-            )
+            attitude = q[0, i], q[1, i], q[2, i], q[3, i]
+            target = targets[0, i], targets[1, i], targets[2, i], targets[3, i]
+            rates[0, i], rates[1, i], rates[2, i] = one_law(attitude, target, dt, constants)
 
     def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
         for i in range(q.shape[1]):
-            after[0, i], after[1, i], after[2, i], after[3, i] = turned(
-                q[0, i], q[1, i], q[2, i], q[3, i], rates[0, i], rates[1, i], rates[2, i], dt
-            )
+            attitude = q[0, i], q[1, i], q[2, i], q[3, i]
+            turning = rates[0, i], rates[1, i], rates[2, i]
+            after[0, i], after[1, i], after[2, i], after[3, i] = turned(attitude, turning, dt)
 
     return _over_samples(compiler.loop(apply), compiler.loop(turn), compiler.loop, any_angle)
 
@@ -80,11 +71,11 @@ def plain_loops(law: Law) -> Loops:
     turned: Any = rotation.turned
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
-        vehicles = zip(*q.tolist(), *targets.tolist(), strict=True)
+        vehicles = zip(q.T.tolist(), targets.T.tolist(), strict=True)
         rates[...] = np.transpose([one_law(*vehicle, dt, constants) for vehicle in vehicles])
 
     def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
-        vehicles = zip(*q.tolist(), *rates.tolist(), strict=True)
+        vehicles = zip(q.T.tolist(), rates.T.tolist(), strict=True)
         after[...] = np.transpose([turned(*vehicle, dt) for vehicle in vehicles])
 
     return _over_samples(apply, turn, lambda loop: loop, any_angle=True)
