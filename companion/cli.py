@@ -273,7 +273,11 @@ def _study(options: argparse.Namespace) -> int:
     from companion.study import runner  # noqa: PLC0415  needs the extra
 
     console = Console()
-    page = runner.run(options.name, options.case, options.out, console)
+    try:
+        page = runner.run(options.name, options.case, options.out, console)
+    except KeyboardInterrupt:
+        console.print(f"Interrupted; what stands in {options.out} is whole.", highlight=False)
+        return EXIT_FLIGHT
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     return EXIT_OK
 

@@ -89,11 +89,11 @@ class PlannerConfig(Section):
 class LimitsConfig(Section):
     """What we never ask of the vehicle, and where it may fly."""
 
-    max_tilt_deg: Annotated[float, Field(gt=0.0, le=60.0)] = 35.0
+    max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 35.0
     """Largest tilt of a target; longer targets are shortened along their direction."""
-    max_tilt_rate_deg_s: Annotated[float, Field(gt=0.0, le=1000.0)] = 90.0
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 90.0
     """Largest roll-pitch rate, as the length of the two."""
-    max_yaw_rate_deg_s: Annotated[float, Field(gt=0.0, le=1000.0)] = 60.0
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 60.0
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""

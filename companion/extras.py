@@ -21,4 +21,5 @@ def require(module: str, extra: str, purpose: str) -> None:
     if importlib.util.find_spec(module) is None:
         raise MissingExtraError(
             f"{purpose} needs {module}; install it with: pip install 'mavlink-companion[{extra}]'"
+            f" (in a clone: pip install -e '.[{extra}]')"
         )

@@ -82,14 +82,28 @@ def validated(data: dict[str, Any], name: str, model: type[Model]) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        lines = [_explain(detail["loc"], detail, model) for detail in error.errors()]
+        details = _without_consequences(error.errors())
+        lines = [_explain(detail["loc"], detail, model) for detail in details]
         raise ConfigError(f"{name}: " + "; ".join(lines)) from error
+
+
+def _without_consequences(details: list[Any]) -> list[Any]:
+    """Without "too short" of a list whose only fault is that an item of it was refused."""
+    places = [detail["loc"] for detail in details]
+    return [
+        detail
+        for detail in details
+        if detail["type"] != "too_short"
+        or not any(
+            len(p) > len(detail["loc"]) and p[: len(detail["loc"])] == detail["loc"] for p in places
+        )
+    ]
 
 
 def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel]) -> str:
     where = ".".join(str(part) for part in location)
     if detail["type"] != "extra_forbidden":
-        message = detail["msg"].removeprefix("Value error, ")
+        message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
         if not where:
             return str(message)
         value = "" if isinstance(detail["input"], dict) else f" (got {detail['input']!r})"

@@ -11,6 +11,8 @@ from companion.attitude.types import Quaternion, Target
 
 SHORTEST_SAMPLE = 1e-4
 """s; a shorter sample is answered like this one: the rates differ from their limit by 1e-4·p."""
+LONGEST_SAMPLE = 1.0
+"""s; a longer one is answered like this one."""
 
 _SETTLED = 1e-14
 _PASSES = 20
@@ -29,6 +31,7 @@ def exact(
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE
+    dt = dt if dt < LONGEST_SAMPLE else LONGEST_SAMPLE
     w, x, y, z = q
     north, east, heading, heading_rate = target
     a, b, tilt_x, tilt_y, yaw_z = split(w, x, y, z)

@@ -8,6 +8,11 @@ them need a², a·x and a·y only, and so neither a root nor a division.
 from math import atan, sqrt
 
 
+def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """(a², a·x, a·y) of the split; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (10)."""
+    return w * w + z * z, w * x - z * y, z * x + w * y
+
+
 def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
     """Split a unit quaternion into (a, b, x, y, z), tilt ⊗ yaw (equation 9).
 
@@ -16,17 +21,13 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
     a = sqrt(w * w + z * z)
     if a < 1e-12:
         return 0.0, 1.0, x, y, 0.0
-    return a, w / a, (w * x - z * y) / a, (z * x + w * y) / a, z / a
+    _, ax, ay = tilt_products(w, x, y, z)
+    return a, w / a, ax / a, ay / a, z / a
 
 
 def cos_tilt(x: float, y: float) -> float:
     """Cosine of the tilt; `x`, `y` of the split or of the whole quaternion alike (equation 10)."""
     return 1.0 - 2.0 * (x * x + y * y)
-
-
-def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """(a², a·x, a·y) of the split; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (10)."""
-    return w * w + z * z, w * x - z * y, z * x + w * y
 
 
 def body_rates(

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from math import inf, isfinite, pi
 from typing import Literal
 
+_LEAST = 1e-6
+"""Least limit that is not taken for a slip: rad, rad/s."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -29,7 +32,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_tilt", "max_tilt_rate", "max_yaw_rate"):
             value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value > 0.0):
+            if value is not None and not (isfinite(value) and value >= _LEAST):
                 raise ValueError(f"{name} must be positive and finite, not {value}")
         if self.max_tilt is not None and self.max_tilt >= pi / 2.0:
             raise ValueError(f"max_tilt must be below 90°, not {self.max_tilt:.4g} rad")

@@ -55,7 +55,7 @@ class LawPlanner:
         """
         if target is not self._asked:  # a target stands for many samples; it cannot change
             self._admitted = admissible(target, self.constants.longest_target)
-            self._asked = target
+            self._asked = target if isinstance(target, tuple) else None
         return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
 
 
@@ -89,7 +89,8 @@ def make_planner(
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
         limits: bounds on tilt and rates.
-        options: what the named planner takes beyond these: `recovery_angle`, rad.
+        options: what the named planner takes beyond these: `recovery_angle`, rad. Without
+            `limits.max_tilt` it is also the largest tilt of a target, with every planner.
 
     Raises:
         ValueError: unknown name, or a value out of range.

@@ -3,7 +3,7 @@
 from math import atan2, pi, sqrt
 
 from companion.attitude.errors import InvalidQuaternionError
-from companion.attitude.kinematics import split
+from companion.attitude.kinematics import split, tilt_products
 from companion.attitude.rotation import attitude_of
 from companion.attitude.types import Coefficients, Quaternion, TiltYaw
 
@@ -56,8 +56,8 @@ def coefficients(q: Quaternion) -> Coefficients:
     Raises:
         InvalidQuaternionError: as `normalised`.
     """
-    w, x, y, z = normalised(q)
-    return Coefficients(-2.0 * (z * x + w * y), 2.0 * (w * x - z * y))
+    _, ax, ay = tilt_products(*normalised(q))
+    return Coefficients(-2.0 * ay, 2.0 * ax)
 
 
 def heading(q: Quaternion) -> float:

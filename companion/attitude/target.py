@@ -16,7 +16,7 @@ def admissible(target: Target, longest: float) -> Target:
     north, east, heading, heading_rate = target
     square = north * north + east * east
     if not -inf < square + heading + heading_rate < inf:
-        raise InvalidTargetError(f"target is not finite: {target}")
+        raise InvalidTargetError(f"target is not finite, or far too large: {target}")
     if square <= longest * longest and -pi < heading <= pi:
         return target
     scale = min(1.0, longest / sqrt(square)) if square > 0.0 else 1.0

@@ -36,8 +36,8 @@ class History(NamedTuple):
 
 
 def can_compile() -> bool:
-    """Whether numba is installed."""
-    return importlib.util.find_spec("numba") is not None
+    """Whether numba is installed, with the compiler that it stands on."""
+    return all(importlib.util.find_spec(module) for module in ("numba", "llvmlite"))
 
 
 def rates(

@@ -111,6 +111,7 @@ class Session:
         summary = Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
+            planner=self._config.planner.name,
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={**counts, "not_recorded": tlog_dropped},

@@ -40,7 +40,8 @@ class Summary:
     Attributes:
         result: "ok", or the reason for which it ended.
         phase: the last phase it reached.
-        gain: p of the planner, 1/s.
+        planner: name of the planner that flew.
+        gain: its p, 1/s.
         counts: what the control loop counted.
         link: frames received, lost, damaged and so on, by name.
         trace: rows to measure from.
@@ -50,6 +51,7 @@ class Summary:
 
     result: str
     phase: str
+    planner: str
     gain: float
     counts: LoopCounts
     link: dict[str, int]
@@ -88,6 +90,7 @@ class Summary:
         return {
             "result": self.result,
             "phase": self.phase,
+            "planner": self.planner,
             "gain_per_s": self.gain,
             "samples": self.counts.samples,
             "setpoints": self.counts.setpoints,

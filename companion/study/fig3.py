@@ -4,6 +4,8 @@ from math import degrees
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from companion.study.drawing import draw, draw_reference, new_figure
@@ -50,10 +52,11 @@ def run(tick: Tick) -> Outcome:
         ),
         findings=(
             Finding(
+                "asked",
                 "Some headings suit Euler angles much better than others.",
                 bool(away[best] < 0.5 * away[worst]),
-                f"The best, {at[best]}°, deviates by {away[best]:.2e}, the worst, {at[worst]}°, by"
-                f" {away[worst]:.2e}; the proposed method has {proposed.max():.2e} at all of them.",
+                f"The best, {at[best]}°, deviates by {away[best]:.2g}, the worst, {at[worst]}°, by"
+                f" {away[worst]:.2g}; the proposed method has {proposed.max():.2g} at all of them.",
             ),
         ),
     )
@@ -63,7 +66,8 @@ def _figure(response: Response, reference: Floats) -> Figure:
     figure, ((north, east), (away, plane)) = new_figure(2, 2)
     time, headings = FIGURE_2.time, np.degrees(FIGURE_2.headings)
     folded = np.abs((headings + 90.0) % 180.0 - 90.0)
-    colours = _FOLDED(folded / 100.0)  # short of the palest yellow
+    key = ScalarMappable(Normalize(0.0, 100.0), _FOLDED)
+    colours = key.to_rgba(folded)
     for k in np.argsort(-folded):
         line = {"color": colours[k], "linewidth": 0.8}
         c = response.at(k)
@@ -86,5 +90,7 @@ def _figure(response: Response, reference: Floats) -> Figure:
         xticks=np.arange(-180, 181, 60),
         ylim=(0.0, None),
     )
+    bar = figure.colorbar(key, ax=[east, plane], ticks=[0, 30, 60, 90], boundaries=range(91))
+    bar.set_label("angle between heading and the step's axis, °")
     north.legend(loc="lower right")
     return figure

@@ -1,7 +1,7 @@
 """Figure 4: the step under a limit of the tilt rate."""
 
 from dataclasses import replace
-from math import cos, degrees, pi, radians
+from math import cos, pi, radians
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,10 +12,10 @@ from companion.study.drawing import draw, draw_plane, draw_reference, new_figure
 from companion.study.measures import cross_track, largest_deviation, largest_tilt_rate, time_to
 from companion.study.methods import (
     EULER,
+    LIMIT,
     PAPER_LIMIT,
     PROPOSED,
     QUATERNION,
-    REFERENCE,
     SO3,
     Method,
     planner_of,
@@ -97,7 +97,7 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         draw(east, time, c[:, 1], method.line)
         draw(rate, time[:-1], responses[method].tilt_rate[:, at[method]], method.line)
     draw_reference(north, east, time, reference, "reference, equation 33")
-    rate.axhline(MAX_TILT_RATE, **REFERENCE)
+    rate.axhline(MAX_TILT_RATE, **LIMIT)
     north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
     east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
     rate.set(
@@ -118,27 +118,30 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
     across = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
     away = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
     euler = time_to(responses[EULER])
-    slowest = round(degrees(FIGURE_4.headings[int(euler.argmax())]))
     return (
         Finding(
+            "paper",
             "The limit of equation 33 keeps the tilt rate within W_M.",
             rate[PAPER_LIMIT] <= MAX_TILT_RATE * (1.0 + 1e-12),
             f"The largest is {rate[PAPER_LIMIT]:.3f} of {MAX_TILT_RATE:.3f} rad/s; the response"
-            f" follows the limited first-order reference within {away:.1e}.",
+            f" follows the limited first-order reference within {away:.2g}.",
         ),
         Finding(
+            "asked",
             "That limit makes full use of W_M.",
             rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
             f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of it and takes"
             f" {arrived[PAPER_LIMIT]:.3f} s; the tight limit uses"
             f" {100.0 * rate[PROPOSED] / MAX_TILT_RATE:.0f} % and takes {arrived[PROPOSED]:.3f} s,"
-            f" on the same straight line (cross-track {across[PROPOSED]:.1e}).",
+            f" on the same straight line (cross-track {across[PROPOSED]:.2g}).",
         ),
         Finding(
+            "asked",
             "Under the limit the proposed method is the quickest.",
             min(arrived, key=lambda method: arrived[method]) in (PROPOSED, PAPER_LIMIT),
-            f"SO(3) takes {arrived[SO3]:.3f} s, the quaternion method {arrived[QUATERNION]:.3f} s,"
-            f" Euler angles {euler.min():.3f} to {euler.max():.3f} s (slowest at {slowest}°)."
-            f" They cut the corner: SO(3) leaves the line by {across[SO3]:.2g}.",
+            f"so3 takes {arrived[SO3]:.3f} s, the quaternion method {arrived[QUATERNION]:.3f} s,"
+            f" euler {euler.min():.3f} to {euler.max():.3f} s by heading, first-order"
+            f" {arrived[PROPOSED]:.3f} s. so3 leaves the straight line by {across[SO3]:.2g},"
+            f" first-order by {across[PROPOSED]:.2g}.",
         ),
     )

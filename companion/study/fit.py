@@ -1,6 +1,7 @@
-"""The second-order model that a response comes nearest to."""
+"""The second-order model with a dead time that a response comes nearest to."""
 
 from math import exp, log
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -11,15 +12,24 @@ from companion.study.step import Floats, Step
 
 _THINNING = 10
 _REST = Coefficients(0.0, 0.0)
+_LONGEST_DEAD_TIME = 0.5  # s
 
 
-def second_order_path(step: Step, model: SecondOrderReference, time: Floats) -> Floats:
-    """(n, 2) coefficients of a second-order model that starts at rest, at the times (n,) in s."""
-    return np.array([model.after(step.start, _REST, step.target, float(t))[0] for t in time])
+class SecondOrderFit(NamedTuple):
+    """A second-order model that begins to move `dead_time` seconds after the step."""
+
+    model: SecondOrderReference
+    dead_time: float
 
 
-def fit_second_order(step: Step, path: Floats) -> SecondOrderReference:
-    """Least squares over frequency and damping.
+def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
+    """(n, 2) coefficients of the model, from rest, at the times (n,) in s after the step."""
+    moving = np.maximum(time - fit.dead_time, 0.0)
+    return np.array([fit.model.after(step.start, _REST, step.target, float(t))[0] for t in moving])
+
+
+def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
+    """Least squares over frequency, damping and dead time.
 
     Args:
         step: what was flown.
@@ -27,10 +37,14 @@ def fit_second_order(step: Step, path: Floats) -> SecondOrderReference:
     """
     time, measured = step.time[::_THINNING], path[::_THINNING]
 
-    def apart(logarithms: Floats) -> Floats:
-        frequency, damping = np.exp(logarithms)
-        model = SecondOrderReference(float(frequency), float(damping))
-        return np.asarray((second_order_path(step, model, time) - measured).ravel())
+    def apart(unknown: Floats) -> Floats:
+        return np.asarray((second_order_path(step, _fit(unknown), time) - measured).ravel())
 
-    found = least_squares(apart, [log(2.0 * step.gain), 0.0])
-    return SecondOrderReference(exp(float(found.x[0])), exp(float(found.x[1])))
+    start = [log(2.0 * step.gain), 0.0, 1.0 / step.rate_hz]
+    bounds = ([-np.inf, -np.inf, 0.0], [np.inf, np.inf, _LONGEST_DEAD_TIME])
+    return _fit(least_squares(apart, start, bounds=bounds).x)
+
+
+def _fit(unknown: Floats) -> SecondOrderFit:
+    frequency, damping, dead_time = (float(value) for value in unknown)
+    return SecondOrderFit(SecondOrderReference(exp(frequency), exp(damping)), dead_time)

@@ -80,7 +80,7 @@ def run(tick: Tick) -> Outcome:
                 (
                     "tilt, °",
                     "K_max computed",
-                    "1/(1 − 2A_M²)²",
+                    "1/(1 − 2A_M²)² = 1/cos² tilt, A_M = sin(tilt/2)",
                     "K_min computed",
                     "mean rate over largest rate",
                 ),
@@ -89,17 +89,19 @@ def run(tick: Tick) -> Outcome:
         ),
         findings=(
             Finding(
+                "paper",
                 "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
                 all(abs(computed[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
                 and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
                 "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed.items()) + ".",
             ),
             Finding(
+                "asked",
                 "K_max is what every movement needs.",
                 min(row[3] / row[1] for row in rows) > 0.99,
-                f"Only the worst direction (towards or away from level) at full tilt needs it; at"
-                f" 40° the mean over all directions is {100.0 * share[40]:.0f} % of that rate, at"
-                f" 60° {100.0 * share[60]:.0f} %. The tight limit uses the difference.",
+                f"By direction K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g} at"
+                f" {rows[-1][0]}°; the mean over all directions is {100.0 * share[40]:.0f} % of the"
+                f" largest rate at 40°, {100.0 * share[60]:.0f} % at 60°.",
             ),
         ),
     )
@@ -132,7 +134,9 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
             markerfacecolor="none",
             label=f"{words} over the directions",
         )
-    over_tilt.plot(list(PRINTED), list(PRINTED.values()), "o", color="black", label="printed")
+    over_tilt.plot(
+        list(PRINTED), list(PRINTED.values()), "o", color="black", label="printed in the paper"
+    )
     over_tilt.set(title="K by tilt", xlabel="tilt, °", ylabel="K", ylim=(0.0, None))
     over_tilt.legend(loc="upper left")
     return figure

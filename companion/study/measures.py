@@ -16,12 +16,17 @@ def largest_deviation(response: Response, reference: Floats) -> Floats:
     return np.asarray(deviation(response, reference).max(axis=0))
 
 
-def cross_track(response: Response) -> Floats:
-    """(headings,) largest distance from the straight line between start and target."""
+def from_line(response: Response) -> Floats:
+    """(samples + 1, headings) distance from the straight line start → target, to its right."""
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))
     away = response.coefficients - start[:, None]
-    return np.asarray(np.abs(away[:, 0] * east - away[:, 1] * north).max(axis=0))
+    return np.asarray(away[:, 1] * north - away[:, 0] * east)
+
+
+def cross_track(response: Response) -> Floats:
+    """(headings,) largest distance from the straight line between start and target."""
+    return np.asarray(np.abs(from_line(response)).max(axis=0))
 
 
 def time_to(response: Response, share: float = 0.05) -> Floats:

@@ -13,7 +13,7 @@ class Method(NamedTuple):
     """A planner under the name and the look that it has throughout.
 
     The colours are Okabe and Ito's, which the colour-blind tell apart; the dashes and widths keep
-    the methods apart in black and white, and let a curve be seen below another.
+    the methods apart in black and white, and let a curve be seen below another that is narrower.
     """
 
     planner: str
@@ -29,14 +29,16 @@ class Method(NamedTuple):
         return {"color": self.colour, "linestyle": style, "linewidth": self.width}
 
 
+LIMIT: Line = {"color": "#666666", "linestyle": "-", "linewidth": 0.8}
+"""The look of a limit."""
 REFERENCE: Line = {"color": "black", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
 """The look of every reference model."""
 
-QUATERNION = Method("quaternion", "quaternion", "#E69F00", width=3.0)
-SO3 = Method("so3", "SO(3)", "#009E73", (5, 2))
-EULER = Method("euler", "Euler Z-Y-X", "#D55E00", (7, 2, 1.5, 2))
-PROPOSED = Method("first-order", "proposed", "#0072B2", width=2.0)
-PAPER_LIMIT = Method("first-order", "proposed, paper's limit", "#56B4E9", (3, 1.2), 2.0)
+QUATERNION = Method("quaternion", "quaternion", "#E69F00", width=3.4)
+SO3 = Method("so3", "so3", "#009E73", (5, 2), 2.4)
+EULER = Method("euler", "euler", "#D55E00", (7, 2, 1.5, 2), 1.8)
+PROPOSED = Method("first-order", "first-order", "#0072B2", width=1.3)
+PAPER_LIMIT = Method("first-order", "first-order, paper's limit", "#56B4E9", (3, 1.2), 2.0)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPERS = (QUATERNION, SO3, EULER, PROPOSED)

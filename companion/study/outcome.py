@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from matplotlib.figure import Figure
 
@@ -13,9 +14,17 @@ Tick = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim, whether the computed numbers bear it out, and those numbers."""
+    """A statement, whether the computed numbers bear it out, and those numbers.
 
-    claim: str
+    Attributes:
+        source: "paper" where the paper claims it, "asked" where its claim raises the question.
+        statement: what is claimed or asked.
+        holds: the verdict.
+        evidence: the numbers, and the bound they were held against.
+    """
+
+    source: Literal["paper", "asked"]
+    statement: str
     holds: bool
     evidence: str
 
@@ -32,6 +41,7 @@ class Outcome:
         caption: what the figure shows.
         tables: the numbers.
         findings: each made from the numbers, none from memory.
+        series: further tables, written as CSV only.
     """
 
     name: str
@@ -41,3 +51,4 @@ class Outcome:
     caption: str
     tables: tuple[Table, ...]
     findings: tuple[Finding, ...] = ()
+    series: tuple[Table, ...] = ()

@@ -12,21 +12,18 @@ from matplotlib.figure import Figure
 from companion.study.outcome import Outcome
 
 
-def write_outcome(outcome: Outcome, folder: Path) -> list[Path]:
-    """Write the figure (SVG and PNG) and the tables (CSV and Markdown); returns the files.
+def write_outcome(outcome: Outcome, folder: Path) -> None:
+    """Write the figure (SVG and PNG) and the tables (CSV and Markdown; series as CSV only).
 
     Raises:
         OSError: a file cannot be written.
     """
-    files = []
     for ending in ("svg", "png"):
-        files.append(folder / f"{outcome.name}.{ending}")
-        files[-1].write_bytes(_image(outcome.figure, ending))
+        _write(folder / f"{outcome.name}.{ending}", _image(outcome.figure, ending))
+    for table in (*outcome.tables, *outcome.series):
+        _write(folder / f"{table.name}.csv", table.as_csv().encode())
     for table in outcome.tables:
-        for ending, text in (("csv", table.as_csv()), ("md", table.as_markdown())):
-            files.append(folder / f"{table.name}.{ending}")
-            files[-1].write_text(text, encoding="utf-8")
-    return files
+        _write(folder / f"{table.name}.md", table.as_markdown().encode())
 
 
 def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
@@ -50,7 +47,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
         },
         version=version("mavlink-companion"),
     )
-    path.write_text(page, encoding="utf-8")
+    _write(path, page.encode())
 
 
 def _image(figure: Figure, ending: str) -> bytes:
@@ -59,3 +56,13 @@ def _image(figure: Figure, ending: str) -> bytes:
     metadata = {"Date": None} if ending == "svg" else {"Software": None}
     figure.savefig(buffer, format=ending, dpi=130, metadata=metadata)
     return buffer.getvalue()
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all: an older one stays until the new one is there."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -18,7 +19,7 @@ from rich.progress import (
 
 from companion import yaml_file
 from companion.study import custom, fig2, fig3, fig4, fig5, kmax, rates
-from companion.study.custom import Case
+from companion.study.case import Case
 from companion.study.drawing import STYLE
 from companion.study.outcome import Outcome, Tick
 from companion.study.report import write_outcome, write_page
@@ -39,8 +40,6 @@ _PAPERS = {
     "kmax": _Study(kmax.run, kmax.PARTS),
 }
 
-PAGE = "study.html"
-
 
 def run(name: str, case_file: Path | None, out: Path, console: Console) -> Path:
     """Run one study, `all` of the paper's, or `custom` from a case file; returns the page.
@@ -50,9 +49,11 @@ def run(name: str, case_file: Path | None, out: Path, console: Console) -> Path:
         OSError: a result cannot be written.
     """
     chosen = _chosen(name, case_file)
-    page = _prepared(out)
+    page = _prepared(out, "study" if name == "all" else name)
     outcomes = []
-    with mpl.rc_context(STYLE), _progress(console) as progress:
+    with mpl.rc_context(), _progress(console) as progress:
+        mpl.rcdefaults()  # whatever matplotlibrc lies about, the same numbers give the same files
+        mpl.rcParams.update(STYLE)
         total = sum(study.parts + 1 for study in chosen.values()) + 1
         task = progress.add_task("", total=total, study="")
         for key, study in chosen.items():
@@ -77,14 +78,17 @@ def _chosen(name: str, case_file: Path | None) -> dict[str, _Study]:
     return _PAPERS if name == "all" else {name: _PAPERS[name]}
 
 
-def _prepared(out: Path) -> Path:
+def _prepared(out: Path, name: str) -> Path:
     """Make the folder, and find out before the work whether it takes files."""
-    page = out / PAGE
+    page = out / f"{name}.html"
     try:
         out.mkdir(parents=True, exist_ok=True)
-        page.touch()
+        with TemporaryFile(dir=out):
+            pass
     except OSError as error:
         raise ConfigError(f"--out: cannot write to {out}: {error.strerror}") from error
+    if page.is_dir():
+        raise ConfigError(f"--out: {page} is a folder; the page is to have that name")
     return page
 
 

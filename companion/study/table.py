@@ -3,6 +3,7 @@
 import csv
 import io
 from dataclasses import dataclass
+from math import isinf
 
 from tabulate import tabulate
 
@@ -53,4 +54,8 @@ class Table:
 
 
 def _rounded(cell: Cell) -> str:
-    return f"{cell:.3g}" if isinstance(cell, float) else str(cell)
+    if not isinstance(cell, float):
+        return str(cell)
+    if isinf(cell):
+        return "never"
+    return f"{cell:.0f}" if abs(cell) >= 1e3 else f"{cell:.3g}"

@@ -52,7 +52,9 @@ def test_without_steps_there_is_no_response():
 
 
 def summary(trace):
-    return Summary("ok", "disarm", 5.0, LoopCounts(7, 6, 1), {"lost": 0}, trace, [], Path("x"))
+    return Summary(
+        "ok", "disarm", "exact", 5.0, LoopCounts(7, 6, 1), {"lost": 0}, trace, [], Path("x")
+    )
 
 
 def test_json_has_the_promised_keys():

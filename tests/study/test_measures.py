@@ -5,7 +5,7 @@ import pytest
 
 from companion.attitude import Coefficients
 from companion.attitude.reference import SecondOrderReference
-from companion.study.fit import fit_second_order, second_order_path
+from companion.study.fit import SecondOrderFit, fit_second_order, second_order_path
 from companion.study.measures import (
     cross_track,
     heading_effect,
@@ -63,9 +63,12 @@ def test_the_tilt_rate_leaves_yaw_out():
 
 def test_a_second_order_response_is_found_again():
     model = SecondOrderReference(9.0, 0.7)
-    found = fit_second_order(STEP, second_order_path(STEP, model, STEP.time))
-    assert found.frequency == pytest.approx(9.0, rel=1e-4)
-    assert found.damping == pytest.approx(0.7, rel=1e-4)
+    path = second_order_path(STEP, SecondOrderFit(model, 0.043), STEP.time)
+    assert path[4] == pytest.approx(STEP.start)  # still dead at 40 ms
+    found = fit_second_order(STEP, path)
+    assert found.dead_time == pytest.approx(0.043, rel=1e-3)
+    assert found.model.frequency == pytest.approx(9.0, rel=1e-3)
+    assert found.model.damping == pytest.approx(0.7, rel=1e-3)
 
 
 def test_a_flown_response_begins_at_the_start_and_ends_at_the_target():
