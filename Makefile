@@ -18,7 +18,7 @@ demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 	$(BIN)/companion demo
 
 test: lint  ## style, types, import rules, then every test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadscope
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
