@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from companion.attitude import PLANNER_NAMES
+from companion.attitude.planner import MODEL_FOLLOWING
 from companion.guidance.reference import GRAVITY
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -72,7 +73,8 @@ class PlannerConfig(Section):
 
     name: Annotated[str, Field(json_schema_extra={"enum": list(PLANNER_NAMES)})] = "first-order"
     """first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
-    error of discretisation. quaternion, so3, euler: what they compare it with."""
+    error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
+    needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
     """p: acceleration approaches its target with the time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
@@ -84,6 +86,19 @@ class PlannerConfig(Section):
         if self.name not in PLANNER_NAMES:
             raise ValueError(f"unknown planner {self.name!r}; known: {', '.join(PLANNER_NAMES)}")
         return self
+
+
+class VehicleConfig(Section):
+    """How the vehicle's own rate loop answers; `model-following` plans with it."""
+
+    lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """Time constant of the roll and pitch rates after their dead time."""
+    dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """From an attitude sample to the first effect of its answer on roll and pitch."""
+    yaw_lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """The same time constant for yaw; null: that of roll and pitch."""
+    yaw_dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """The same dead time for yaw; null: that of roll and pitch."""
 
 
 class LimitsConfig(Section):
@@ -241,6 +256,7 @@ class Config(Section):
 
     link: LinkConfig = LinkConfig()
     planner: PlannerConfig = PlannerConfig()
+    vehicle: VehicleConfig = VehicleConfig()
     limits: LimitsConfig = LimitsConfig()
     deadman: DeadmanConfig = DeadmanConfig()
     guidance: GuidanceConfig = GuidanceConfig()
@@ -268,6 +284,11 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
     tilt = radians(limits.max_tilt_deg)
     needed = circle.speed_m_s**2 / circle.radius_m + config.guidance.drag_per_s * circle.speed_m_s
     return [
+        (
+            config.planner.name == MODEL_FOLLOWING
+            and None in (config.vehicle.lag_ms, config.vehicle.dead_time_ms),
+            "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms",
+        ),
         (
             not limits.min_thrust < thrust.hover_thrust < limits.max_thrust,
             "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust",

@@ -7,7 +7,7 @@ this package are that paper's.
 
 from companion.attitude.errors import AttitudeError, InvalidQuaternionError, InvalidTargetError
 from companion.attitude.limits import Limits
-from companion.attitude.planner import PLANNER_NAMES, Planner, make_planner
+from companion.attitude.planner import LAW_NAMES, PLANNER_NAMES, Planner, make_planner
 from companion.attitude.representation import (
     attitude,
     coefficients,
@@ -19,6 +19,7 @@ from companion.attitude.representation import (
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target, TiltYaw
 
 __all__ = [
+    "LAW_NAMES",
     "PLANNER_NAMES",
     "AttitudeError",
     "BodyRates",

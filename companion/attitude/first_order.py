@@ -3,7 +3,7 @@
 from math import sqrt
 
 from companion.attitude.constants import Constants
-from companion.attitude.kinematics import body_rates, heading_of, tilt_products
+from companion.attitude.kinematics import heading_of, speed_to_rates, tilt_products
 from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
 from companion.attitude.rotation import short_way, within
 from companion.attitude.types import Quaternion, Target
@@ -35,7 +35,7 @@ def first_order(
     faded = share * gain
     e_x = faded * (east - 2.0 * ax)
     e_y = -faded * (north + 2.0 * ay)
-    roll, pitch, still = body_rates(w, z, ax, ay, inverse, both * square, e_x, e_y)
+    roll, pitch, still = speed_to_rates(w, z, ax, ay, inverse, both * square, e_x, e_y)
     if share < 1.0:
         up_roll, up_pitch = levelling_rates(gain, a, inverse, w, x, y, z)
         roll += (1.0 - share) * up_roll

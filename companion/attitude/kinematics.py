@@ -30,7 +30,7 @@ def cos_tilt(x: float, y: float) -> float:
     return 1.0 - 2.0 * (x * x + y * y)
 
 
-def body_rates(
+def speed_to_rates(
     w: float,
     z: float,
     ax: float,
@@ -51,6 +51,22 @@ def body_rates(
     cosine = (w * w - z * z) * inverse
     sine = 2.0 * w * z * inverse
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x, (ay * r_x - ax * r_y) * inverse
+
+
+def rates_to_speed(
+    w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
+) -> tuple[float, float, float]:
+    """The way back: speed (north, east) of the coefficients, 1/s, and of the heading, rad/s.
+
+    Under body rates in rad/s the thrust axis −R·e_z moves with −R·(ω × e_z), and the heading with
+    what the yaw rate is more than the R_z that would keep it still.
+    """
+    north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
+    east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch
+    square, ax, ay = tilt_products(w, x, y, z)
+    inverse = 1.0 / square
+    _, _, still = speed_to_rates(w, z, ax, ay, inverse, 1.0 / (2.0 * square - 1.0), east, -north)
+    return north, east, yaw - still
 
 
 def heading_of(a: float, w: float, z: float) -> float:

@@ -9,6 +9,7 @@ from companion.attitude.euler import euler
 from companion.attitude.exact import exact
 from companion.attitude.first_order import first_order
 from companion.attitude.limits import Limits
+from companion.attitude.model_following import ModelFollowingPlanner
 from companion.attitude.representation import normalised
 from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Quaternion, Target
@@ -25,6 +26,10 @@ class Planner(Protocol):
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
         """One step: rates in rad/s for attitude `q`; `dt` is the sample period in s."""
+        ...
+
+    def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
+        """Forget what was planned: after a gap, a change of mode, a jump of the estimate."""
         ...
 
 
@@ -58,6 +63,9 @@ class LawPlanner:
             self._asked = target if isinstance(target, tuple) else None
         return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
 
+    def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
+        """Nothing is remembered, so there is nothing to forget."""
+
 
 _rates_of = tuple.__new__
 """BodyRates of a plain tuple, without the NamedTuple's own constructor: half its cost."""
@@ -71,7 +79,11 @@ _LAWS: dict[str, Law] = {
     "euler": euler,
 }
 
-PLANNER_NAMES = tuple(_LAWS)
+MODEL_FOLLOWING = "model-following"
+
+LAW_NAMES = tuple(_LAWS)
+"""The planners without memory, which a batch can map."""
+PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
 def make_planner(
@@ -91,10 +103,35 @@ def make_planner(
         limits: bounds on tilt and rates.
         options: what the named planner takes beyond these: `recovery_angle`, rad. Without
             `limits.max_tilt` it is also the largest tilt of a target, with every planner.
+            `model-following` takes `lag` and `dead_time` of the rate loop, s (0 by default: it
+            follows at once), `yaw_lag` and `yaw_dead_time` (those of roll and pitch by default).
 
     Raises:
+        TypeError: an option that the planner does not take.
         ValueError: unknown name, or a value out of range.
     """
+    if name == MODEL_FOLLOWING:
+        return _model_following(gain, yaw_gain, limits, **options)
     if name not in _LAWS:
         raise ValueError(f"unknown planner {name!r}; known: {', '.join(PLANNER_NAMES)}")
     return LawPlanner(_LAWS[name], make_constants(gain, yaw_gain, limits, **options))
+
+
+def _model_following(
+    gain: float,
+    yaw_gain: float,
+    limits: Limits,
+    *,
+    lag: float = 0.0,
+    dead_time: float = 0.0,
+    yaw_lag: float | None = None,
+    yaw_dead_time: float | None = None,
+    **options: Any,
+) -> Planner:
+    return ModelFollowingPlanner(
+        make_constants(gain, yaw_gain, limits, **options),
+        lag,
+        dead_time,
+        lag if yaw_lag is None else yaw_lag,
+        dead_time if yaw_dead_time is None else yaw_dead_time,
+    )

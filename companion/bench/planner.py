@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion import batch
-from companion.attitude import PLANNER_NAMES, Limits, Target, make_planner
+from companion.attitude import LAW_NAMES, Limits, Target, make_planner
 from companion.attitude.planner import LawPlanner
 
 BATCHES = (1, 1_000, 10_000)
@@ -89,7 +89,7 @@ def _flight_cases() -> list[_Case]:
     held, other = (Target(*column) for column in vehicle.targets.T.tolist())
     known: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "held": held, "other": other}
     asked: dict[str, Callable[..., Any]] = {"baseline": _answered}
-    asked |= {name: _planner(name).rates for name in PLANNER_NAMES}
+    asked |= {name: _planner(name).rates for name in LAW_NAMES}
     return [
         _Case(group, key, Timer(statement, globals={**known, "f": function}), 2)
         for key, function in asked.items()
@@ -111,7 +111,7 @@ def _batch_cases(compiled: bool) -> list[_Case]:
         known: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
         copy = Timer("q.copy(), targets.copy()", globals=known)
         cases.append(_Case(str(count), "baseline", copy, count))
-        for name in PLANNER_NAMES:
+        for name in LAW_NAMES:
             known = {**known, "rates": batch.rates, "planner": _planner(name)}
             timer = Timer("rates(planner, q, targets, 0.004, compiled)", globals=known)
             cases.append(_Case(str(count), name, timer, count))
@@ -180,7 +180,7 @@ def _show(figures: dict[str, Any]) -> None:
         table.add_column(heading, justify="right", no_wrap=True)
     columns = [(figures[f"{key}_ns"], figures[f"{key}_ratio"]) for key in ("flight", "new_target")]
     columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCHES]
-    for key in ("baseline", *PLANNER_NAMES):
+    for key in ("baseline", *LAW_NAMES):
         table.add_row(key, *(_cell(ns[key], ratio.get(key)) for ns, ratio in columns))
     simulated = figures["simulated"]
     console = Console()

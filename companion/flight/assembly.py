@@ -7,6 +7,7 @@ from math import radians, tan
 from pathlib import Path
 
 from companion.attitude import Limits, Planner, make_planner
+from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.flight import AskLanding, Flight
@@ -58,8 +59,12 @@ def _signing(key_file: Path | None) -> Signing | None:
 
 
 def planner(config: Config) -> Planner:
-    """The planner with its limits."""
+    """The planner with its limits, and with the vehicle's response if it plans with that."""
     limits = config.limits
+    response: dict[str, float] = {}
+    if config.planner.name == MODEL_FOLLOWING:
+        times = config.vehicle.model_dump(exclude_none=True)
+        response = {key.removesuffix("_ms"): 1e-3 * value for key, value in times.items()}
     return make_planner(
         config.planner.name,
         gain=config.planner.gain_per_s,
@@ -71,6 +76,7 @@ def planner(config: Config) -> Planner:
             shape=limits.rate_limit,
         ),
         recovery_angle=radians(limits.recovery_angle_deg),
+        **response,
     )
 
 

@@ -87,6 +87,7 @@ class ControlLoop:
         self._trace = trace
         self._clock = SampleClock()
         self._last_time = -inf
+        self._planned_at = -inf
         self._gap_from = inf
 
     def resume(self) -> None:
@@ -116,7 +117,7 @@ class ControlLoop:
             if command.idle:
                 rates, thrust = BodyRates(0.0, 0.0, 0.0), 0.0
             else:
-                rates = self._planner.rates(sample.q, command.target, dt, sample.body_rates)
+                rates = self._plan(sample, command.target, dt)
                 thrust = self._hover_thrust.normalised(
                     specific_thrust(command.acceleration_down, cosine)
                 )
@@ -127,6 +128,15 @@ class ControlLoop:
             self.refused += 1
             return
         self._account(sample, command, thrust * cosine)
+
+    def _plan(self, sample: AttitudeSample, target: Target, dt: float) -> BodyRates:
+        """Ask the planner; after a gap, or at the first sample, it is to begin anew."""
+        since = sample.vehicle_time - self._planned_at
+        if since > _LONGEST_STEP:
+            self._planner.reset(sample.q, sample.body_rates)
+            since = dt
+        self._planned_at = sample.vehicle_time
+        return self._planner.rates(sample.q, target, since, sample.body_rates)
 
     def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
         """Keep what the watch asks for; returns the sample period in s."""

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
-from companion.attitude import PLANNER_NAMES, Coefficients, Limits
+from companion.attitude import LAW_NAMES, Coefficients, Limits
 from companion.study.step import Step
 
 Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
@@ -45,7 +45,7 @@ class Case(_Section):
     """Acceleration coefficients [north, east] of the target."""
     headings_deg: Annotated[tuple[float, ...], Field(min_length=1, max_length=360)] = (0.0,)
     """Tilt-yaw headings at which it is flown."""
-    methods: Annotated[tuple[str, ...], Field(min_length=1)] = PLANNER_NAMES
+    methods: Annotated[tuple[str, ...], Field(min_length=1)] = LAW_NAMES
     """Planners to compare."""
     rates_hz: Annotated[
         tuple[Annotated[float, Field(ge=10.0, le=1000.0)], ...], Field(min_length=1)
@@ -82,9 +82,9 @@ class Case(_Section):
 
     @model_validator(mode="after")
     def _lists_make_sense(self) -> "Case":
-        unknown = [name for name in self.methods if name not in PLANNER_NAMES]
+        unknown = [name for name in self.methods if name not in LAW_NAMES]
         if unknown:
-            known = ", ".join(PLANNER_NAMES)
+            known = ", ".join(LAW_NAMES)
             raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):

@@ -22,7 +22,7 @@ from companion.study.measures import (
 )
 from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
 from companion.study.outcome import Outcome, Tick
-from companion.study.step import Floats, Response, fly, fly_inner_loop
+from companion.study.step import Floats, Response, fly, fly_loop
 from companion.study.table import Cell, Table
 
 
@@ -110,7 +110,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
         inner_loop = replace(
             quickened(case.quickness), transport_delay=1e-3 * case.transport_delay_ms
         )
-        return fly_inner_loop(planner, step, inner_loop)
+        return fly_loop(planner, step, inner_loop)
     return fly(planner, step)
 
 

@@ -29,7 +29,7 @@ from companion.study.methods import (
     planner_of,
 )
 from companion.study.outcome import Finding, Outcome, Tick
-from companion.study.step import FIGURE_2, Response, fly_inner_loop
+from companion.study.step import FIGURE_2, Response, fly_loop
 from companion.study.table import Cell, Table
 
 STEP = replace(FIGURE_2, headings=tuple(k * pi / 4.0 for k in range(-3, 5)))
@@ -114,7 +114,7 @@ def _fly(factor: int, tick: Tick) -> _Loop:
     responses, fits = {}, {}
     for method in _METHODS:
         tick(f"{method.label}, {1e3 * time_63:.0f} ms")
-        responses[method] = fly_inner_loop(planner_of(method, STEP.gain), STEP, inner_loop)
+        responses[method] = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
         fits[method] = fit_second_order(STEP, responses[method].at(_worst(responses[method])))
     return _Loop(time_63, responses, fits)
 
@@ -128,9 +128,7 @@ def _sweep(tick: Tick) -> dict[float, dict[Method, float]]:
         tick(f"cross-track, {1e3 * time_63:.0f} ms")
         out[time_63] = {
             method: float(
-                cross_track(
-                    fly_inner_loop(planner_of(method, STEP.gain), _ONE_HEADING, inner_loop)
-                )[0]
+                cross_track(fly_loop(planner_of(method, STEP.gain), _ONE_HEADING, inner_loop))[0]
             )
             for method in PAPERS
         }

@@ -201,6 +201,9 @@ class _Constant:
         """The constant rates."""
         return self._rates
 
+    def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
+        """Nothing to forget."""
+
 
 def _thrust(q: Quaternion) -> float:
     """Specific thrust that holds height at this attitude, m/s²."""

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Coefficients, attitude
-from companion.attitude.kinematics import body_rates, tilt_products
+from companion.attitude.kinematics import speed_to_rates, tilt_products
 from companion.study.drawing import new_figure
 from companion.study.methods import PROPOSED, REFERENCE
 from companion.study.outcome import Finding, Outcome, Tick
@@ -26,7 +26,7 @@ def scaling_factor(c: Coefficients, direction: float) -> float:
     w, x, y, z = attitude(c, 0.0)
     square, ax, ay = tilt_products(w, x, y, z)
     # e_x = d(2ax)/dt is the east component, e_y = d(2ay)/dt the south component.
-    roll, pitch, _ = body_rates(
+    roll, pitch, _ = speed_to_rates(
         w, z, ax, ay, 1.0 / square, 1.0 / (2.0 * square - 1.0), sin(direction), -cos(direction)
     )
     return roll * roll + pitch * pitch

@@ -39,6 +39,7 @@ SO3 = Method("so3", "so3", "#009E73", (5, 2), 2.4)
 EULER = Method("euler", "euler", "#D55E00", (7, 2, 1.5, 2), 1.8)
 PROPOSED = Method("first-order", "first-order", "#0072B2", width=1.3)
 PAPER_LIMIT = Method("first-order", "first-order, paper's limit", "#56B4E9", (3, 1.2), 2.0)
+FOLLOWING = Method("model-following", "model-following", "#332288", width=2.2)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPERS = (QUATERNION, SO3, EULER, PROPOSED)

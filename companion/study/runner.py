@@ -18,7 +18,7 @@ from rich.progress import (
 )
 
 from companion import yaml_file
-from companion.study import custom, fig2, fig3, fig4, fig5, kmax, rates
+from companion.study import custom, fig2, fig3, fig4, fig5, kmax, lag, rates
 from companion.study.case import Case
 from companion.study.drawing import STYLE
 from companion.study.outcome import Outcome, Tick
@@ -31,18 +31,19 @@ class _Study(NamedTuple):
     parts: int  # how many times it ticks
 
 
-_PAPERS = {
+_STUDIES = {
     "fig2": _Study(fig2.run, fig2.PARTS),
     "fig3": _Study(fig3.run, fig3.PARTS),
     "fig4": _Study(fig4.run, fig4.PARTS),
     "fig5": _Study(fig5.run, fig5.PARTS),
     "rates": _Study(rates.run, rates.PARTS),
     "kmax": _Study(kmax.run, kmax.PARTS),
+    "lag": _Study(lag.run, lag.PARTS),
 }
 
 
 def run(name: str, case_file: Path | None, out: Path, console: Console) -> Path:
-    """Run one study, `all` of the paper's, or `custom` from a case file; returns the page.
+    """Run one study, `all` of them, or `custom` from a case file; returns the page.
 
     Raises:
         ConfigError: `out` or the case cannot be used, or a case is missing or not asked for.
@@ -75,7 +76,7 @@ def _chosen(name: str, case_file: Path | None) -> dict[str, _Study]:
         return {name: _Study(partial(custom.run, case), custom.parts(case))}
     if case_file is not None:
         raise ConfigError(f"--case goes with study custom; study {name} has its own case")
-    return _PAPERS if name == "all" else {name: _PAPERS[name]}
+    return _STUDIES if name == "all" else {name: _STUDIES[name]}
 
 
 def _prepared(out: Path, name: str) -> Path:

@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass
 from math import pi
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion import batch
-from companion.attitude import Coefficients, Target, attitude
+from companion.attitude import Coefficients, Planner, Quaternion, Target, attitude
 from companion.attitude.kinematics import tilt_products
 from companion.attitude.planner import LawPlanner
 from companion.attitude.reference import FirstOrderReference
-from companion.study.inner_loop import InnerLoop
 
 Floats = NDArray[np.float64]
 
@@ -84,6 +84,30 @@ class Response:
         return self.coefficients[:, :, heading]
 
 
+class Flown(Protocol):
+    """What a loop hands over: q (samples + 1, 4), commanded body rates (samples, 3) in rad/s."""
+
+    @property
+    def q(self) -> Floats:
+        """Attitudes w, x, y, z."""
+        ...
+
+    @property
+    def commanded(self) -> Floats:
+        """Body rates, rad/s."""
+        ...
+
+
+class Loop(Protocol):
+    """What lies between the body rates a planner asks for and the attitude it sees."""
+
+    def fly(
+        self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
+    ) -> Flown:
+        """Fly one target from rest."""
+        ...
+
+
 def fly(planner: LawPlanner, step: Step) -> Response:
     """Fly a step with body rates that follow at once, as the paper's section 4 assumes."""
     starts = [attitude(step.start, heading) for heading in step.headings]
@@ -94,18 +118,14 @@ def fly(planner: LawPlanner, step: Step) -> Response:
     return Response(step, _coefficients(history.q), history.rates)
 
 
-def fly_inner_loop(planner: LawPlanner, step: Step, inner_loop: InnerLoop) -> Response:
-    """Fly a step with the complete inner loop between the body rates and the attitude."""
-    flights = [
-        inner_loop.fly(
-            planner,
-            attitude(step.start, heading),
-            Target(*step.target, heading),
-            seconds=step.seconds,
-            rate_hz=step.rate_hz,
-        )
-        for heading in step.headings
-    ]
+def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
+    """Fly a step with an inner loop between the body rates and the attitude."""
+    flights = []
+    for heading in step.headings:
+        start = attitude(step.start, heading)
+        planner.reset(start)
+        target = Target(*step.target, heading)
+        flights.append(loop.fly(planner, start, target, seconds=step.seconds, rate_hz=step.rate_hz))
     return Response(
         step,
         _coefficients(np.stack([flight.q for flight in flights], axis=-1)),

@@ -9,7 +9,7 @@ from hypothesis import settings as effort
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from companion.attitude import PLANNER_NAMES, Limits, Target, make_planner
+from companion.attitude import LAW_NAMES, Limits, Target, make_planner
 from companion.attitude.representation import normalised
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, wrapped
 from tests.attitude.simulate import answers, fly_all, rotation
@@ -47,7 +47,7 @@ gains = st.floats(0.1, 20.0)
 fuzz = effort(max_examples=400)
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 @fuzz
 @given(st.one_of(quaternions, awkward), targets, limits, periods, gains, gains)
 def test_rates_are_finite_and_within_the_limits(name, q, target, bounds, dt, gain, yaw_gain):
@@ -70,7 +70,7 @@ def between_two_ways(name, q, target):
     return (rotation(q).inv() * goal).magnitude()[0] > math.pi - 1e-6
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 @fuzz
 @given(q=quaternions, target=targets, dt=periods)
 def test_opposite_quaternions_give_the_same_rates(name, q, target, dt):
@@ -85,7 +85,7 @@ SOUTH, INVERTED = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("q", [SOUTH, INVERTED])
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 def test_opposite_quaternions_take_the_same_way_of_an_exact_half_turn(name, q):
     """Both ways are equally short, but the sign of the telemetry should not choose one."""
     planner = make_planner(name)
@@ -108,7 +108,7 @@ def whole_sphere():
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.04])
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 def test_converges_from_the_whole_sphere_within_the_limits(name, dt, whole_sphere):
     bounds = Limits(math.radians(35), np.pi / 2, 1.2)
     planner = make_planner(name, 5.0, limits=bounds)
@@ -151,7 +151,7 @@ def test_rates_stay_bounded_without_a_rate_limit(name):
     assert np.hypot(rates[:, 0], rates[:, 1]).max() < 2 * 5.0 / math.cos(math.radians(75))
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 @pytest.mark.parametrize("length", [0.7, 1.0, 1e6])
 def test_too_long_a_target_is_shortened_along_its_direction(name, length):
     planner = make_planner(name, 5.0, limits=Limits(math.radians(30)))

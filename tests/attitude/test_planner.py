@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.attitude import (
-    PLANNER_NAMES,
+    LAW_NAMES,
     BodyRates,
     Coefficients,
     InvalidQuaternionError,
@@ -22,11 +22,11 @@ from companion.attitude.target import admissible
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 Q = attitude(Coefficients(0.3, -0.2), 1.0)
-every_planner = pytest.mark.parametrize("name", PLANNER_NAMES)
+every_planner = pytest.mark.parametrize("name", LAW_NAMES)
 
 
 def test_the_names_are_those_of_the_contract():
-    assert set(PLANNER_NAMES) >= {"first-order", "exact", "quaternion", "so3", "euler"}
+    assert set(LAW_NAMES) >= {"first-order", "exact", "quaternion", "so3", "euler"}
 
 
 def test_unknown_planner_names_the_known_ones():
@@ -202,6 +202,6 @@ def test_a_target_that_is_admissible_is_not_made_anew():
 
 
 def test_level_and_on_target_nothing_is_asked():
-    for name in PLANNER_NAMES:
+    for name in LAW_NAMES:
         rates = make_planner(name).rates(LEVEL, Target(0.0, 0.0, 0.0), 0.01)
         assert tuple(rates) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from companion.attitude import PLANNER_NAMES, Target, make_planner
+from companion.attitude import LAW_NAMES, Target, make_planner
 from tests.attitude.independent import LAWS, attitudes, coefficients_of, continuous, held, sampled
 from tests.attitude.simulate import fly_all
 
@@ -35,7 +35,7 @@ def flown():
         name: fly_all(
             make_planner(name, GAIN), attitudes(START, HEADINGS), targets, SECONDS, PERIOD
         )[0]
-        for name in PLANNER_NAMES
+        for name in LAW_NAMES
     }
 
 
@@ -95,7 +95,7 @@ def test_euler_at_its_worst_heading_in_continuous_time():
     assert np.argmax(deviations) == np.argmax(largest(own("euler", sampled, PERIOD)[0], PERIOD)[0])
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 def test_only_euler_changes_its_path_with_the_heading(name, flown):
     spread = np.abs(flown[name] - flown[name][:, :1]).max()
     if name == "euler":

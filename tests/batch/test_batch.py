@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from companion import batch
 from companion.attitude import (
-    PLANNER_NAMES,
+    LAW_NAMES,
     InvalidQuaternionError,
     InvalidTargetError,
     Limits,
@@ -39,7 +39,7 @@ def rounding(name, q):
     return 1.0
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 @pytest.mark.parametrize("limits", LIMITS)
 @BOTH
 def test_rates_are_those_of_the_flight(name, limits, compiled):
@@ -50,7 +50,7 @@ def test_rates_are_those_of_the_flight(name, limits, compiled):
     assert np.all(np.abs(rates - flown) <= bound)
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 @BOTH
 def test_each_attitude_is_the_one_before_turned_by_the_rates(name, compiled):
     q, targets = anywhere(20)

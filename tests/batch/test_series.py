@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.attitude import PLANNER_NAMES, make_planner, rotation
+from companion.attitude import LAW_NAMES, make_planner, rotation
 from companion.attitude.kinematics import heading_of
 from companion.batch import series
 
@@ -47,7 +47,7 @@ def called_by(function, seen):
     return seen
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 def test_arctangents_of_one_argument_are_taken_of_half_angles_only(name):
     """The series is good from −1 to 1; `heading_of` makes sure of that, and others may not."""
     functions = called_by(make_planner(name).law, set())

@@ -5,10 +5,10 @@ import json
 import pytest
 
 from companion import cli
-from companion.attitude import PLANNER_NAMES
+from companion.attitude import LAW_NAMES
 from companion.bench import planner
 
-ROWS = {"baseline", *PLANNER_NAMES}
+ROWS = {"baseline", *LAW_NAMES}
 
 
 def check(figures, compiled):
@@ -19,7 +19,7 @@ def check(figures, compiled):
         *zip(figures["batch_ns"].values(), figures["batch_ratio"].values(), strict=True),
     ]:
         assert set(ns) == ROWS
-        for name in PLANNER_NAMES:
+        for name in LAW_NAMES:
             assert ratios[name] == pytest.approx(ns[name] / ns["baseline"], rel=0.02)
         assert min(ns.values()) > 0.0
     simulated = figures["simulated"]

@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink import mavutil
 
-from companion.attitude import PLANNER_NAMES, Limits, make_planner
+from companion.attitude import LAW_NAMES, Limits, make_planner
 from companion.config_file import load
 from companion.flight import assembly
 from tests.flight.fly import fly, mock_vehicle
@@ -13,7 +13,7 @@ from tests.flight.fly import fly, mock_vehicle
 MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 
 
-@pytest.fixture(scope="module", params=PLANNER_NAMES)
+@pytest.fixture(scope="module", params=LAW_NAMES)
 def flown(request, tmp_path_factory):
     """Its name, and the summary of steps north, east and along a diagonal."""
     folder = tmp_path_factory.mktemp("flight")
@@ -54,7 +54,7 @@ def test_every_setpoint_is_within_the_limits(flown):
     assert max(yaw_rates) <= MAX_YAW_RATE * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("name", PLANNER_NAMES)
+@pytest.mark.parametrize("name", LAW_NAMES)
 def test_the_yaml_makes_the_planner_it_names(name, tmp_path):
     path = tmp_path / "vehicle.yaml"
     path.write_text(

@@ -1,0 +1,52 @@
+"""The largest stable gain against the rightmost root of the delayed loop itself."""
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.attitude.margin import largest_gain
+
+NODES = 24
+
+
+def rightmost(gain, lag, dead_time):
+    """Largest real part of the roots of τs² + s + k·e^(−θs) = 0, 1/s.
+
+    They are the eigenvalues of d/dt on the states x(t − θ…t), here polynomials at Chebyshev nodes,
+    with ẋ = v, τ·v̇ = −v − k·x(t − θ) at the newest.
+    """
+    n = np.arange(NODES + 1)
+    x = np.cos(np.pi * n / NODES)  # 1 is now, −1 one dead time ago
+    weight = np.where((n == 0) | (n == NODES), 2.0, 1.0) * (-1.0) ** n
+    d = np.outer(weight, 1.0 / weight) / (x[:, None] - x + np.eye(NODES + 1))
+    d -= np.diag(d.sum(axis=1))
+    system = np.kron(d * 2.0 / dead_time, np.eye(2))
+    system[:2] = 0.0
+    system[0, 1] = 1.0
+    system[1, 1] = -1.0 / lag
+    system[1, -2] = -gain / lag
+    return np.linalg.eigvals(system).real.max()
+
+
+@pytest.mark.parametrize("lag", [0.003, 0.01, 0.025, 0.06, 0.3, 1.0])
+@pytest.mark.parametrize("dead_time", [0.002, 0.005, 0.02, 0.045, 0.08, 0.17, 1.0])
+def test_stable_just_below_and_not_just_above(lag, dead_time):
+    gain = largest_gain(lag, dead_time)
+    scale = lag + dead_time
+    assert rightmost(0.99 * gain, lag, dead_time) * scale < -1e-6
+    assert rightmost(1.01 * gain, lag, dead_time) * scale > 1e-6
+
+
+def test_without_a_lag_it_is_a_quarter_turn_in_the_dead_time():
+    assert largest_gain(0.0, 0.045) == pytest.approx(0.5 * math.pi / 0.045, rel=1e-12)
+
+
+def test_without_a_dead_time_every_gain_is_stable():
+    assert largest_gain(0.025, 0.0) == math.inf
+    assert largest_gain(0.0, 0.0) == math.inf
+
+
+def test_a_short_dead_time_of_a_long_lag_bears_its_inverse():
+    """ω → 1/√(τθ), k → ω²·τ = 1/θ."""
+    assert largest_gain(1.0, 1e-6) == pytest.approx(1e6, rel=1e-3)

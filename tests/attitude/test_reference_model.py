@@ -1,0 +1,147 @@
+"""The planned motion against numerical integration, and its lines and limits; where it stood."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from companion.attitude import Coefficients, Limits, Target
+from companion.attitude.constants import make_constants
+from companion.attitude.history import History
+from companion.attitude.reference_model import ReferenceModel, rates_along
+from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
+
+W_M = np.pi / 2
+START, GOAL = (-0.4, -0.5), (0.4, -0.5)
+AT_REST = Coefficients(0.0, 0.0)
+
+
+def placed(start, limits=Limits(), lag=0.05, yaw_lag=0.05, speed=AT_REST, gain=5.0):  # noqa: B008
+    model = ReferenceModel(make_constants(gain, 2.0, limits), lag, yaw_lag)
+    model.place(Coefficients(*start), Coefficients(*speed), 0.3, 0.0)
+    return model
+
+
+def moved(model, target, seconds, dt):
+    """(S + 1, 6): north, east, their speeds, heading, turn rate."""
+
+    def state():
+        return (
+            model.north,
+            model.east,
+            model.speed_north,
+            model.speed_east,
+            model.heading,
+            model.turn_rate,
+        )
+
+    rows = [state()]
+    for _ in range(round(seconds / dt)):
+        model.advance(target, dt)
+        rows.append(state())
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("dt", [0.004, 0.01, 0.02, 0.2])
+@pytest.mark.parametrize("lag", [0.01, 0.05, 0.09])
+def test_unlimited_it_is_the_differential_equation(lag, dt):
+    speed = (0.3, -0.4)
+    rows = moved(placed(START, lag=lag, speed=speed), Target(*GOAL, 0.3), 1.6, dt)
+    solved = solve_ivp(
+        lambda _, s: [*s[2:], *((5.0 * (np.array(GOAL) - s[:2]) - s[2:]) / lag)],
+        (0.0, 1.6),
+        [*START, *speed],
+        t_eval=np.linspace(0.0, 1.6, len(rows)),
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    assert rows[:, :4] == pytest.approx(solved.y.T, abs=1e-8)
+
+
+def test_the_heading_is_the_same_equation_sampled():
+    rows = moved(placed(START, yaw_lag=0.075), Target(*GOAL, 1.3), 3.0, 0.002)
+    solved = solve_ivp(
+        lambda _, s: [s[1], (2.0 * (1.3 - s[0]) - s[1]) / 0.075],
+        (0.0, 3.0),
+        [0.3, 0.0],
+        t_eval=np.linspace(0.0, 3.0, len(rows)),
+        rtol=1e-9,
+    )
+    assert rows[:, 4:] == pytest.approx(solved.y.T, abs=4e-3)  # held over each sample
+
+
+def test_a_turning_target_is_followed_without_error():
+    model = placed(START)
+    for n in range(1000):
+        model.advance(Target(*GOAL, 0.3 + 0.005 * n, 0.5), 0.01)
+    assert model.heading == pytest.approx(0.3 + 5.0, abs=5e-3)
+    assert model.turn_rate == pytest.approx(0.5, abs=1e-6)
+
+
+LIMITS = [
+    Limits(None, W_M),
+    Limits(np.radians(50), W_M),
+    Limits(np.radians(50), W_M, shape="paper"),
+    Limits(np.radians(50), 0.4),
+]
+
+
+@pytest.mark.parametrize("limits", LIMITS)
+@pytest.mark.parametrize("dt", [0.004, 0.02])
+def test_a_step_moves_on_a_straight_line_within_the_limits(limits, dt):
+    rows = moved(placed(START, limits), Target(*GOAL, 0.3), 4.0, dt)
+    assert np.abs(rows[:, 1] + 0.5).max() <= 1e-12
+    assert np.diff(rows[:, 0]).min() >= -1e-9  # never back
+    assert rows[-1, :2] == pytest.approx(GOAL, abs=2e-2 if limits.tilt_rate < 1.0 else 1e-3)
+    r = attitudes(rows[:, :2], np.zeros(len(rows)))
+    tilt_rate = np.hypot(*rate_between(r[:-1], r[1:], dt)[:, :2].T)
+    assert tilt_rate.max() <= 1.005 * limits.tilt_rate
+    speed = np.hypot(*rows[:, 2:4].T).max()
+    if limits.shape == "paper":
+        assert speed == pytest.approx(W_M * np.cos(np.radians(50)), rel=1e-2)
+    else:
+        assert tilt_rate.max() >= 0.97 * limits.tilt_rate  # nothing is given away
+
+
+def test_the_tilt_limit_holds_for_a_motion_that_would_leave_it():
+    limits = Limits(np.radians(40), W_M)
+    longest = np.sin(np.radians(40))
+    rows = moved(placed((0.6, 0.0), limits, speed=(1.2, 0.8)), Target(0.5, 0.0, 0.3), 2.0, 0.01)
+    length = np.hypot(*rows[:, :2].T)
+    assert length.max() <= longest * (1.0 + 1e-12)
+    assert length.max() == pytest.approx(longest, rel=1e-6)  # it was tried
+    assert rows[-1, :2] == pytest.approx((0.5, 0.0), abs=1e-3)
+
+
+def test_placed_beyond_the_tilt_limit_it_goes_no_further_and_comes_back():
+    limits = Limits(np.radians(40), W_M)
+    rows = moved(placed((0.8, 0.3), limits, speed=(1.0, 0.0)), Target(0.5, 0.0, 0.3), 3.0, 0.01)
+    length = np.hypot(*rows[:, :2].T)
+    assert length.max() <= np.hypot(0.8, 0.3) + 1e-12
+    assert rows[-1, :2] == pytest.approx((0.5, 0.0), abs=1e-3)
+
+
+def test_its_rates_move_the_attitude_along_it():
+    """`rates_along`, by a small turn of a SciPy rotation: this speed, and the heading still."""
+    rng = np.random.default_rng(4)
+    for north, east, heading, *speed in rng.uniform(-0.65, 0.65, (50, 5)) * [1, 1, 4.8, 2, 2]:
+        rates = rates_along(north, east, heading, *speed)
+        r = attitudes((north, east), heading)
+        h = 1e-5
+        ahead, behind = held(r, [rates], h), held(r, [rates], -h)
+        got = (coefficients_of(ahead) - coefficients_of(behind))[0] / (2.0 * h)
+        assert got == pytest.approx(speed, abs=1e-8)
+        assert headings_of(ahead)[0] == pytest.approx(headings_of(behind)[0], abs=1e-12)
+
+
+def test_history_is_linear_between_its_rows_and_constant_before_them():
+    past = History(0.1)
+    past.start((0.0, 1.0, 2.0, 3.0))
+    for n in range(1, 101):
+        past.add((0.01 * n, 1.0 + n, 2.0 - n, 3.0 + n * n))
+    assert past.at(0.955) == pytest.approx((96.5, -93.5, 3.0 + (95**2 + 96**2) / 2))
+    assert past.at(0.9) == pytest.approx((91.0, -88.0, 3.0 + 90**2))
+    assert past.at(1.0) == (101.0, -98.0, 3.0 + 100**2)
+    past.start((0.0, 1.0, 2.0, 3.0))
+    past.add((0.01, 2.0, 3.0, 4.0))
+    assert past.at(-5.0) == (1.0, 2.0, 3.0)
+    assert past.at(0.005) == pytest.approx((1.5, 2.5, 3.5))
