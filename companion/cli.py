@@ -18,8 +18,9 @@ from typing import Any, get_args
 from rich.console import Console
 
 from companion import demo
-from companion.config import Config, FlightConfig
+from companion.config import Config
 from companion.config_file import changed, json_schema, load
+from companion.config_sections import FlightConfig
 from companion.extras import MissingExtraError
 from companion.flight.assembly import link_settings
 from companion.flight.session import Session

@@ -18,6 +18,7 @@ from companion.flight.safety import Fence, SafetyMonitors
 from companion.flight.watch import Watch
 from companion.guidance import (
     Circle,
+    Corners,
     HoldGains,
     Hover,
     HoverThrust,
@@ -84,6 +85,9 @@ def programme(config: Config) -> Sequence:
     """The programmes of `flight.programme`, one after the other."""
     known: dict[str, Programme] = {
         "hover": Hover(config.hover.duration_s),
+        "corners": Corners(
+            config.corners.coefficient, config.corners.duration_s, config.corners.settle_s
+        ),
         "steps": Steps(config.steps.coefficient, config.steps.duration_s, config.steps.settle_s),
         "circle": Circle(config.circle.radius_m, config.circle.speed_m_s, config.circle.laps),
     }

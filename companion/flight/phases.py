@@ -4,7 +4,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from companion.config import FlightConfig
+from companion.config_sections import FlightConfig
 from companion.flight import preparation, procedures
 from companion.flight.ending import Exit
 from companion.flight.rig import Rig

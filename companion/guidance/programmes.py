@@ -85,6 +85,53 @@ class Steps:
 
 
 @dataclass(frozen=True, slots=True)
+class Corners:
+    """Acceleration steps between the corners of a square, none of them through level.
+
+    There the methods differ, as in the paper's figure 2; steps through level run straight with any
+    of them. Twice round, the second time mirrored, brings the vehicle, on an ideal response, back
+    to where it was and to rest; what remains is taken out by position hold for `settle` seconds.
+
+    Attributes:
+        coefficient: of each axis; the tilt at a corner has the sine √2 times this.
+        step: how long each corner is held, s.
+        settle: s.
+    """
+
+    coefficient: float
+    step: float
+    settle: float
+    name: str = "corners"
+
+    CORNERS = (
+        (1.0, 1.0),
+        (-1.0, 1.0),
+        (-1.0, -1.0),
+        (1.0, -1.0),
+        (1.0, -1.0),
+        (-1.0, -1.0),
+        (-1.0, 1.0),
+        (1.0, 1.0),
+    )
+
+    @property
+    def duration(self) -> float:
+        """All corners, and the settling, s."""
+        return len(self.CORNERS) * self.step + self.settle
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference: open-loop coefficients at the corners, then position hold."""
+        rest = Reference(start.position_ned, heading=start.heading)
+        which = int(max(time, 0.0) / self.step)
+        if which >= len(self.CORNERS):
+            return rest
+        north, east = self.CORNERS[which]
+        return rest._replace(
+            coefficients=Coefficients(self.coefficient * north, self.coefficient * east)
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Circle:
     """Laps of a circle that begins and ends, at rest, where the vehicle is; heading held.
 

@@ -34,6 +34,8 @@ def config(tmp_path, text):
         ("limits: {min_thrust: 0.9}", "min_thrust must be below max_thrust"),
         ("planner: {name: so4}", "unknown planner 'so4'"),
         ("planner: {gain_per_s: .nan}", "finite"),
+        ("planner: {name: model-following}", "needs vehicle.lag_ms and vehicle.dead_time_ms"),
+        ("flight: {programme: [corners]}\nlimits: {max_tilt_deg: 25}", "√2 × corners.coefficient"),
         ("flight: {programme: [loop]}", "`flight.programme.0`"),
         ("flight: {programme: []}", "`flight.programme`"),
         ("steps: {settle_s: .inf}", "`steps.settle_s`"),

@@ -5,7 +5,14 @@ import math
 import pytest
 from pymavlink import mavutil
 
-from companion.attitude import LAW_NAMES, Limits, make_planner
+from companion.attitude import (
+    LAW_NAMES,
+    Coefficients,
+    Limits,
+    Target,
+    attitude,
+    make_planner,
+)
 from companion.config_file import load
 from companion.flight import assembly
 from tests.flight.fly import fly, mock_vehicle
@@ -52,6 +59,45 @@ def test_every_setpoint_is_within_the_limits(flown):
     tilt_rates, yaw_rates = zip(*asked, strict=True)
     assert 30.0 < max(tilt_rates) <= MAX_TILT_RATE * (1.0 + 1e-6)  # the wire is single precision
     assert max(yaw_rates) <= MAX_YAW_RATE * (1.0 + 1e-6)
+
+
+def cross_axis(folder, name):
+    """The largest movement across the steps of `corners`, flown with PX4's measured response."""
+    vehicle = {"lag_ms": 47, "dead_time_ms": 40, "yaw_lag_ms": 370, "yaw_dead_time_ms": 102}
+    with mock_vehicle(folder, seed=3) as mock:
+        summary = fly(
+            mock,
+            folder / "log",
+            planner={"name": name},
+            vehicle=vehicle,
+            flight={"programme": ["corners"], "takeoff_height_m": 5.0},
+        )
+    assert summary.result == "ok", summary.events
+    return summary.response().cross_axis_max
+
+
+def test_model_following_is_the_straightest_on_a_real_rate_loop(tmp_path):
+    across = {}
+    for name in ("model-following", "first-order", "quaternion"):
+        (tmp_path / name).mkdir()
+        across[name] = cross_axis(tmp_path / name, name)
+    assert across["model-following"] < across["first-order"] / 4
+    assert across["model-following"] < across["quaternion"] / 3
+
+
+def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
+    path = tmp_path / "vehicle.yaml"
+    path.write_text(
+        "planner: {name: model-following}\n"
+        "vehicle: {lag_ms: 30, dead_time_ms: 45, yaw_lag_ms: 90}\n"
+    )
+    q = attitude(Coefficients(0.1, 0.2), 0.3)
+    target = Target(0.3, -0.1, 0.5)
+    limits = Limits(*(math.radians(angle) for angle in (35, 90, 60)))
+    expected = make_planner(
+        "model-following", limits=limits, lag=0.03, dead_time=0.045, yaw_lag=0.09
+    )
+    assert assembly.planner(load(path)).rates(q, target, 0.01) == expected.rates(q, target, 0.01)
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance import Circle, Hover, Pose, Sequence, Steps
+from companion.guidance import Circle, Corners, Hover, Pose, Sequence, Steps
 
 START = Pose((3.0, -2.0, -5.0), 0.7)
 CIRCLES = [Circle(3.0, 2.0, 1.0), Circle(1.0, 3.0, 0.2), Circle(8.0, 0.5, 2.5)]
@@ -71,3 +71,19 @@ def test_sequence_plays_its_parts_in_order(time):
     assert within == pytest.approx(time - (edges[expected - 1] if expected else 0.0))
     assert sequence.at(time, START) == part.at(within, START)
     assert sequence.name == "hover, steps, circle"
+
+
+def test_corners_bring_an_ideal_vehicle_back_and_never_step_through_level():
+    corners = Corners(0.3, 1.0, 2.0)
+    dt = 1e-3
+    times = np.arange(0.0, corners.duration, dt) + 0.5 * dt
+    asked = [corners.at(float(t), START).coefficients for t in times]
+    assert asked[-1] is None
+    c = np.array([a for a in asked if a is not None])
+    velocity = np.cumsum(c, axis=0) * dt
+    assert velocity[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert np.sum(velocity, axis=0) * dt == pytest.approx([0.0, 0.0], abs=1e-2)
+    steps = np.diff(c, axis=0)
+    for k in np.flatnonzero(np.any(steps, axis=1)):
+        middle = 0.5 * (c[k] + c[k + 1])
+        assert np.abs(middle).max() == pytest.approx(0.3)  # half way it is not level

@@ -1,0 +1,261 @@
+"""The sections of the configuration, one a room: units in the key names, what each key means.
+
+Degrees and milliseconds live only here, for people; `companion.flight.assembly` turns them into SI.
+Every field's description is also what an editor shows, through the JSON Schema.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+
+from companion.attitude import PLANNER_NAMES
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: immutable, unknown keys refused, every key described."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+class LinkConfig(Section):
+    """How to reach the autopilot."""
+
+    endpoint: str = "udpin://0.0.0.0:14540"
+    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD."""
+    target_system: Annotated[int, Field(ge=1, le=255)] = 1
+    """System id of the autopilot; every other system is ignored."""
+    target_component: Annotated[int, Field(ge=1, le=255)] = 1
+    """Component id of the autopilot."""
+    source_system: Annotated[int, Field(ge=1, le=255)] = 1
+    """Our own system id; a companion computer shares its vehicle's."""
+    source_component: Annotated[int, Field(ge=1, le=255)] = 191
+    """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
+    signing_key_file: Path | None = None
+    """File whose first line is the passphrase: sign what we send, refuse what is not signed."""
+    lockstep: StrictBool = False
+    """Run on the bundled vehicle's clock, step by step. Never with a real vehicle."""
+    attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
+    """Asked of the autopilot for ATTITUDE_QUATERNION; the loop runs at what really arrives."""
+    min_attitude_rate_hz: Annotated[float, Field(ge=10.0)] = 50.0
+    """Refuse to fly if less than this arrives."""
+    position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
+    """Asked for LOCAL_POSITION_NED."""
+    min_position_rate_hz: Annotated[float, Field(ge=1.0)] = 10.0
+    """Refuse to fly if less than this arrives."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "LinkConfig":
+        if self.min_attitude_rate_hz > self.attitude_rate_hz:
+            raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
+        if self.min_position_rate_hz > self.position_rate_hz:
+            raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
+        if self.lockstep and not self.endpoint.startswith("udp"):
+            raise ValueError("lockstep is for the bundled vehicle, over a udp endpoint")
+        ours, theirs = self.source_component, self.target_component
+        if (self.source_system, ours) == (self.target_system, theirs):
+            raise ValueError("source_system and source_component are the autopilot's own")
+        return self
+
+
+class PlannerConfig(Section):
+    """The attitude law."""
+
+    name: Annotated[str, Field(json_schema_extra={"enum": list(PLANNER_NAMES)})] = "first-order"
+    """first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
+    error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
+    needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
+    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
+    """p: acceleration approaches its target with the time constant 1/p."""
+    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
+    """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
+    use gain_per_s for it."""
+
+    @model_validator(mode="after")
+    def _known_name(self) -> "PlannerConfig":
+        if self.name not in PLANNER_NAMES:
+            raise ValueError(f"unknown planner {self.name!r}; known: {', '.join(PLANNER_NAMES)}")
+        return self
+
+
+class VehicleConfig(Section):
+    """How the vehicle's own rate loop answers; `model-following` plans with it."""
+
+    lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """Time constant of the roll and pitch rates after their dead time."""
+    dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """From an attitude sample to the first effect of its answer on roll and pitch."""
+    yaw_lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """The same time constant for yaw; null: that of roll and pitch."""
+    yaw_dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """The same dead time for yaw; null: that of roll and pitch."""
+
+
+class LimitsConfig(Section):
+    """What we never ask of the vehicle, and where it may fly."""
+
+    max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 35.0
+    """Largest tilt of a target; longer targets are shortened along their direction."""
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 90.0
+    """Largest roll-pitch rate, as the length of the two."""
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 60.0
+    """Largest yaw rate."""
+    rate_limit: Literal["tight", "paper"] = "tight"
+    """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
+    recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
+    """Beyond this tilt first-order and exact first bring the thrust axis up, the shortest way."""
+    min_thrust: Share = 0.1
+    """Smallest normalised thrust sent in flight."""
+    max_thrust: Share = 0.9
+    """Largest normalised thrust sent."""
+    max_climb_m_s: Positive = 2.0
+    """Largest upward speed that height hold asks for."""
+    max_descent_m_s: Positive = 1.0
+    """Largest downward speed that height hold asks for."""
+    fence_radius_m: Positive = 50.0
+    """Farthest from where control began; beyond it we hand back and land."""
+    fence_ceiling_m: Positive = 30.0
+    """Highest above where control began."""
+    fence_floor_m: Positive = 1.0
+    """Lowest above home; below it we hand back and land."""
+    min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
+    """Below this: no arming, and in flight hand back and land."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "LimitsConfig":
+        if self.max_tilt_deg > self.recovery_angle_deg:
+            raise ValueError("max_tilt_deg must not exceed recovery_angle_deg")
+        if self.min_thrust >= self.max_thrust:
+            raise ValueError("min_thrust must be below max_thrust")
+        return self
+
+
+class DeadmanConfig(Section):
+    """When silence ends control. A setpoint leaves only in answer to fresh data."""
+
+    telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
+    """Attitude older than this is not answered, and counts as silence."""
+    target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
+    """Guidance older than this is not answered."""
+    position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
+    """Position older than this stops guidance, and so the setpoints."""
+    silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
+    """Control that stood still this long is not taken up again: hand back. Keep it below the
+    autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s)."""
+    deadline_ms: Positive = 4.0
+    """An answer that takes longer inside this process counts as a missed deadline."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "DeadmanConfig":
+        if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
+            raise ValueError("silence_limit_ms must be at least as long as the stale limits")
+        return self
+
+
+class GuidanceConfig(Section):
+    """Position and height hold above the attitude law: a PD with feed-forward."""
+
+    rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
+    """How often guidance makes a new target."""
+    position_gain_per_s2: NotNegative = 0.9
+    """Horizontal acceleration per metre of position error."""
+    velocity_gain_per_s: NotNegative = 1.6
+    """Horizontal acceleration per m/s of velocity error."""
+    height_gain_per_s: NotNegative = 1.5
+    """Vertical speed per metre of height error."""
+    climb_gain_per_s: NotNegative = 3.5
+    """Vertical acceleration per m/s of vertical speed error."""
+    drag_per_s: NotNegative = 0.0
+    """Linear drag per mass, fed forward on the reference's velocity."""
+
+
+class ThrustConfig(Section):
+    """From specific thrust in m/s² to the 0..1 that MAVLink carries."""
+
+    hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
+    """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER)."""
+    correction_limit: Annotated[float, Field(ge=0.0, le=0.6)] = 0.4
+    """How far flight may correct hover_thrust, as a share of it."""
+    correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
+    """Time constant of that correction."""
+
+
+class FlightConfig(Section):
+    """What to fly, and how long each phase may take."""
+
+    takeoff_height_m: Annotated[float, Field(ge=1.5, le=100.0)] = 5.0
+    """Height above home to which the autopilot takes off."""
+    programme: Annotated[
+        tuple[Literal["hover", "steps", "circle", "corners"], ...], Field(min_length=1)
+    ] = (
+        "hover",
+        "steps",
+        "circle",
+    )
+    """Flown in this order."""
+    arm: StrictBool = False
+    """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
+    connect_timeout_s: Seconds = 30.0
+    """Wait this long for a heartbeat."""
+    ready_timeout_s: Seconds = 60.0
+    """Wait this long for the autopilot's estimator and pre-arm checks."""
+    arming_timeout_s: Seconds = 60.0
+    """Wait this long for the vehicle to be armed."""
+    takeoff_timeout_s: Seconds = 40.0
+    """Wait this long to reach takeoff_height_m."""
+    landing_timeout_s: Seconds = 90.0
+    """Wait this long for the autopilot to report that it has landed."""
+
+
+class HoverConfig(Section):
+    """Programme `hover`: stay where control began."""
+
+    duration_s: Seconds = 3.0
+    """How long."""
+
+
+class StepsConfig(Section):
+    """Programme `steps`: acceleration doublets along north, east and a diagonal."""
+
+    coefficient: Annotated[float, Field(gt=0.0, le=0.7)] = 0.25
+    """Size of a step: horizontal acceleration per specific thrust, the sine of the tilt."""
+    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.0
+    """How long the first part of a doublet lasts; the middle part takes twice as long."""
+    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
+    """Position hold between doublets."""
+
+
+class CornersConfig(Section):
+    """Programme `corners`: acceleration steps past level, where the planners differ."""
+
+    coefficient: Annotated[float, Field(gt=0.0, le=0.45)] = 0.35
+    """Of each axis; the tilt at a corner has the sine √2 times this."""
+    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
+    """How long each corner is held."""
+    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
+    """Position hold at the end."""
+
+
+class CircleConfig(Section):
+    """Programme `circle`: laps at a steady speed, heading held."""
+
+    radius_m: Positive = 3.0
+    """Radius; the circle begins where the vehicle is and lies north of it."""
+    speed_m_s: Positive = 2.0
+    """Speed along the circle, reached and left smoothly."""
+    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
+    """How often round, gathering speed and braking included."""
+
+
+class RecordingConfig(Section):
+    """What is written down."""
+
+    directory: Path = Path("flights")
+    """Each flight makes a folder of its own in here."""
