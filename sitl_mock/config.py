@@ -3,9 +3,10 @@
 The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; see README.
 """
 
-from typing import Annotated
+from math import radians
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -52,6 +53,19 @@ class AirframeConfig(Section):
     """Time constant with which the landing gear levels the standing vehicle."""
 
 
+class AxisShaping(Section):
+    """How one axis shapes its rate setpoint before the controller sees it (ArduPilot)."""
+
+    acceleration_limit_rad_s2: Positive
+    """The shaped rate changes no faster."""
+    lag_ms: NonNegative = 0.0
+    """Time constant with which the shaped rate nears its setpoint, within that limit."""
+    attitude_gain_1_s: NonNegative = 4.5
+    """Body rate per angle from the attitude to the integral of the shaped rates."""
+    delay_ms: NonNegative = 0.0
+    """From a rate setpoint's arrival to the shaping."""
+
+
 class AxisGains(Section):
     """One axis of the body-rate controller: PI with feed-forward, and damping."""
 
@@ -68,7 +82,9 @@ class AxisGains(Section):
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
     setpoint_delay_ms: NonNegative = 7.0
-    """From a rate setpoint's arrival to the controller using it."""
+    """From a rate setpoint's arrival (or its shaping) to the controller using it."""
+    shaping: AxisShaping | None = None
+    """Before the controller: none, or for all three axes."""
 
 
 # Poles at wn 19.1 rad/s, zeta 0.70 (with the 50 ms rotor lag; fits the measured response together
@@ -87,13 +103,70 @@ YAW_GAINS = AxisGains(
     torque_filter_ms=75.0,
 )
 
+# Poles at wn 111 rad/s, zeta 0.88 (tilt) and 23.6, 0.96 (yaw). A body that lags its attitude target
+# would have to overshoot in rate to catch up; none was measured. So the negative feed-forward makes
+# the controller fall short by what the attitude gain then adds: steadily, the lag is kept.
+ARDUPILOT_TILT_GAINS = AxisGains(
+    proportional_n_m_s=15.3,
+    feed_forward_n_m_s=-1.39,
+    damping_n_m_s2=0.217,
+    setpoint_delay_ms=0.0,
+    shaping=AxisShaping(acceleration_limit_rad_s2=radians(1100.0), lag_ms=8.5, delay_ms=14.0),
+)
+ARDUPILOT_YAW_GAINS = AxisGains(
+    proportional_n_m_s=0.834,
+    feed_forward_n_m_s=-0.214,
+    damping_n_m_s2=0.0377,
+    setpoint_delay_ms=0.0,
+    shaping=AxisShaping(acceleration_limit_rad_s2=radians(270.0), lag_ms=36.0, delay_ms=125.0),
+)
+RATE_LOOPS = {
+    "px4": {"roll": TILT_GAINS, "pitch": TILT_GAINS, "yaw": YAW_GAINS},
+    "ardupilot": {
+        "roll": ARDUPILOT_TILT_GAINS,
+        "pitch": ARDUPILOT_TILT_GAINS,
+        "yaw": ARDUPILOT_YAW_GAINS,
+    },
+}
+"""What the words that may stand for a whole rate loop mean."""
+
 
 class RateLoopConfig(Section):
-    """The autopilot's body-rate controller, tuned to PX4's measured responses."""
+    """The autopilot's body-rate controller, tuned to PX4's measured responses.
+
+    The word `px4` or `ardupilot` in its place stands for all of it.
+    """
 
     roll: AxisGains = TILT_GAINS
     pitch: AxisGains = TILT_GAINS
     yaw: AxisGains = YAW_GAINS
+
+    @property
+    def shaping(self) -> tuple[AxisShaping, AxisShaping, AxisShaping] | None:
+        """How roll, pitch and yaw setpoints are shaped before the controller, if they are."""
+        roll, pitch, yaw = self.roll.shaping, self.pitch.shaping, self.yaw.shaping
+        return (roll, pitch, yaw) if roll and pitch and yaw else None
+
+    @classmethod
+    def ardupilot(cls) -> Self:
+        """Tuned to ArduPilot's measured responses, on the default airframe."""
+        return cls(**RATE_LOOPS["ardupilot"])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        if not isinstance(value, str):
+            return value
+        if value not in RATE_LOOPS:
+            raise ValueError(f"known rate loops are {', '.join(RATE_LOOPS)}")
+        return RATE_LOOPS[value]
+
+    @model_validator(mode="after")
+    def _shaped_whole(self) -> Self:
+        shaped = [axis.shaping is not None for axis in (self.roll, self.pitch, self.yaw)]
+        if any(shaped) and not all(shaped):
+            raise ValueError("shaping must be given for all three axes or for none")
+        return self
 
 
 class WindConfig(Section):

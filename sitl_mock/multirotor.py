@@ -7,6 +7,7 @@ from sitl_mock.config import AirframeConfig, RateLoopConfig
 from sitl_mock.physics import Load, Motion, advance, body_of, derivative
 from sitl_mock.quaternion import Quaternion, Vector
 from sitl_mock.rate_loop import RateLoop
+from sitl_mock.rate_shaping import RateShaping
 from sitl_mock.rotors import STOPPED, Mix, Rotors, mix
 
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -37,6 +38,7 @@ class Multirotor:
         "_mass",
         "_rate_hz",
         "_rate_loop",
+        "_shaping",
         "_tilt_torque",
         "_yaw_torque",
         "acceleration",
@@ -65,6 +67,8 @@ class Multirotor:
         self._tilt_torque = airframe.rotor_arm_m * per_throttle  # N m per throttle difference
         self._yaw_torque = airframe.rotor_drag_ratio_m * per_throttle
         self._body = body_of(airframe)
+        shaping = rate_loop.shaping
+        self._shaping = None if shaping is None else RateShaping(shaping, self.dt)
         self._rate_loop = RateLoop(rate_loop, self.dt)
         self.rotors = Rotors(airframe, self.dt)
         throttle = self.throttle(specific_thrust)
@@ -99,13 +103,16 @@ class Multirotor:
         """Controller, allocation and rotors of one step: what then acts on the body.
 
         Args:
-            setpoint: body rates, rad/s, FRD; a value that is not finite holds the present rate.
+            setpoint: body rates, rad/s, FRD; NaN holds the present rate, and so does infinity
+                unless the rate loop shapes its setpoints: then the rate runs away.
             throttle: collective; NaN or <= 0 stops the rotors, above 1 is full.
             controlled: whether the rate loop acts; without it, it idles.
             thrust_factor: on every rotor's thrust, for the battery's voltage.
             wind: the air's velocity, NED, m/s.
         """
         if controlled:
+            if self._shaping is not None:
+                setpoint = self._shaping.step(setpoint, self.motion[3:7])
             torques = self._rate_loop.step(
                 setpoint,
                 self.motion[7:],
@@ -114,6 +121,8 @@ class Multirotor:
                 yaw_saturated=self.mix.yaw_saturated,
             )
         else:
+            if self._shaping is not None:
+                self._shaping.idle(setpoint)
             self._rate_loop.idle(setpoint)
             torques = ZERO
         # Written so that a NaN throttle fails the comparison and stops the rotors.

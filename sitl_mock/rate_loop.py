@@ -1,11 +1,11 @@
 """The autopilot's body-rate controller: PI with feed-forward and damping on each axis."""
 
-from collections import deque
 from math import exp, isfinite
 from typing import NamedTuple
 
 from sitl_mock.config import AxisGains, RateLoopConfig
 from sitl_mock.quaternion import Vector
+from sitl_mock.setpoint_delay import SetpointDelay
 
 
 class AxisLaw(NamedTuple):
@@ -68,22 +68,20 @@ def axis_step(
 
 
 class RateLoop:
-    """The three axes, and the transport delay of their setpoints (to the nearest whole step).
+    """The three axes, and the transport delay of their setpoints.
 
     A setpoint that is NaN or infinite holds the present rate, as PX4 was measured to do: the axis
     sees no error, and a rolling vehicle rolls on. Setpoints are not clipped.
     """
 
-    __slots__ = ("_axes", "_delays", "_dt", "_laws")
+    __slots__ = ("_axes", "_delay", "_dt", "_laws")
 
     def __init__(self, config: RateLoopConfig, dt: float) -> None:
         self._dt = dt
         gains = (config.roll, config.pitch, config.yaw)
         self._laws = tuple(axis_law(axis, dt) for axis in gains)
-        self._delays = tuple(
-            deque([0.0] * steps, maxlen=steps)
-            for steps in (1 + round(axis.setpoint_delay_ms * 1e-3 / dt) for axis in gains)
-        )
+        roll, pitch, yaw = (axis.setpoint_delay_ms for axis in gains)
+        self._delay = SetpointDelay((roll, pitch, yaw), dt)
         self._axes = (AT_REST, AT_REST, AT_REST)
 
     def step(
@@ -96,11 +94,7 @@ class RateLoop:
         yaw_saturated: bool,
     ) -> Vector:
         """Torques about body x, y, z in N m for this step."""
-        roll_delay, pitch_delay, yaw_delay = self._delays
-        roll_delay.append(setpoint[0])
-        pitch_delay.append(setpoint[1])
-        yaw_delay.append(setpoint[2])
-        roll, pitch, yaw = roll_delay[0], pitch_delay[0], yaw_delay[0]
+        roll, pitch, yaw = self._delay.step(setpoint)
         p, q, r = rates
         p_dot, q_dot, r_dot = accelerations
         x_law, y_law, z_law = self._laws
@@ -114,6 +108,5 @@ class RateLoop:
 
     def idle(self, setpoint: Vector) -> None:
         """A step without control (disarmed, or standing): memory cleared, setpoints delayed."""
-        for delay, value in zip(self._delays, setpoint, strict=True):
-            delay.append(value)
+        self._delay.step(setpoint)
         self._axes = (AT_REST, AT_REST, AT_REST)

@@ -28,8 +28,8 @@ SLOW_STEP_S = 0.01
 class ActuatorCommand(NamedTuple):
     """What the autopilot's upper layers ask of the rate loop.
 
-    Rates in rad/s, body FRD, not clipped; NaN or infinite = hold the present rate. Thrust 0..1;
-    NaN or <= 0 = none, above 1 = full.
+    Rates in rad/s, body FRD, not clipped; NaN = hold the present rate, and so infinite with PX4's
+    rate loop (ArduPilot's spins away). Thrust 0..1; NaN or <= 0 = none, above 1 = full.
     """
 
     armed: bool

@@ -1,45 +1,67 @@
-"""Where a reference stood a while ago."""
+"""Where a plan stood a while ago, and where it goes on to."""
 
 from collections import deque
+from typing import NamedTuple
 
-Row = tuple[float, float, float, float]
-"""(time in s, north, east, heading in rad, unwrapped)."""
+
+class Planned(NamedTuple):
+    """The plan at one time.
+
+    Attributes:
+        time: s.
+        north, east: coefficients.
+        heading: rad, not wrapped.
+        still: integral of R_z, the yaw rate that kept the heading still on the way, rad.
+    """
+
+    time: float
+    north: float
+    east: float
+    heading: float
+    still: float
 
 
 class History:
-    """The last rows of a reference, over the longest delay that is asked for."""
+    """What was planned, over the longest delay that is asked for."""
 
     __slots__ = ("_rows", "_span")
 
     def __init__(self, span: float) -> None:
         self._span = span
-        self._rows: deque[Row] = deque()
+        self._rows: deque[Planned] = deque()
 
-    def start(self, row: Row) -> None:
-        """Forget all; before `row` the reference stood where it says."""
+    def start(self, row: Planned, motion: Planned) -> None:
+        """Forget all; up to `row` the plan moved evenly, by `motion` a second."""
         self._rows.clear()
+        self._rows.append(Planned(*(a - self._span * b for a, b in zip(row, motion, strict=True))))
         self._rows.append(row)
 
-    def add(self, row: Row) -> None:
+    def add(self, row: Planned) -> None:
         """A newer row; rows that no delay reaches are dropped."""
         rows = self._rows
         rows.append(row)
-        oldest = row[0] - self._span
-        while len(rows) > 1 and rows[1][0] <= oldest:
+        oldest = row.time - self._span
+        while len(rows) > 2 and rows[1].time <= oldest:
             rows.popleft()
 
-    def at(self, time: float) -> tuple[float, float, float]:
-        """(north, east, heading) at `time`, linear between rows, constant beyond either end."""
+    def at(self, time: float) -> Planned:
+        """The plan at `time`: linear between rows and beyond the newest, constant before all."""
         later = self._rows[-1]
-        if time >= later[0]:
-            return later[1:]
+        if time >= later.time:
+            return _between(self._rows[-2], later, time)
         for row in reversed(self._rows):
-            if row[0] <= time:
-                share = (time - row[0]) / (later[0] - row[0])
-                return (
-                    row[1] + share * (later[1] - row[1]),
-                    row[2] + share * (later[2] - row[2]),
-                    row[3] + share * (later[3] - row[3]),
-                )
+            if row.time <= time:
+                return row if row is later else _between(row, later, time)
             later = row
-        return later[1:]
+        return later
+
+
+def _between(a: Planned, b: Planned, time: float) -> Planned:
+    share = (time - a.time) / (b.time - a.time)
+    return Planned(
+        time,
+        a.north + share * (b.north - a.north),
+        a.east + share * (b.east - a.east),
+        a.heading + share * (b.heading - a.heading),
+        a.still + share * (b.still - a.still),
+    )

@@ -4,7 +4,7 @@ from math import sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.first_order import first_order
-from companion.attitude.history import History
+from companion.attitude.history import History, Planned
 from companion.attitude.kinematics import (
     heading_of,
     rates_to_speed,
@@ -23,6 +23,7 @@ SHARE_OF_LARGEST_GAIN = 0.35
 
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
 _LONGEST = 1.0  # s, of a lag or a dead time
+_MOMENT = 0.01  # s, over which the planned turn rate is taken
 _QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample rate
 
 
@@ -76,7 +77,7 @@ class ModelFollowingPlanner:
         )
         critical = 0.25 / constants.gain  # no overshoot, and no quicker than the rate loop
         self._model = ReferenceModel(constants, max(critical, self._lag), self._yaw_lag)
-        self._past = History(max(dead_time, yaw_dead_time))
+        self._past = History(max(dead_time, yaw_dead_time) + _MOMENT + LONGEST_SAMPLE)
         self._time = 0.0
         self._started = False
 
@@ -92,18 +93,19 @@ class ModelFollowingPlanner:
         """
         w, x, y, z = normalised(q)
         square, ax, ay = tilt_products(w, x, y, z)
-        north = east = turn_rate = 0.0
+        north = east = turn_rate = still = 0.0
         if body_rates is not None:
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
-        speed = Coefficients(north, east)
+            still = body_rates[2] - turn_rate
         # What is answered now takes effect one dead time later: the plan begins there.
-        c = Coefficients(
-            -2.0 * ay + self._dead_time * speed.north, 2.0 * ax + self._dead_time * speed.east
-        )
+        c = Coefficients(-2.0 * ay + self._dead_time * north, 2.0 * ax + self._dead_time * east)
         heading = heading_of(sqrt(square), w, z) + self._yaw_dead_time * turn_rate
-        self._model.place(c, speed, heading, turn_rate)
+        model = self._model
+        model.place(c, Coefficients(north, east), heading, turn_rate)
         self._time = 0.0
-        self._past.start((0.0, self._model.north, self._model.east, heading))
+        here = Planned(0.0, model.north, model.east, heading, 0.0)
+        motion = Planned(1.0, north, east, turn_rate, still)
+        self._past.start(here, motion)
         self._started = True
 
     def rates(
@@ -125,14 +127,13 @@ class ModelFollowingPlanner:
             return BodyRates(*first_order(q, target, dt, constants))
         if not self._started:
             self.reset(q, body_rates)
-        dt = min(max(dt, SHORTEST_SAMPLE), LONGEST_SAMPLE)
+        dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         heading = heading_of(sqrt(square), w, z)
         north_error, east_error, heading_error = self._errors(-2.0 * ay, 2.0 * ax, heading)
-        turn_rate = self._model.turn_rate
+        turn_rate = None
         if body_rates is not None:
             turn_rate = rates_to_speed(w, x, y, z, *body_rates)[2]
-        acting = heading + (self._dead_time + self._lag) * turn_rate
-        roll, pitch, yaw = self._feed_forward(target, acting, dt)
+        roll, pitch, yaw = self._feed_forward(target, heading, turn_rate, dt)
         more_roll, more_pitch, still = speed_to_rates(
             w,
             z,
@@ -160,28 +161,37 @@ class ModelFollowingPlanner:
         """
         north_error = east_error = heading_error = 0.0
         if self._time >= self._dead_time:
-            was_north, was_east, _ = self._past.at(self._time - self._dead_time)
-            north_error, east_error = was_north - north, was_east - east
+            was = self._past.at(self._time - self._dead_time)
+            north_error, east_error = was.north - north, was.east - east
         if self._time >= self._yaw_dead_time:
-            was_heading = self._past.at(self._time - self._yaw_dead_time)[2]
-            heading_error = wrap_angle(was_heading - heading)
+            was = self._past.at(self._time - self._yaw_dead_time)
+            heading_error = wrap_angle(was.heading - heading)
         return north_error, east_error, heading_error
 
     def _feed_forward(
-        self, target: Target, heading: float, dt: float
+        self, target: Target, heading: float, turn_rate: float | None, dt: float
     ) -> tuple[float, float, float]:
         """Move the plan on by a sample; the rates that follow it there, led by the lags.
 
-        `heading` is what the vehicle is expected to have when they act: a dead time later, and a
-        lag, for what is turned with the body has to be led as the rates themselves are.
+        At each end of the sample they are turned into the body at the heading that the vehicle is
+        expected to have when they act, so that what turns with the body is led with them.
         """
-        model = self._model
-        before = rates_along(model.north, model.east, heading, model.speed_north, model.speed_east)
-        turn_before = model.turn_rate
+        model, now = self._model, self._time
+        north, east, turn_before = model.north, model.east, model.turn_rate
+        speed_north, speed_east = model.speed_north, model.speed_east
+        still_before = rates_along(north, east, 0.0, speed_north, speed_east)[2]
         model.advance(target, dt)
+        still_after = rates_along(
+            model.north, model.east, 0.0, model.speed_north, model.speed_east
+        )[2]
         self._time += dt
-        self._past.add((self._time, model.north, model.east, model.heading))
-        after = rates_along(model.north, model.east, heading, model.speed_north, model.speed_east)
+        still = self._past.at(now).still + 0.5 * (still_before + still_after) * dt
+        self._past.add(Planned(self._time, model.north, model.east, model.heading, still))
+        change = self._unplanned_turn(turn_rate, now) - self._expected_heading(now)
+        first = heading + change + self._expected_heading(now + self._dead_time)
+        last = heading + change + self._expected_heading(now + self._dead_time + dt)
+        before = rates_along(north, east, first, speed_north, speed_east)
+        after = rates_along(model.north, model.east, last, model.speed_north, model.speed_east)
         lead, yaw_lead = self._lag / dt, self._yaw_lag / dt
         return (
             0.5 * (before[0] + after[0]) + lead * (after[0] - before[0]),
@@ -189,3 +199,24 @@ class ModelFollowingPlanner:
             0.5 * (before[2] + after[2] + turn_before + model.turn_rate)
             + yaw_lead * (after[2] - before[2] + model.turn_rate - turn_before),
         )
+
+    def _expected_heading(self, time: float) -> float:
+        """Heading by the plan at `time`, but for a constant, rad.
+
+        The turn that is planned comes a yaw dead time late; so does the yaw rate that is to keep
+        the heading still, while the tilting that needs it comes a roll-pitch dead time late.
+        """
+        by_yaw = self._past.at(time - self._yaw_dead_time)
+        return by_yaw.heading + by_yaw.still - self._past.at(time - self._dead_time).still
+
+    def _unplanned_turn(self, turn_rate: float | None, now: float) -> float:
+        """What the heading will turn beyond the plan until now's answer acts, rad.
+
+        As quickly as it is turning now beyond it; a dead time long, and a lag, for what turns with
+        the body has to be led as the rates are.
+        """
+        if turn_rate is None:
+            return 0.0
+        planned = self._expected_heading(now + 0.5 * _MOMENT)
+        planned -= self._expected_heading(now - 0.5 * _MOMENT)
+        return (self._dead_time + self._lag) * (turn_rate - planned / _MOMENT)

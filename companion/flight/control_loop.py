@@ -88,6 +88,7 @@ class ControlLoop:
         self._clock = SampleClock()
         self._last_time = -inf
         self._planned_at = -inf
+        self._period = 0.0
         self._gap_from = inf
 
     def resume(self) -> None:
@@ -134,7 +135,8 @@ class ControlLoop:
         since = sample.vehicle_time - self._planned_at
         if since > _LONGEST_STEP:
             self._planner.reset(sample.q, sample.body_rates)
-            since = dt
+            since = self._period or dt  # a gap says nothing of when the next sample comes
+        self._period = since
         self._planned_at = sample.vehicle_time
         return self._planner.rates(sample.q, target, since, sample.body_rates)
 

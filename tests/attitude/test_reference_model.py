@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from companion.attitude import Coefficients, Limits, Target
 from companion.attitude.constants import make_constants
-from companion.attitude.history import History
+from companion.attitude.history import History, Planned
 from companion.attitude.reference_model import ReferenceModel, rates_along
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
 
@@ -94,7 +94,7 @@ def test_a_step_moves_on_a_straight_line_within_the_limits(limits, dt):
     assert rows[-1, :2] == pytest.approx(GOAL, abs=2e-2 if limits.tilt_rate < 1.0 else 1e-3)
     r = attitudes(rows[:, :2], np.zeros(len(rows)))
     tilt_rate = np.hypot(*rate_between(r[:-1], r[1:], dt)[:, :2].T)
-    assert tilt_rate.max() <= 1.005 * limits.tilt_rate
+    assert tilt_rate.max() <= 1.03 * limits.tilt_rate
     speed = np.hypot(*rows[:, 2:4].T).max()
     if limits.shape == "paper":
         assert speed == pytest.approx(W_M * np.cos(np.radians(50)), rel=1e-2)
@@ -105,7 +105,7 @@ def test_a_step_moves_on_a_straight_line_within_the_limits(limits, dt):
 def test_the_tilt_limit_holds_for_a_motion_that_would_leave_it():
     limits = Limits(np.radians(40), W_M)
     longest = np.sin(np.radians(40))
-    rows = moved(placed((0.6, 0.0), limits, speed=(1.2, 0.8)), Target(0.5, 0.0, 0.3), 2.0, 0.01)
+    rows = moved(placed((0.63, 0.0), limits, speed=(1.5, 0.8)), Target(0.5, 0.0, 0.3), 2.0, 0.01)
     length = np.hypot(*rows[:, :2].T)
     assert length.max() <= longest * (1.0 + 1e-12)
     assert length.max() == pytest.approx(longest, rel=1e-6)  # it was tried
@@ -133,15 +133,16 @@ def test_its_rates_move_the_attitude_along_it():
         assert headings_of(ahead)[0] == pytest.approx(headings_of(behind)[0], abs=1e-12)
 
 
-def test_history_is_linear_between_its_rows_and_constant_before_them():
+def test_history_is_linear_between_its_rows_and_moves_evenly_before_and_beyond_them():
     past = History(0.1)
-    past.start((0.0, 1.0, 2.0, 3.0))
+    motion = Planned(1.0, 2.0, -1.0, 0.5, 4.0)
+    past.start(Planned(0.0, 1.0, 2.0, 3.0, 0.0), motion)
+    assert past.at(-0.05) == pytest.approx((-0.05, 0.9, 2.05, 2.975, -0.2))
+    assert past.at(-5.0)[1:] == pytest.approx((0.8, 2.1, 2.95, -0.4))  # no longer ago than the span
     for n in range(1, 101):
-        past.add((0.01 * n, 1.0 + n, 2.0 - n, 3.0 + n * n))
-    assert past.at(0.955) == pytest.approx((96.5, -93.5, 3.0 + (95**2 + 96**2) / 2))
-    assert past.at(0.9) == pytest.approx((91.0, -88.0, 3.0 + 90**2))
-    assert past.at(1.0) == (101.0, -98.0, 3.0 + 100**2)
-    past.start((0.0, 1.0, 2.0, 3.0))
-    past.add((0.01, 2.0, 3.0, 4.0))
-    assert past.at(-5.0) == (1.0, 2.0, 3.0)
-    assert past.at(0.005) == pytest.approx((1.5, 2.5, 3.5))
+        past.add(Planned(0.01 * n, 1.0 + n, 2.0 - n, 3.0 + n * n, 7.0))
+    middle = 3.0 + (95**2 + 96**2) / 2
+    assert past.at(0.955) == pytest.approx((0.955, 96.5, -93.5, middle, 7.0))
+    assert past.at(0.9) == pytest.approx((0.9, 91.0, -88.0, 3.0 + 90**2, 7.0))
+    assert past.at(1.0) == pytest.approx((1.0, 101.0, -98.0, 3.0 + 100**2, 7.0))
+    assert past.at(1.005)[1:3] == pytest.approx((101.5, -98.5))

@@ -1,0 +1,108 @@
+"""A vehicle whose rate loop answers late: dead time, then a first-order lag, on SciPy rotations.
+
+The judge of `model-following`, written from that one sentence; nothing of its maths is shared.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from companion.attitude import BodyRates
+from tests.attitude.independent import coefficients_of, headings_of
+
+LONGEST_STEP = 1e-3  # s
+
+
+class LagPlant:
+    """N vehicles sampled together; each τ·ω̇ = u(t − θ) − ω per axis, u held over each sample.
+
+    `lag` and `dead_time` are the τ and θ of (roll, pitch, yaw), s: (3,) or (N, 3). Rates are solved
+    exactly, also where u changes within a step; the attitude turns by their integral over at most
+    a millisecond. Before the start, u was `rates`, as was the answer.
+    """
+
+    def __init__(self, start, lag, dead_time, rates=(0.0, 0.0, 0.0)):
+        shape = (len(start), 3)
+        self.r = start
+        self._lag = np.maximum(np.broadcast_to(np.asarray(lag, dtype=float), shape), 1e-9)
+        self._dead_time = np.broadcast_to(np.asarray(dead_time, dtype=float), shape)
+        self.rates = np.broadcast_to(np.asarray(rates, dtype=float), shape)
+        self.true_rates = self.rates
+        self._time = 0.0
+        self._times = np.array([-np.inf])
+        self._commands = [self.rates]
+
+    def hold(self, command, dt, push=0.0):
+        """Hold `command` (N, 3) for `dt`; `push` (rad/s) turns the body without its rate loop."""
+        self._times = np.append(self._times, self._time)
+        self._commands.append(np.asarray(command, dtype=float))
+        commands = np.array(self._commands)
+        times = np.append(self._times, np.inf)
+        row, column = np.indices(self.rates.shape)
+        steps = int(np.ceil(dt / LONGEST_STEP - 1e-9))
+        h = dt / steps
+        for step in range(steps):
+            now = self._time + step * h - self._dead_time
+            which = np.searchsorted(times, now + 1e-9, side="right") - 1
+            first = np.clip(times[which + 1] - now, 0.0, h)
+            turned = self._answer(commands[which, row, column], first)
+            later = np.minimum(which + 1, len(commands) - 1)
+            turned = turned + self._answer(commands[later, row, column], h - first)
+            self.r = self.r * Rotation.from_rotvec(turned + np.asarray(push) * h)
+        self._time += dt
+        self.true_rates = self.rates + push
+
+    def _answer(self, command, seconds):
+        """Rates after so many seconds of a steady command; returns their integral."""
+        kept = np.exp(-seconds / self._lag)
+        turned = command * seconds + (self.rates - command) * self._lag * (1.0 - kept)
+        self.rates = command + (self.rates - command) * kept
+        return turned
+
+
+@dataclass
+class Flight:
+    """Of N vehicles in S samples: what was measured at each, and what was answered to it."""
+
+    c: np.ndarray  # (S + 1, N, 2)
+    heading: np.ndarray  # (S + 1, N) rad, unwrapped
+    rates: np.ndarray  # (S + 1, N, 3) rad/s, of the body
+    commands: np.ndarray  # (S, N, 3) rad/s
+    dt: float
+
+    @property
+    def t(self):
+        return np.arange(len(self.c)) * self.dt
+
+    @property
+    def tilt_commands(self):
+        return np.hypot(self.commands[..., 0], self.commands[..., 1])
+
+
+def fly(planners, plant, target_at, samples, dt, push_at=None):
+    """`planners[i]` flies vehicle i; `target_at(n)` gives the N targets of sample n.
+
+    `push_at(n)` are the disturbing rates (N, 3) until the next sample.
+    """
+    seen = [(plant.r, plant.true_rates)]
+    commands = []
+    for planner, q, w in zip(planners, *_measured(plant), strict=True):
+        planner.reset(q, w)
+    for n in range(samples):
+        measured = zip(planners, *_measured(plant), target_at(n), strict=True)
+        commands.append(np.array([p.rates(q, target, dt, w) for p, q, w, target in measured]))
+        plant.hold(commands[-1], dt, 0.0 if push_at is None else push_at(n))
+        seen.append((plant.r, plant.true_rates))
+    return Flight(
+        np.array([coefficients_of(r) for r, _ in seen]),
+        np.unwrap([headings_of(r) for r, _ in seen], axis=0),
+        np.array([rates for _, rates in seen]),
+        np.array(commands),
+        dt,
+    )
+
+
+def _measured(plant):
+    q = np.roll(plant.r.as_quat(), 1, axis=1).tolist()
+    return [tuple(row) for row in q], [BodyRates(*row) for row in plant.true_rates.tolist()]

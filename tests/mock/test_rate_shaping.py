@@ -1,0 +1,252 @@
+"""Body-rate responses of the shaped rate loop against those measured on ArduPilot."""
+
+from functools import cache
+from math import degrees, inf, isfinite, nan, radians
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.optimize import curve_fit
+from scipy.spatial.transform import Rotation
+
+from sitl_mock.__main__ import main
+from sitl_mock.config import AirframeConfig, AxisShaping, RateLoopConfig
+from sitl_mock.multirotor import Multirotor
+from sitl_mock.rate_shaping import RateShaping
+from sitl_mock.settings import MockSettings, load_settings
+from sitl_mock.vehicle import ActuatorCommand, Vehicle
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+REST = (0.0, 0.0, 0.0)
+GRAVITY = 9.80665
+DT = 1e-3
+ROLL, PITCH, YAW = range(3)
+TILT_LIMIT, YAW_LIMIT = 1100.0, 270.0  # measured, deg/s^2
+# Measured fits of the answer to a step of so many rad/s: first-order lag and dead time, ms.
+MEASURED = {
+    ROLL: {0.5: (18, 27), 1.0: (28, 34), 2.0: (48, 46)},
+    PITCH: {0.5: (18, 27), 1.0: (28, 34), 2.0: (48, 46)},
+    YAW: {0.5: (87, 184), 1.0: (101, 229), 2.0: (164, 293)},
+}
+# The same with the slew separated, ms: least and most lag, least and most dead time.
+SEPARATED = {ROLL: (15, 21, 14, 17), PITCH: (15, 21, 14, 17), YAW: (52, 75, 144, 171)}
+
+
+def vector(axis, value):
+    return tuple(value if each == axis else 0.0 for each in range(3))
+
+
+def hovering(rate_loop=None):
+    rate_loop = rate_loop or RateLoopConfig.ardupilot()
+    return Multirotor(AirframeConfig(), rate_loop, LEVEL, GRAVITY)
+
+
+def fly(multirotor, setpoint, seconds):
+    """Body rates before each step, (n, 3); lift holds what the level hover needs."""
+    throttle = multirotor.throttle(GRAVITY)
+    rates = []
+    for _ in range(round(seconds / DT)):
+        rates.append(multirotor.body_rates)
+        multirotor.move(multirotor.drive(setpoint, throttle))
+    return np.array(rates)
+
+
+def rotation(q):
+    return Rotation.from_quat([*q[1:], q[0]])
+
+
+@cache
+def response(axis, rate):
+    """Times in s and rates per setpoint; a roll of 2 rad/s comes to 57 degrees in its time."""
+    y = fly(hovering(), vector(axis, rate), 1.0 if axis == YAW else 0.5)[:, axis] / rate
+    return np.arange(len(y)) * DT, y
+
+
+def first_order(t, lag, dead_time):
+    return 1.0 - np.exp(-np.maximum(t - dead_time, 0.0) / lag)
+
+
+def first_order_of_a_ramp(t, lag, dead_time, ramp):
+    """The answer of a first-order lag to a setpoint that rises for `ramp` seconds."""
+
+    def since(start):
+        s = np.maximum(t - start, 0.0)
+        return s - lag * (1.0 - np.exp(-s / lag))
+
+    return (since(dead_time) - since(dead_time + ramp)) / ramp
+
+
+def fitted(model, t, y, start):
+    return curve_fit(model, t, y, p0=start, bounds=([1e-3, 0.0], [0.5, 0.5]))[0] * 1e3
+
+
+STEPS = [(axis, rate) for axis, steps in MEASURED.items() for rate in steps]
+
+
+@pytest.mark.parametrize(("axis", "rate"), STEPS)
+def test_the_answer_to_a_step_is_as_measured(axis, rate):
+    t, y = response(axis, rate)
+    measured = MEASURED[axis][rate]
+    assert fitted(first_order, t, y, np.array(measured) * 1e-3) == pytest.approx(measured, rel=0.1)
+    assert y.max() < 1.03
+
+
+@pytest.mark.parametrize(("axis", "rate"), STEPS)
+def test_with_the_slew_separated_it_does_not_depend_on_the_step(axis, rate):
+    t, y = response(axis, rate)
+    ramp = rate / radians(YAW_LIMIT if axis == YAW else TILT_LIMIT)
+    least_lag, most_lag, least_dead, most_dead = SEPARATED[axis]
+    start = np.array([least_lag, least_dead]) * 1e-3
+    lag, dead = fitted(lambda t, lag, dead: first_order_of_a_ramp(t, lag, dead, ramp), t, y, start)
+    assert least_lag <= lag <= most_lag
+    assert least_dead - 1.0 <= dead <= most_dead + 1.0
+
+
+def test_a_step_back_answers_as_the_step_did():
+    assert fly(hovering(), vector(PITCH, -1.0), 0.5)[:, PITCH] == pytest.approx(
+        -response(PITCH, 1.0)[1], abs=1e-6
+    )
+
+
+@pytest.mark.parametrize("axis", [ROLL, PITCH, YAW])
+def test_the_shaped_rate_never_changes_faster_than_the_limit(axis):
+    axes = RateLoopConfig.ardupilot().shaping
+    shaping = RateShaping(tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT)
+    rng = np.random.default_rng(4)
+    shaped = [0.0]
+    for _ in range(100):
+        setpoint = vector(axis, rng.uniform(-4.0, 4.0))
+        shaped += [shaping.step(setpoint, LEVEL)[axis] for _ in range(rng.integers(1, 300))]
+    fastest = max(abs(np.diff(shaped))) / DT
+    assert fastest == pytest.approx(radians(YAW_LIMIT if axis == YAW else TILT_LIMIT), rel=1e-6)
+
+
+@pytest.mark.parametrize("axis", [ROLL, PITCH, YAW])
+@pytest.mark.parametrize("rate", [0.5, -1.0, 2.0])
+def test_the_angle_reached_is_the_integral_of_the_command(axis, rate):
+    multirotor = hovering()
+    seconds = 1.0 if axis == YAW else 0.4  # longer than the slew, less than a half turn
+    fly(multirotor, vector(axis, rate), seconds)
+    fly(multirotor, REST, 2.0)
+    assert rotation(multirotor.q).as_rotvec()[axis] == pytest.approx(seconds * rate, rel=0.04)
+
+
+def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
+    """Against SciPy: the setpoints integrated, and seen from a body that does not move."""
+    axis = AxisShaping(acceleration_limit_rad_s2=1e6)
+    shaping = RateShaping((axis, axis, axis), DT)
+    body = Rotation.from_euler("ZYX", [0.7, -0.3, 0.2])
+    x, y, z, w = body.as_quat()
+    target = body
+    for setpoint in np.random.default_rng(7).uniform(-2.0, 2.0, (20, 3)):
+        for _ in range(50):
+            rates = shaping.step(tuple(setpoint), (w, x, y, z))
+            target = target * Rotation.from_rotvec(setpoint * DT)
+        ahead = body.inv() * target
+        expected = ahead.apply(setpoint) + axis.attitude_gain_1_s * ahead.as_rotvec()
+        assert np.array(rates) == pytest.approx(expected, abs=1e-5)
+
+
+def left_of_a_push(rate_loop):
+    """Angle in degrees, 2 s after something turned the vehicle at rest by 20 degrees."""
+    multirotor = hovering(rate_loop)
+    fly(multirotor, REST, 0.1)
+    x, y, z, w = Rotation.from_rotvec([20.0, 0.0, 0.0], degrees=True).as_quat()
+    multirotor.rest((w, x, y, z))
+    fly(multirotor, REST, 2.0)
+    return degrees(rotation(multirotor.q).magnitude())
+
+
+def test_after_a_push_the_attitude_returns_unlike_that_of_px4():
+    assert left_of_a_push(RateLoopConfig.ardupilot()) < 0.1
+    assert left_of_a_push(RateLoopConfig()) == pytest.approx(20.0, abs=0.1)
+
+
+@pytest.mark.parametrize("axis", [ROLL, PITCH, YAW])
+def test_a_rate_that_is_no_number_holds_the_present_rate(axis):
+    multirotor = hovering()
+    fly(multirotor, vector(axis, 0.5), 1.0)
+    held = fly(multirotor, vector(axis, nan), 0.5)
+    assert held == pytest.approx(np.tile(vector(axis, 0.5), (len(held), 1)), abs=0.01)
+    fly(multirotor, REST, 2.0)
+    assert multirotor.body_rates == pytest.approx(REST, abs=0.01)
+
+
+@pytest.mark.parametrize(("odd", "sign"), [(inf, 1.0), (-inf, -1.0)])
+def test_an_infinite_rate_makes_it_spin_away(odd, sign):
+    multirotor = hovering()
+    rates = fly(multirotor, vector(ROLL, odd), 0.5)[:, ROLL]
+    assert sign * rates[-1] > 6.0
+    assert np.isfinite(rates).all()
+
+
+def test_the_shaping_acts_only_after_its_delay():
+    multirotor = hovering()
+    delay = RateLoopConfig.ardupilot().roll.shaping.delay_ms * 1e-3
+    fly(multirotor, vector(ROLL, 1.0), delay)
+    assert len(set(multirotor.mix.throttles)) == 1
+    fly(multirotor, vector(ROLL, 1.0), DT)
+    assert len(set(multirotor.mix.throttles)) > 1
+
+
+@pytest.mark.parametrize("armed", [True, False])
+def test_nothing_is_shaped_while_standing_or_disarmed(armed):
+    """A target that had gone on turning would throw the vehicle as it lifts off."""
+    vehicles = [Vehicle(rate_loop=RateLoopConfig.ardupilot(), seed=0) for _ in range(2)]
+    for vehicle, rate in zip(vehicles, (2.0, 0.0), strict=True):
+        for _ in range(1000):
+            vehicle.step(ActuatorCommand(armed, rate, -rate, rate, 0.0))
+        for _ in range(500):  # longer than any delay
+            vehicle.step(ActuatorCommand(armed, 0.0, 0.0, 0.0, 0.0))
+        for _ in range(500):
+            vehicle.step(ActuatorCommand(True, 0.0, 0.0, 0.0, 0.6))
+    assert not vehicles[0].on_ground
+    assert vehicles[0].truth == vehicles[1].truth
+
+
+def test_it_stays_upright_in_gusty_commands_about_all_axes():
+    multirotor = hovering()
+    rng = np.random.default_rng(11)
+    for setpoint in rng.uniform(-1.0, 1.0, (40, 3)):
+        fly(multirotor, tuple(setpoint), 0.2)
+        fly(multirotor, tuple(-setpoint), 0.2)
+        assert max(map(abs, multirotor.body_rates)) < 3.0
+    fly(multirotor, REST, 2.0)
+    assert all(map(isfinite, multirotor.motion))
+    assert multirotor.body_rates == pytest.approx(REST, abs=1e-3)
+
+
+def test_one_word_in_the_configuration_chooses_it(tmp_path):
+    path = tmp_path / "mock.yaml"
+    path.write_text("mock: {rate_loop: ardupilot}")
+    assert load_settings(path, {}).rate_loop == RateLoopConfig.ardupilot()
+    path.write_text("mock: {rate_loop: px4}")
+    assert load_settings(path, {}) == MockSettings()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("ardupiolt", ("mock.rate_loop", "px4, ardupilot")),
+        (
+            "{roll: {proportional_n_m_s: 1, shaping: {acceleration_limit_rad_s2: 1}}}",
+            ("mock.rate_loop", "all three axes"),
+        ),
+        (
+            "{yaw: {proportional_n_m_s: 1, shaping: {acceleration_rad_s2: 1}}}",
+            ("mock.rate_loop.yaw.shaping",),
+        ),
+    ],
+)
+def test_mistakes_are_told(text, words, tmp_path, capsys):
+    path = tmp_path / "mock.yaml"
+    path.write_text(f"mock:\n  rate_loop: {text}\n")
+    assert main(["--config", str(path), "--check"]) == 2
+    errors = capsys.readouterr().err
+    assert all(word in errors for word in words)
+
+
+def test_part_of_the_axes_shaped_is_refused():
+    shaped = RateLoopConfig.ardupilot()
+    with pytest.raises(ValidationError, match="all three axes"):
+        RateLoopConfig(roll=shaped.roll)
