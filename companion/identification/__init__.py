@@ -1,0 +1,28 @@
+"""How a vehicle answers body rates and thrust, from what a flight has recorded; needs only NumPy.
+
+Commands stand at the vehicle time of the sample they answered, so that a dead time found here runs
+from a sample to the first effect of its answer: what `vehicle.dead_time_ms` means.
+"""
+
+from companion.identification.correlation import dead_time_by_correlation
+from companion.identification.fragment import vehicle_fragment
+from companion.identification.response import (
+    BadFitError,
+    FitNeeds,
+    FitQuality,
+    RateResponse,
+    fit_rate_response,
+)
+from companion.identification.thrust_map import ThrustMap, fit_thrust_map
+
+__all__ = [
+    "BadFitError",
+    "FitNeeds",
+    "FitQuality",
+    "RateResponse",
+    "ThrustMap",
+    "dead_time_by_correlation",
+    "fit_rate_response",
+    "fit_thrust_map",
+    "vehicle_fragment",
+]

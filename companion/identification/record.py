@@ -1,0 +1,67 @@
+"""Commands and what was measured of them, cut where control stood still."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+LONGEST_DEAD_TIME = 0.5
+"""The longest dead time that is looked for, s."""
+_LONGEST_HOLD = 0.5
+"""A command is taken as held this long, s; autopilots leave our control after about 1 s."""
+
+
+class Stretch(NamedTuple):
+    """Control without a pause: n commands, each held until the next, and m samples.
+
+    Attributes:
+        time: (n,), of the commands, s.
+        commanded: (n,).
+        measured_time: (m,), s; none is earlier than `LONGEST_DEAD_TIME` after the first command or
+            later than the last one, so that it is known what acts on it whatever the dead time.
+        measured: (m,), in the commands' unit.
+    """
+
+    time: Floats
+    commanded: Floats
+    measured_time: Floats
+    measured: Floats
+
+
+def stretches(
+    time: ArrayLike, commanded: ArrayLike, measured_time: ArrayLike, measured: ArrayLike
+) -> list[Stretch]:
+    """The stretches of a record that are long enough to hold a sample.
+
+    Args:
+        time: (n,), vehicle time of the sample that each command answered, s, in any order.
+        commanded: (n,); rows that are not finite are left out.
+        measured_time: (m,), vehicle time, s, in any order.
+        measured: (m,); rows that are not finite are left out.
+
+    Raises:
+        ValueError: a time series and its values are not two rows of equal length.
+    """
+    t, u = _series(time, commanded)
+    sampled, y = _series(measured_time, measured)
+    found = []
+    for part in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
+        if part.size == 0:
+            continue
+        first, last = t[part[0]], t[part[-1]]
+        inside = (sampled >= first + LONGEST_DEAD_TIME) & (sampled <= last)
+        if inside.any():
+            found.append(Stretch(t[part], u[part], sampled[inside], y[inside]))
+    return found
+
+
+def _series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:
+    t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if t.ndim != 1 or t.shape != v.shape:
+        raise ValueError(f"times {t.shape} and values {v.shape} must be two rows of equal length")
+    finite = np.isfinite(t) & np.isfinite(v)
+    t, v = t[finite], v[finite]
+    order = np.argsort(t, kind="stable")
+    return t[order], v[order]
