@@ -172,11 +172,11 @@ def _ratios(group: dict[str, float]) -> dict[str, float]:
 def _show(figures: dict[str, Any]) -> None:
     means = "compiled by numba" if figures["compiled"] else "in Python"
     table = Table(
-        title=f"ns a step (× baseline), the best of many; batches {means}",
-        caption="baseline: a bare Python call; for batches, a copy of their attitudes and targets",
+        title=f"ns a step and × baseline, the best of many; batches {means}",
+        caption="baseline: a bare Python call; of a batch, a copy of its attitudes and targets",
     )
     table.add_column("", no_wrap=True)
-    for heading in ("flight", "new target", *(f"batch {count:,}" for count in BATCHES)):
+    for heading in ("flight", "new target", *(f"of {count:,}" for count in BATCHES)):
         table.add_column(heading, justify="right", no_wrap=True)
     columns = [(figures[f"{key}_ns"], figures[f"{key}_ratio"]) for key in ("flight", "new_target")]
     columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCHES]
@@ -201,7 +201,7 @@ def _show(figures: dict[str, Any]) -> None:
 
 def _cell(ns: float, ratio: float | None) -> str:
     shown = _short(ns)
-    return shown if ratio is None else f"{shown} ({_short(ratio)}×)"
+    return shown if ratio is None else f"{shown} {ratio:.0f}×"
 
 
 def _short(number: float) -> str:
