@@ -20,12 +20,12 @@ from companion.config_sections import (
     LinkConfig,
     PlannerConfig,
     RecordingConfig,
-    Section,
     StepsConfig,
     ThrustConfig,
     VehicleConfig,
 )
 from companion.guidance.reference import GRAVITY
+from companion.yaml_file import Section
 
 
 class Config(Section):

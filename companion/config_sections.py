@@ -7,22 +7,15 @@ Every field's description is also what an editor shows, through the JSON Schema.
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from companion.attitude import PLANNER_NAMES
+from companion.yaml_file import Section
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
-
-
-class Section(BaseModel):
-    """A part of the configuration: immutable, unknown keys refused, every key described."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
 
 
 class LinkConfig(Section):

@@ -15,31 +15,31 @@ def quaternion(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), the short way round."""
-    gain = constants.gain
     north, east, heading, heading_rate = target
-    _, e_x, e_y, e_z = body_error(q, attitude_of(north, east, heading))
-    scale = 2.0 * gain
-    return within_limits(
-        scale * e_x,
-        scale * e_y,
-        scale * e_z + heading_rate,
-        constants.max_tilt_rate,
-        constants.max_yaw_rate,
-    )
+    error = body_error(q, attitude_of(north, east, heading))
+    return _along(error, 2.0 * constants.gain, heading_rate, constants)
 
 
 def so3(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
     """Body rates ω = p·Log(q⁻¹ ⊗ q_d)."""
-    gain = constants.gain
     north, east, heading, heading_rate = target
-    e_w, e_x, e_y, e_z = body_error(q, attitude_of(north, east, heading))
-    scale = gain * angle_per_sine(e_w, sqrt(e_x * e_x + e_y * e_y + e_z * e_z))
+    error = body_error(q, attitude_of(north, east, heading))
+    w, x, y, z = error
+    scale = constants.gain * angle_per_sine(w, sqrt(x * x + y * y + z * z))
+    return _along(error, scale, heading_rate, constants)
+
+
+def _along(
+    error: Quaternion, scale: float, heading_rate: float, constants: Constants
+) -> tuple[float, float, float]:
+    """Body rates of `scale` times the vector part of the error, within the limits."""
+    _, x, y, z = error
     return within_limits(
-        scale * e_x,
-        scale * e_y,
-        scale * e_z + heading_rate,
+        scale * x,
+        scale * y,
+        scale * z + heading_rate,
         constants.max_tilt_rate,
         constants.max_yaw_rate,
     )

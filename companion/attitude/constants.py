@@ -50,7 +50,7 @@ def make_constants(
     max_tilt = recovery_angle if limits.max_tilt is None else limits.max_tilt
     if max_tilt > recovery_angle:
         raise ValueError("max_tilt must not exceed the recovery angle")
-    max_speed = limits.tilt_rate * cos(max_tilt) if limits.shape == "paper" else inf
+    max_speed = limits.coefficient_speed
     return Constants(
         gain=gain,
         yaw_gain=yaw_gain,

@@ -3,7 +3,7 @@
 from math import asin, atan2, cos, exp, inf, sin, sqrt
 
 from companion.attitude.constants import Constants
-from companion.attitude.kinematics import heading_of, split
+from companion.attitude.kinematics import heading_of, into_body, split
 from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
 from companion.attitude.reference import distance_left
 from companion.attitude.rotation import angle_per_sine, short_way, within, within_limits
@@ -47,9 +47,9 @@ def exact(
         r_x, r_y, r_z = _rotation(
             a, tilt_x, tilt_y, north_left, east_left, part, turn, max_rate * dt, max_yaw_rate * dt
         )
-        cosine_heading, sine_heading = b * b - yaw_z * yaw_z, 2.0 * b * yaw_z
-        roll = share / dt * (cosine_heading * r_x + sine_heading * r_y)
-        pitch = share / dt * (cosine_heading * r_y - sine_heading * r_x)
+        roll, pitch = into_body(b * b - yaw_z * yaw_z, 2.0 * b * yaw_z, r_x, r_y)
+        roll *= share / dt
+        pitch *= share / dt
         yaw = share / dt * r_z
     if share < 1.0:
         a = a if a > SMALLEST_A else SMALLEST_A

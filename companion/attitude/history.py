@@ -44,6 +44,11 @@ class History:
         while len(rows) > 2 and rows[1].time <= oldest:
             rows.popleft()
 
+    @property
+    def newest(self) -> Planned:
+        """The plan as it was last added."""
+        return self._rows[-1]
+
     def at(self, time: float) -> Planned:
         """The plan at `time`: linear between rows and beyond the newest, constant before all."""
         later = self._rows[-1]

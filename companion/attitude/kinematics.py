@@ -53,6 +53,11 @@ def speed_to_rates(
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x, (ay * r_x - ax * r_y) * inverse
 
 
+def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float, float]:
+    """Horizontal rates seen from the heading with this cosine and sine (equation 28)."""
+    return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x
+
+
 def rates_to_speed(
     w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
 ) -> tuple[float, float, float]:

@@ -1,7 +1,7 @@
 """What a planner may ask of the vehicle."""
 
 from dataclasses import dataclass
-from math import inf, isfinite, pi
+from math import cos, inf, isfinite, pi
 from typing import Literal
 
 _LEAST = 1e-6
@@ -47,6 +47,13 @@ class Limits:
     def tilt_rate(self) -> float:
         """W_M in rad/s, infinite where there is no limit."""
         return inf if self.max_tilt_rate is None else self.max_tilt_rate
+
+    @property
+    def coefficient_speed(self) -> float:
+        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) in the paper's shape (33)."""
+        if self.shape != "paper" or self.max_tilt is None:
+            return inf
+        return self.tilt_rate * cos(self.max_tilt)
 
     @property
     def yaw_rate(self) -> float:

@@ -1,12 +1,13 @@
 """`model-following`: past the paper, a response that stays linear behind a real rate loop."""
 
-from math import sqrt
+from math import cos, sin, sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.first_order import first_order
 from companion.attitude.history import History, Planned
 from companion.attitude.kinematics import (
     heading_of,
+    into_body,
     rates_to_speed,
     speed_to_rates,
     tilt_products,
@@ -177,28 +178,30 @@ class ModelFollowingPlanner:
         expected to have when they act, so that what turns with the body is led with them.
         """
         model, now = self._model, self._time
-        north, east, turn_before = model.north, model.east, model.turn_rate
-        speed_north, speed_east = model.speed_north, model.speed_east
-        still_before = rates_along(north, east, 0.0, speed_north, speed_east)[2]
+        turn_before = model.turn_rate
+        x_before, y_before, still_before = self._planned_rates()
         model.advance(target, dt)
-        still_after = rates_along(
-            model.north, model.east, 0.0, model.speed_north, model.speed_east
-        )[2]
+        x_after, y_after, still_after = self._planned_rates()
         self._time += dt
-        still = self._past.at(now).still + 0.5 * (still_before + still_after) * dt
+        still = self._past.newest.still + 0.5 * (still_before + still_after) * dt
         self._past.add(Planned(self._time, model.north, model.east, model.heading, still))
         change = self._unplanned_turn(turn_rate, now) - self._expected_heading(now)
         first = heading + change + self._expected_heading(now + self._dead_time)
         last = heading + change + self._expected_heading(now + self._dead_time + dt)
-        before = rates_along(north, east, first, speed_north, speed_east)
-        after = rates_along(model.north, model.east, last, model.speed_north, model.speed_east)
+        x_before, y_before = into_body(cos(first), sin(first), x_before, y_before)
+        x_after, y_after = into_body(cos(last), sin(last), x_after, y_after)
         lead, yaw_lead = self._lag / dt, self._yaw_lag / dt
         return (
-            0.5 * (before[0] + after[0]) + lead * (after[0] - before[0]),
-            0.5 * (before[1] + after[1]) + lead * (after[1] - before[1]),
-            0.5 * (before[2] + after[2] + turn_before + model.turn_rate)
-            + yaw_lead * (after[2] - before[2] + model.turn_rate - turn_before),
+            0.5 * (x_before + x_after) + lead * (x_after - x_before),
+            0.5 * (y_before + y_after) + lead * (y_after - y_before),
+            0.5 * (still_before + still_after + turn_before + model.turn_rate)
+            + yaw_lead * (still_after - still_before + model.turn_rate - turn_before),
         )
+
+    def _planned_rates(self) -> tuple[float, float, float]:
+        """Rates that go with the plan as it stands, seen from heading 0, rad/s."""
+        model = self._model
+        return rates_along(model.north, model.east, model.speed_north, model.speed_east)
 
     def _expected_heading(self, time: float) -> float:
         """Heading by the plan at `time`, but for a constant, rad.

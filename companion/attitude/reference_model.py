@@ -14,10 +14,13 @@ _FURTHEST = sin(1.4)
 
 
 def rates_along(
-    north: float, east: float, heading: float, speed_north: float, speed_east: float
+    north: float, east: float, speed_north: float, speed_east: float
 ) -> tuple[float, float, float]:
-    """Body rates (rad/s) that move these coefficients at this speed (1/s), heading kept still."""
-    w, x, y, z = attitude_of(north, east, heading)
+    """Body rates (rad/s) that move these coefficients at this speed (1/s) at heading 0, kept still.
+
+    `kinematics.into_body` turns the first two to another heading; the third is the same at all.
+    """
+    w, x, y, z = attitude_of(north, east, 0.0)
     square, ax, ay = tilt_products(w, x, y, z)
     return speed_to_rates(
         w, z, ax, ay, 1.0 / square, 1.0 / (2.0 * square - 1.0), speed_east, -speed_north
@@ -97,7 +100,7 @@ class ReferenceModel:
         constants = self._constants
         v_north = constants.gain * (target.north - self.north)
         v_east = constants.gain * (target.east - self.east)
-        roll, pitch, _ = rates_along(self.north, self.east, 0.0, v_north, v_east)
+        roll, pitch, _ = rates_along(self.north, self.east, v_north, v_east)
         excess = constants.tilt_rate_weight * (roll * roll + pitch * pitch)
         excess = max(excess, constants.speed_weight * (v_north * v_north + v_east * v_east))
         scale = 1.0 / sqrt(excess) if excess > 1.0 else 1.0

@@ -3,10 +3,11 @@
 from math import hypot, radians, sin
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from companion.attitude import LAW_NAMES, Coefficients, Limits
 from companion.study.step import Step
+from companion.yaml_file import Section
 
 Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
@@ -15,15 +16,7 @@ MOST_STEPS = 5e6
 """Of the planner, or of the inner loop's physics: half a gigabyte, some minutes."""
 
 
-class _Section(BaseModel):
-    """Immutable, unknown keys refused, every key described."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
-
-
-class CaseLimits(_Section):
+class CaseLimits(Section):
     """Limits of the planners; null is no limit."""
 
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=75.0)] | None = None
@@ -36,7 +29,7 @@ class CaseLimits(_Section):
     """Which limit the proposed method uses; paper: equation 33, needs max_tilt_deg."""
 
 
-class Case(_Section):
+class Case(Section):
     """A step of the coefficients, and who shall fly it how."""
 
     start: Pair

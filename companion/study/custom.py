@@ -2,14 +2,20 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import cos
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude.reference import FirstOrderReference
 from companion.study.case import Case
-from companion.study.drawing import draw, draw_plane, draw_reference, draw_response, new_figure
+from companion.study.drawing import (
+    draw,
+    draw_plane,
+    draw_reference,
+    draw_response,
+    label_tilt_rate,
+    new_figure,
+)
 from companion.study.inner_loop import quickened
 from companion.study.measures import (
     cross_track,
@@ -116,10 +122,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 
 def _reference(case: Case, rate_hz: float) -> Floats:
     """First order, with the limit of equation 33 where the case asks for it."""
-    limits = case.planner_limits()
-    model = FirstOrderReference(case.gain_per_s)
-    if limits.shape == "paper" and limits.max_tilt is not None:
-        model = FirstOrderReference(case.gain_per_s, limits.tilt_rate * cos(limits.max_tilt))
+    model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
 
 
@@ -161,11 +164,7 @@ def _figure(case: Case, flown: dict[tuple[Method, float], Response]) -> Figure:
         draw(rate, step.time[:-1], response.tilt_rate[:, at[m]], m.line)
     across.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")
     away.set(title="Distance from the reference", xlabel="time, s", ylabel="|c − reference|")
-    rate.set(
-        title="Tilt rate commanded",
-        xlabel="time, s",
-        ylabel=r"$\sqrt{\omega_x^2+\omega_y^2}$, rad/s",
-    )
+    label_tilt_rate(rate, "Tilt rate commanded")
     limit = case.planner_limits().max_tilt_rate
     if limit is not None:
         rate.axhline(limit, **LIMIT)

@@ -48,8 +48,18 @@ def draw_response(
     for method, label, c in curves:
         for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
             draw(axes, time, values, method.line, label)
+    label_response(north, east)
+
+
+def label_response(north: Axes, east: Axes) -> None:
+    """Titles and units of the two panels of a response."""
     north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
     east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
+
+
+def label_tilt_rate(axes: Axes, title: str) -> None:
+    """Title and units of a panel of tilt rates."""
+    axes.set(title=title, xlabel="time, s", ylabel=r"$\sqrt{\omega_x^2+\omega_y^2}$, rad/s")
 
 
 def draw_reference(

@@ -15,6 +15,7 @@ from companion.study.drawing import (
     new_figure,
 )
 from companion.study.measures import (
+    best_and_worst,
     cross_track,
     deviation,
     heading_effect,
@@ -96,8 +97,7 @@ def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell,
     if effect < _SAME:
         return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
     rows: list[tuple[Cell, ...]] = []
-    ranked = np.round(away, 9)  # opposite headings are equal but for rounding: the first counts
-    for words, index in (("best", int(ranked.argmin())), ("worst", int(ranked.argmax()))):
+    for words, index in zip(("best", "worst"), best_and_worst(away), strict=True):
         at = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
         rows.append((at, float(away[index]), float(across[index]), float(arrived[index]), effect))
     return rows
@@ -105,7 +105,7 @@ def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell,
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_2.time
-    worst = int(largest_deviation(responses[EULER], reference).argmax())
+    _, worst = best_and_worst(largest_deviation(responses[EULER], reference))
     at = {method: worst if method is EULER else 0 for method in PAPERS}
     curves = [
         (

@@ -8,8 +8,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from companion.study.drawing import draw, draw_reference, new_figure
-from companion.study.measures import cross_track, largest_deviation
+from companion.study.drawing import draw, draw_reference, label_response, new_figure
+from companion.study.measures import best_and_worst, cross_track, largest_deviation
 from companion.study.methods import EULER, PROPOSED, planner_of
 from companion.study.outcome import Finding, Outcome, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
@@ -28,8 +28,7 @@ def run(tick: Tick) -> Outcome:
     response = fly(planner_of(EULER, FIGURE_2.gain), FIGURE_2)
     reference = FIGURE_2.reference()
     away, across = largest_deviation(response, reference), cross_track(response)
-    ranked = np.round(away, 9)  # opposite headings are equal but for rounding: the first counts
-    best, worst = int(ranked.argmin()), int(ranked.argmax())
+    best, worst = best_and_worst(away)
     tick(PROPOSED.label)
     proposed = largest_deviation(fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference)
     at = [round(degrees(heading)) for heading in FIGURE_2.headings]
@@ -75,8 +74,7 @@ def _figure(response: Response, reference: Floats) -> Figure:
         draw(east, time, c[:, 1], line)
         draw(plane, c[:, 1], c[:, 0], line)
     draw_reference(north, east, time, reference)
-    north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
-    east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
+    label_response(north, east)
     plane.set(
         title="Paths (a straight line at $a_E$ = −0.5 is asked)", xlabel="$a_E$", ylabel="$a_N$"
     )

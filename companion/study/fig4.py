@@ -1,14 +1,21 @@
 """Figure 4: the step under a limit of the tilt rate."""
 
 from dataclasses import replace
-from math import cos, pi, radians
+from math import pi, radians
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Limits
 from companion.attitude.reference import FirstOrderReference
-from companion.study.drawing import draw, draw_plane, draw_reference, new_figure
+from companion.study.drawing import (
+    draw,
+    draw_plane,
+    draw_reference,
+    label_response,
+    label_tilt_rate,
+    new_figure,
+)
 from companion.study.measures import cross_track, largest_deviation, largest_tilt_rate, time_to
 from companion.study.methods import (
     EULER,
@@ -36,14 +43,13 @@ PARTS = len(_METHODS)
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 4 with every method, the proposed one with both of its limits."""
     tight = Limits(MAX_TILT, MAX_TILT_RATE)
+    paper = replace(tight, shape="paper")
     responses = {}
     for method in _METHODS:
         tick(method.label)
-        limits = replace(tight, shape="paper") if method is PAPER_LIMIT else tight
+        limits = paper if method is PAPER_LIMIT else tight
         responses[method] = fly(planner_of(method, FIGURE_4.gain, limits), FIGURE_4)
-    reference = FIGURE_4.reference(
-        FirstOrderReference(FIGURE_4.gain, MAX_TILT_RATE * cos(MAX_TILT))
-    )
+    reference = FIGURE_4.reference(FirstOrderReference(FIGURE_4.gain, paper.coefficient_speed))
     return Outcome(
         name="fig4",
         title="Figure 4: step response with the tilt rate limited",
@@ -98,15 +104,9 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         draw(rate, time[:-1], responses[method].tilt_rate[:, at[method]], method.line)
     draw_reference(north, east, time, reference, "reference, equation 33")
     rate.axhline(MAX_TILT_RATE, **LIMIT)
-    north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
-    east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
-    rate.set(
-        title="Tilt rate and its limit",
-        xlabel="time, s",
-        ylabel=r"$\sqrt{\omega_x^2+\omega_y^2}$, rad/s",
-        xlim=(0.0, 1.2),
-        ylim=(0.0, 1.8),
-    )
+    label_response(north, east)
+    label_tilt_rate(rate, "Tilt rate and its limit")
+    rate.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))
     draw_plane(plane, curves, np.array([FIGURE_4.start, FIGURE_4.target]))
     north.legend(loc="lower right")
     return figure

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from companion.study.drawing import draw, draw_plane, draw_reference, draw_response, new_figure
-from companion.study.fit import SecondOrderFit, fit_second_order, second_order_path
+from companion.study.fit import FIT_COLUMNS, SecondOrderFit, fit_second_order, second_order_path
 from companion.study.inner_loop import quickened
 from companion.study.measures import (
     cross_track,
@@ -86,9 +86,7 @@ def run(tick: Tick) -> Outcome:
                     "largest deviation from first order",
                     "cross-track",
                     "time to 5 %, s",
-                    "second order: dead time, ms",
-                    "second order: ω, rad/s",
-                    "second order: ζ",
+                    *FIT_COLUMNS,
                     "largest deviation from it",
                     "difference between headings",
                 ),
@@ -155,9 +153,7 @@ def _row(method: Method, loop: _Loop) -> tuple[Cell, ...]:
         float(largest_deviation(response, STEP.reference()).max()),
         float(cross_track(response).max()),
         float(time_to(response).max()),
-        1e3 * fit.dead_time,
-        fit.model.frequency,
-        fit.model.damping,
+        *fit.cells,
         _from_second_order(method, loop),
         heading_effect(response),
     )

@@ -15,11 +15,19 @@ _REST = Coefficients(0.0, 0.0)
 _LONGEST_DEAD_TIME = 0.5  # s
 
 
+FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
+
+
 class SecondOrderFit(NamedTuple):
     """A second-order model that begins to move `dead_time` seconds after the step."""
 
     model: SecondOrderReference
     dead_time: float
+
+    @property
+    def cells(self) -> tuple[float, float, float]:
+        """What stands in a table under `FIT_COLUMNS`."""
+        return 1e3 * self.dead_time, self.model.frequency, self.model.damping
 
 
 def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:

@@ -5,8 +5,8 @@ from math import cos, degrees, pi, radians, sin
 import numpy as np
 from matplotlib.figure import Figure
 
-from companion.attitude import Coefficients, attitude
-from companion.attitude.kinematics import speed_to_rates, tilt_products
+from companion.attitude import Coefficients
+from companion.attitude.reference_model import rates_along
 from companion.study.drawing import new_figure
 from companion.study.methods import PROPOSED, REFERENCE
 from companion.study.outcome import Finding, Outcome, Tick
@@ -23,12 +23,7 @@ _DIRECTIONS = 72
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
     """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) for coefficients that move towards `direction` (rad)."""
-    w, x, y, z = attitude(c, 0.0)
-    square, ax, ay = tilt_products(w, x, y, z)
-    # e_x = d(2ax)/dt is the east component, e_y = d(2ay)/dt the south component.
-    roll, pitch, _ = speed_to_rates(
-        w, z, ax, ay, 1.0 / square, 1.0 / (2.0 * square - 1.0), sin(direction), -cos(direction)
-    )
+    roll, pitch, _ = rates_along(c.north, c.east, cos(direction), sin(direction))
     return roll * roll + pitch * pitch
 
 

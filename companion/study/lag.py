@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 
 from companion.attitude import Limits, Planner, make_planner
 from companion.study.drawing import draw, draw_plane, new_figure
-from companion.study.fit import fit_second_order, second_order_path
+from companion.study.fit import FIT_COLUMNS, SecondOrderFit, fit_second_order, second_order_path
 from companion.study.inner_loop import InnerLoop
 from companion.study.lag_loop import LagLoop
 from companion.study.measures import cross_track, largest_deviation, largest_tilt_rate, time_to
 from companion.study.methods import EXACT, FOLLOWING, PAPERS, PROPOSED, QUATERNION, Method
 from companion.study.outcome import Finding, Outcome, Tick
-from companion.study.step import FIGURE_2, Response, Step, fly_loop
+from companion.study.step import FIGURE_2, Response, fly_loop
 from companion.study.table import Cell, Table
 
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
@@ -40,6 +40,14 @@ _COMPLETE_RESPONSE = {
 """First order and dead time as fitted to the measured PX4, and the transport delay, s."""
 
 PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 4
+
+
+class _Complete(NamedTuple):
+    """One planner with the complete inner loop, and the second-order model it comes nearest to."""
+
+    response: Response
+    fit: SecondOrderFit
+    from_fit: float  # largest deviation from that model
 
 
 class _Row(NamedTuple):
@@ -104,14 +112,8 @@ def run(tick: Tick) -> Outcome:
     )
 
 
-def _planner(method: Method, loop: LagLoop, limits: Limits, error: float = 0.0) -> Planner:
-    """A planner; model-following knows the loop's times, wrong by `error` (0.5 = +50 %)."""
-    return _planner_knowing(
-        method, loop.lag_ms * (1.0 + error), loop.dead_time_ms * (1.0 + error), limits
-    )
-
-
-def _planner_knowing(method: Method, lag_ms: float, dead_time_ms: float, limits: Limits) -> Planner:
+def _planner(method: Method, lag_ms: float, dead_time_ms: float, limits: Limits) -> Planner:
+    """A planner; model-following believes the rate loop to have this lag and dead time."""
     known = {"lag": 1e-3 * lag_ms, "dead_time": 1e-3 * dead_time_ms}
     options = known if method is FOLLOWING else {}
     return make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
@@ -126,20 +128,23 @@ def _grid(tick: Tick) -> list[_Row]:
             for rate in RATES_HZ:
                 step = replace(_HEADING, rate_hz=rate)
                 for method in METHODS:
-                    response = fly_loop(_planner(method, loop, Limits()), step, loop)
+                    response = fly_loop(_planner(method, lag, dead_time, Limits()), step, loop)
                     rows.append(_Row(method, loop, rate, float(cross_track(response)[0])))
     return rows
 
 
 def _case(rate_hz: float) -> dict[Method, Response]:
     step = replace(_HEADING, rate_hz=rate_hz)
-    return {m: fly_loop(_planner(m, CASE, Limits()), step, CASE) for m in METHODS}
+    return {
+        m: fly_loop(_planner(m, CASE.lag_ms, CASE.dead_time_ms, Limits()), step, CASE)
+        for m in METHODS
+    }
 
 
 def _limited(rate_hz: float) -> Response:
     step = replace(_HEADING, rate_hz=rate_hz)
     limits = Limits(max_tilt_rate=_MAX_TILT_RATE)
-    return fly_loop(_planner(FOLLOWING, CASE, limits), step, CASE)
+    return fly_loop(_planner(FOLLOWING, CASE.lag_ms, CASE.dead_time_ms, limits), step, CASE)
 
 
 def _wrong_knowledge(rate_hz: float) -> dict[tuple[float, float], float]:
@@ -148,7 +153,7 @@ def _wrong_knowledge(rate_hz: float) -> dict[tuple[float, float], float]:
     out = {}
     for lag_error in ERRORS:
         for dead_error in ERRORS:
-            planner = _planner_knowing(
+            planner = _planner(
                 FOLLOWING,
                 CASE.lag_ms * (1.0 + lag_error),
                 CASE.dead_time_ms * (1.0 + dead_error),
@@ -158,10 +163,13 @@ def _wrong_knowledge(rate_hz: float) -> dict[tuple[float, float], float]:
     return out
 
 
-def _fly_complete(method: Method) -> Response:
+def _fly_complete(method: Method) -> _Complete:
     options = _COMPLETE_RESPONSE if method is FOLLOWING else {}
     planner = make_planner(method.planner, FIGURE_2.gain, limits=Limits(), **options)
-    return fly_loop(planner, _COMPLETE_STEP, _COMPLETE)
+    response = fly_loop(planner, _COMPLETE_STEP, _COMPLETE)
+    fit = fit_second_order(_COMPLETE_STEP, response.at(0))
+    model = second_order_path(_COMPLETE_STEP, fit, _COMPLETE_STEP.time)
+    return _Complete(response, fit, float(largest_deviation(response, model)[0]))
 
 
 def _case_table(case: dict[float, dict[Method, Response]], limited: dict[float, Response]) -> Table:
@@ -201,21 +209,7 @@ def _percent(error: float) -> str:
     return f"{100.0 * error:+.0f} %" if error else "right"
 
 
-def _complete_table(complete: dict[Method, Response]) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for method, response in complete.items():
-        fit = fit_second_order(_COMPLETE_STEP, response.at(0))
-        rows.append(
-            (
-                method.label,
-                float(cross_track(response)[0]),
-                float(time_to(response)[0]),
-                1e3 * fit.dead_time,
-                fit.model.frequency,
-                fit.model.damping,
-                _from_fit(_COMPLETE_STEP, response),
-            )
-        )
+def _complete_table(complete: dict[Method, _Complete]) -> Table:
     return Table(
         "lag-inner-loop",
         "The complete inner loop with 20 ms of transport delay, 250 Hz, heading 0, and the"
@@ -224,26 +218,27 @@ def _complete_table(complete: dict[Method, Response]) -> Table:
             "method",
             "cross-track",
             "time to 5 %, s",
-            "second order: dead time, ms",
-            "second order: ω, rad/s",
-            "second order: ζ",
+            *FIT_COLUMNS,
             "largest deviation from it",
         ),
-        tuple(rows),
+        tuple(
+            (
+                method.label,
+                float(cross_track(flown.response)[0]),
+                float(time_to(flown.response)[0]),
+                *flown.fit.cells,
+                flown.from_fit,
+            )
+            for method, flown in complete.items()
+        ),
     )
-
-
-def _from_fit(step: Step, response: Response) -> float:
-    """Largest deviation from the second-order model with dead time that comes nearest."""
-    model = second_order_path(step, fit_second_order(step, response.at(0)), step.time)
-    return float(largest_deviation(response, model)[0])
 
 
 def _figure(
     grid: list[_Row],
     case: dict[Method, Response],
     wrong: dict[tuple[float, float], float],
-    complete: dict[Method, Response],
+    complete: dict[Method, _Complete],
 ) -> Figure:
     figure, ((plane, time), (over_dead, over_lag), (over_error, path)) = new_figure(
         3, 2, height=3.1
@@ -287,7 +282,7 @@ def _figure(
         ylim=(0.0, None),
     )
     over_error.legend(ncols=2)
-    draw_plane(path, [(m, m.label, r.at(0)) for m, r in complete.items()], ends)
+    draw_plane(path, [(m, m.label, flown.response.at(0)) for m, flown in complete.items()], ends)
     path.set_title(f"{path.get_title()}, complete inner loop")
     return figure
 
@@ -296,14 +291,14 @@ def _findings(
     case: dict[float, dict[Method, Response]],
     wrong: dict[tuple[float, float], float],
     limited: dict[float, Response],
-    complete: dict[Method, Response],
+    complete: dict[Method, _Complete],
 ) -> tuple[Finding, ...]:
     across = {m: float(cross_track(r)[0]) for m, r in case[100.0].items()}
     others = [method for method in METHODS if method is not FOLLOWING]
     best = min(others, key=lambda method: across[method])
     rate = max(largest_tilt_rate(response) for response in limited.values())
-    bent = {m: float(cross_track(r)[0]) for m, r in complete.items()}
-    apart = {m: _from_fit(_COMPLETE_STEP, r) for m, r in complete.items()}
+    bent = {m: float(cross_track(flown.response)[0]) for m, flown in complete.items()}
+    apart = {m: flown.from_fit for m, flown in complete.items()}
     nearest = min(others, key=lambda method: apart[method])
     return (
         Finding(

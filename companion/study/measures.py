@@ -49,3 +49,12 @@ def heading_effect(response: Response) -> float:
     """Largest difference between the paths at any two headings: 0 where heading does not matter."""
     c = response.coefficients
     return float((c.max(axis=2) - c.min(axis=2)).max())
+
+
+def best_and_worst(values: Floats) -> tuple[int, int]:
+    """Indices of the least and the largest of (headings,) values.
+
+    Opposite headings are equal but for rounding: of those the first counts.
+    """
+    ranked = np.round(values, 9)
+    return int(ranked.argmin()), int(ranked.argmax())

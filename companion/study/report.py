@@ -27,10 +27,10 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
 
 
 def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write the page.
+    """Write the page, beside the figures that `write_outcome` wrote.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: it cannot be written, or a figure is not there.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("companion.study", "."),
@@ -42,7 +42,9 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
     page = environment.get_template("page.html.j2").render(
         outcomes=outcomes,
         images={
-            outcome.name: base64.b64encode(_image(outcome.figure, "svg")).decode("ascii")
+            outcome.name: base64.b64encode(
+                path.with_name(f"{outcome.name}.svg").read_bytes()
+            ).decode("ascii")
             for outcome in outcomes
         },
         version=version("mavlink-companion"),

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 from companion.attitude import Coefficients, Limits, Target
 from companion.attitude.constants import make_constants
 from companion.attitude.history import History, Planned
+from companion.attitude.kinematics import into_body
 from companion.attitude.reference_model import ReferenceModel, rates_along
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
 
@@ -124,7 +125,8 @@ def test_its_rates_move_the_attitude_along_it():
     """`rates_along`, by a small turn of a SciPy rotation: this speed, and the heading still."""
     rng = np.random.default_rng(4)
     for north, east, heading, *speed in rng.uniform(-0.65, 0.65, (50, 5)) * [1, 1, 4.8, 2, 2]:
-        rates = rates_along(north, east, heading, *speed)
+        r_x, r_y, r_z = rates_along(north, east, *speed)
+        rates = (*into_body(np.cos(heading), np.sin(heading), r_x, r_y), r_z)
         r = attitudes((north, east), heading)
         h = 1e-5
         ahead, behind = held(r, [rates], h), held(r, [rates], -h)
