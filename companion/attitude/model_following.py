@@ -1,9 +1,11 @@
 """`model-following`: past the paper, a response that stays linear behind a real rate loop."""
 
+from dataclasses import replace
 from math import cos, sin, sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.first_order import first_order
+from companion.attitude.heading_model import HeadingModel
 from companion.attitude.history import History, Planned
 from companion.attitude.kinematics import (
     heading_of,
@@ -13,18 +15,18 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.margin import largest_gain
-from companion.attitude.reference_model import ReferenceModel, rates_along
+from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.reference_model import ReferenceModel
 from companion.attitude.representation import normalised, wrap_angle
-from companion.attitude.rotation import within_limits
+from companion.attitude.rotation import within, within_limits
 from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
+from companion.attitude.yaw_model import YawModel
 
-SHARE_OF_LARGEST_GAIN = 0.35
-"""Of the largest stable gain, at most this is fed back: a gain margin of 2.9 or more."""
+SHARE_OF_LARGEST_GAIN = 0.25
+"""Of the largest stable gain, at most this is fed back: a gain margin of 4, and no overshoot."""
 
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
-_LONGEST = 1.0  # s, of a lag or a dead time
-_MOMENT = 0.01  # s, over which the planned turn rate is taken
 _QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample rate
 
 
@@ -35,50 +37,35 @@ class ModelFollowingPlanner:
     body rates that move the attitude along it in the middle of the coming sample, led by the lag of
     the rate loop (ω + τ·ω̇). They take effect one dead time later, so fed back is the difference of
     the measured coefficients from the plan as it stood one dead time ago, by the paper's law; that
-    way the loop does not fight its own delay. The gain of the feedback is p, but at most 0.35 of
-    what is stable for dead time and lag (`margin.largest_gain`): it stays stable as long as the
-    real largest gain is not less than 0.35 of the one believed. Heading is treated likewise.
+    way the loop does not fight its own delay. The gain of the feedback is p, but at most a quarter
+    of what is stable for dead time and lag (`margin.largest_gain`): it stays stable as long as the
+    real largest gain is more than a quarter of the one believed. Heading is treated likewise. A
+    larger gain would be stable too, and worse where the dead time is known wrongly.
+
+    Yaw answers slowly, so while the vehicle tilts its heading moves although it is asked to stand
+    still. It is foreseen from the yaw rates that were sent (`YawModel`), and the tilt rates are
+    turned into the body as it will stand when they act.
 
     Past the recovery angle it answers as `first-order` does, and starts anew below it.
 
     Args:
         constants: gains and limits.
-        lag: τ of the roll and pitch rate loop, s.
-        dead_time: from a sample's time to the beginning of the effect of the answer on roll and
-            pitch, s.
-        yaw_lag: τ of the yaw rate loop, s.
-        yaw_dead_time: the same as `dead_time` for yaw, s.
-
-    Raises:
-        ValueError: a lag or a dead time is negative, longer than 1 s, or not finite.
+        response: of the vehicle's rate loop.
     """
 
-    def __init__(
-        self,
-        constants: Constants,
-        lag: float,
-        dead_time: float,
-        yaw_lag: float,
-        yaw_dead_time: float,
-    ) -> None:
-        for name, value in (
-            ("lag", lag),
-            ("dead_time", dead_time),
-            ("yaw_lag", yaw_lag),
-            ("yaw_dead_time", yaw_dead_time),
-        ):
-            if not 0.0 <= value <= _LONGEST:
-                raise ValueError(f"{name} must be from 0 to {_LONGEST:g} s, not {value}")
+    def __init__(self, constants: Constants, response: RateResponse) -> None:
+        tilt, yaw = _no_quicker(response.tilt), _no_quicker(response.yaw)
         self._constants = constants
-        self._lag, self._yaw_lag = max(lag, _QUICKEST), max(yaw_lag, _QUICKEST)
-        self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
-        self._gain = min(constants.gain, SHARE_OF_LARGEST_GAIN * largest_gain(lag, dead_time))
-        self._yaw_gain = min(
-            constants.yaw_gain, SHARE_OF_LARGEST_GAIN * largest_gain(yaw_lag, yaw_dead_time)
-        )
+        self._tilt, self._yaw = tilt, yaw
+        self._frame_lead = response.frame_lead
+        self._gain = _fed_back(constants.gain, tilt)
+        self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
         critical = 0.25 / constants.gain  # no overshoot, and no quicker than the rate loop
-        self._model = ReferenceModel(constants, max(critical, self._lag), self._yaw_lag)
-        self._past = History(max(dead_time, yaw_dead_time) + _MOMENT + LONGEST_SAMPLE)
+        self._model = ReferenceModel(constants, max(critical, tilt.lag), tilt.acceleration)
+        self._heading = HeadingModel(constants, yaw)
+        self._body = YawModel(yaw)
+        self._past = History(max(tilt.dead_time, yaw.dead_time) + LONGEST_SAMPLE)
+        self._planned = (0.0, 0.0, 0.0)
         self._time = 0.0
         self._started = False
 
@@ -94,19 +81,23 @@ class ModelFollowingPlanner:
         """
         w, x, y, z = normalised(q)
         square, ax, ay = tilt_products(w, x, y, z)
-        north = east = turn_rate = still = 0.0
+        north = east = turn_rate = yaw_rate = 0.0
         if body_rates is not None:
+            yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
-            still = body_rates[2] - turn_rate
         # What is answered now takes effect one dead time later: the plan begins there.
-        c = Coefficients(-2.0 * ay + self._dead_time * north, 2.0 * ax + self._dead_time * east)
-        heading = heading_of(sqrt(square), w, z) + self._yaw_dead_time * turn_rate
+        ahead, yaw_ahead = self._tilt.dead_time, self._yaw.dead_time
+        c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
+        heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
         model = self._model
-        model.place(c, Coefficients(north, east), heading, turn_rate)
+        model.place(c, Coefficients(north, east))
+        self._heading.place(heading, turn_rate)
+        self._body.start(yaw_rate)
+        self._planned = model.rates()
         self._time = 0.0
-        here = Planned(0.0, model.north, model.east, heading, 0.0)
-        motion = Planned(1.0, north, east, turn_rate, still)
-        self._past.start(here, motion)
+        here = Planned(model.north, model.east, heading, 0.0, 0.0, yaw_rate)
+        motion = Planned(north, east, turn_rate, yaw_rate - turn_rate, yaw_rate, 0.0)
+        self._past.start(0.0, here, motion)
         self._started = True
 
     def rates(
@@ -129,97 +120,111 @@ class ModelFollowingPlanner:
         if not self._started:
             self.reset(q, body_rates)
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
-        heading = heading_of(sqrt(square), w, z)
-        north_error, east_error, heading_error = self._errors(-2.0 * ay, 2.0 * ax, heading)
-        turn_rate = None
-        if body_rates is not None:
-            turn_rate = rates_to_speed(w, x, y, z, *body_rates)[2]
-        roll, pitch, yaw = self._feed_forward(target, heading, turn_rate, dt)
-        more_roll, more_pitch, still = speed_to_rates(
-            w,
-            z,
-            ax,
-            ay,
-            1.0 / square,
-            1.0 / cosine,
-            self._gain * east_error,
-            -self._gain * north_error,
+        north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
+        by_tilt = self._past.at(self._time - self._tilt.dead_time)
+        by_yaw = self._past.at(self._time - self._yaw.dead_time)
+        north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
+        more_roll, more_pitch, more_yaw = speed_to_rates(
+            w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
+        if body_rates is not None:  # what turns beyond what was foreseen does so until this acts
+            unforeseen = body_rates.yaw - by_yaw.turning
+            heading += (self._tilt.dead_time + self._tilt.lag) * unforeseen
+        heading += by_tilt.still - by_yaw.turned
+        roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
         return BodyRates(
             *within_limits(
                 roll + more_roll,
                 pitch + more_pitch,
-                yaw + still + self._yaw_gain * heading_error,
+                yaw,
                 constants.max_tilt_rate,
                 constants.max_yaw_rate,
             )
         )
 
-    def _errors(self, north: float, east: float, heading: float) -> tuple[float, float, float]:
-        """From what was measured to the plan as it stood one dead time ago.
+    def _feedback(
+        self, by_tilt: Planned, by_yaw: Planned, north: float, east: float, heading: float
+    ) -> tuple[float, float, float]:
+        """Speed of the coefficients (1/s) and of the heading (rad/s), back towards the plan.
 
-        During the first dead time after a start nothing planned has had an effect yet.
+        The plan as it stood one dead time ago; during the first dead time after a start nothing
+        planned has had an effect yet.
         """
-        north_error = east_error = heading_error = 0.0
-        if self._time >= self._dead_time:
-            was = self._past.at(self._time - self._dead_time)
-            north_error, east_error = was.north - north, was.east - east
-        if self._time >= self._yaw_dead_time:
-            was = self._past.at(self._time - self._yaw_dead_time)
-            heading_error = wrap_angle(was.heading - heading)
-        return north_error, east_error, heading_error
+        speed_north = speed_east = turn = 0.0
+        if self._time >= self._tilt.dead_time:
+            speed_north = self._gain * (by_tilt.north - north)
+            speed_east = self._gain * (by_tilt.east - east)
+        if self._time >= self._yaw.dead_time:
+            turn = self._yaw_gain * wrap_angle(by_yaw.heading - heading)
+        return speed_north, speed_east, turn
 
     def _feed_forward(
-        self, target: Target, heading: float, turn_rate: float | None, dt: float
+        self, target: Target, heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
         """Move the plan on by a sample; the rates that follow it there, led by the lags.
 
-        At each end of the sample they are turned into the body at the heading that the vehicle is
-        expected to have when they act, so that what turns with the body is led with them.
+        Args:
+            target: admissible.
+            heading: when the answer acts, but for what is planned to turn until then, rad.
+            yaw_feedback: what is added to the yaw rate, rad/s.
+            dt: s.
         """
-        model, now = self._model, self._time
-        turn_before = model.turn_rate
-        x_before, y_before, still_before = self._planned_rates()
-        model.advance(target, dt)
-        x_after, y_after, still_after = self._planned_rates()
-        self._time += dt
-        still = self._past.newest.still + 0.5 * (still_before + still_after) * dt
-        self._past.add(Planned(self._time, model.north, model.east, model.heading, still))
-        change = self._unplanned_turn(turn_rate, now) - self._expected_heading(now)
-        first = heading + change + self._expected_heading(now + self._dead_time)
-        last = heading + change + self._expected_heading(now + self._dead_time + dt)
+        first = heading + self._to_turn()
+        x_before, y_before, still_before = self._planned
+        turn_before = self._heading.turn_rate
+        self._model.advance(target, dt)
+        self._heading.advance(target, dt)
+        x_after, y_after, still_after = self._planned = self._model.rates()
+        turn_after = self._heading.turn_rate
+        lead, yaw_lead = self._tilt.lag / dt, self._yaw.lag / dt
+        yaw = (
+            0.5 * (still_before + still_after + turn_before + turn_after)
+            + yaw_lead * (still_after - still_before + turn_after - turn_before)
+            + yaw_feedback
+        )
+        yaw = within(yaw, self._constants.max_yaw_rate)
+        self._body.advance(yaw, dt)
+        self._remember(0.5 * (still_before + still_after) * dt, dt)
+        last = heading + self._to_turn()
+        # At each end of the sample seen from the heading that the body is expected to have there,
+        # so that what turns with the body is led with it.
         x_before, y_before = into_body(cos(first), sin(first), x_before, y_before)
         x_after, y_after = into_body(cos(last), sin(last), x_after, y_after)
-        lead, yaw_lead = self._lag / dt, self._yaw_lag / dt
         return (
             0.5 * (x_before + x_after) + lead * (x_after - x_before),
             0.5 * (y_before + y_after) + lead * (y_after - y_before),
-            0.5 * (still_before + still_after + turn_before + model.turn_rate)
-            + yaw_lead * (still_after - still_before + model.turn_rate - turn_before),
+            yaw,
         )
 
-    def _planned_rates(self) -> tuple[float, float, float]:
-        """Rates that go with the plan as it stands, seen from heading 0, rad/s."""
-        model = self._model
-        return rates_along(model.north, model.east, model.speed_north, model.speed_east)
+    def _to_turn(self) -> float:
+        """How far the body will have turned by its yaw rate, less what keeps the heading, rad.
 
-    def _expected_heading(self, time: float) -> float:
-        """Heading by the plan at `time`, but for a constant, rad.
-
-        The turn that is planned comes a yaw dead time late; so does the yaw rate that is to keep
-        the heading still, while the tilting that needs it comes a roll-pitch dead time late.
+        When what is planned for now acts: one dead time of the tilt from now.
         """
-        by_yaw = self._past.at(time - self._yaw_dead_time)
-        return by_yaw.heading + by_yaw.still - self._past.at(time - self._dead_time).still
+        acts = self._time + self._tilt.dead_time + self._frame_lead
+        return self._past.turned_at(acts - self._yaw.dead_time) - self._past.newest.still
 
-    def _unplanned_turn(self, turn_rate: float | None, now: float) -> float:
-        """What the heading will turn beyond the plan until now's answer acts, rad.
+    def _remember(self, stilled: float, dt: float) -> None:
+        """Note the plan as it stands `dt` later; `stilled` rad of yaw keep its heading still."""
+        model, body, before = self._model, self._body, self._past.newest
+        self._time += dt
+        self._past.add(
+            self._time,
+            Planned(
+                model.north,
+                model.east,
+                self._heading.heading,
+                before.still + stilled,
+                body.turned,
+                body.rate,
+            ),
+        )
 
-        As quickly as it is turning now beyond it; a dead time long, and a lag, for what turns with
-        the body has to be led as the rates are.
-        """
-        if turn_rate is None:
-            return 0.0
-        planned = self._expected_heading(now + 0.5 * _MOMENT)
-        planned -= self._expected_heading(now - 0.5 * _MOMENT)
-        return (self._dead_time + self._lag) * (turn_rate - planned / _MOMENT)
+
+def _no_quicker(axis: AxisResponse) -> AxisResponse:
+    return replace(axis, lag=max(axis.lag, _QUICKEST))
+
+
+def _fed_back(gain: float, axis: AxisResponse) -> float:
+    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time)
+    return min(gain, stable)

@@ -1,6 +1,7 @@
 """The one way to a planner: by its name."""
 
 from collections.abc import Callable
+from math import inf
 from typing import Any, Protocol
 
 from companion.attitude.body_error import quaternion, so3
@@ -10,6 +11,7 @@ from companion.attitude.exact import exact
 from companion.attitude.first_order import first_order
 from companion.attitude.limits import Limits
 from companion.attitude.model_following import ModelFollowingPlanner
+from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.representation import normalised
 from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Quaternion, Target
@@ -71,15 +73,16 @@ _rates_of = tuple.__new__
 """BodyRates of a plain tuple, without the NamedTuple's own constructor: half its cost."""
 
 
+FIRST_ORDER = "first-order"
+MODEL_FOLLOWING = "model-following"
+
 _LAWS: dict[str, Law] = {
-    "first-order": first_order,
+    FIRST_ORDER: first_order,
     "exact": exact,
     "quaternion": quaternion,
     "so3": so3,
     "euler": euler,
 }
-
-MODEL_FOLLOWING = "model-following"
 
 LAW_NAMES = tuple(_LAWS)
 """The planners without memory, which a batch can map."""
@@ -103,8 +106,9 @@ def make_planner(
         limits: bounds on tilt and rates.
         options: what the named planner takes beyond these: `recovery_angle`, rad. Without
             `limits.max_tilt` it is also the largest tilt of a target, with every planner.
-            `model-following` takes `lag` and `dead_time` of the rate loop, s (0 by default: it
-            follows at once), `yaw_lag` and `yaw_dead_time` (those of roll and pitch by default).
+            `model-following` takes what `RateResponse` holds: `lag` and `dead_time` of the rate
+            loop, s (0 by default: it follows at once), `acceleration`, rad/s² (None: no limit), the
+            same with `yaw_` before them (those of roll and pitch by default), `frame_lead`, s.
 
     Raises:
         TypeError: an option that the planner does not take.
@@ -124,14 +128,19 @@ def _model_following(
     *,
     lag: float = 0.0,
     dead_time: float = 0.0,
+    acceleration: float | None = None,
     yaw_lag: float | None = None,
     yaw_dead_time: float | None = None,
+    yaw_acceleration: float | None = None,
+    frame_lead: float = 0.0,
     **options: Any,
 ) -> Planner:
-    return ModelFollowingPlanner(
-        make_constants(gain, yaw_gain, limits, **options),
-        lag,
-        dead_time,
+    tilt = AxisResponse(lag, dead_time, inf if acceleration is None else acceleration)
+    yaw = AxisResponse(
         lag if yaw_lag is None else yaw_lag,
         dead_time if yaw_dead_time is None else yaw_dead_time,
+        tilt.acceleration if yaw_acceleration is None else yaw_acceleration,
+    )
+    return ModelFollowingPlanner(
+        make_constants(gain, yaw_gain, limits, **options), RateResponse(tilt, yaw, frame_lead)
     )

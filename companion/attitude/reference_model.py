@@ -1,12 +1,10 @@
-"""The motion that `model-following` plans: second order, on straight lines, within the limits."""
+"""How `model-following` plans the tilt: second order, on straight lines, within the limits."""
 
-from math import exp, hypot, sin, sqrt
+from math import exp, hypot, inf, sin, sqrt
 
 from companion.attitude.constants import Constants
-from companion.attitude.kinematics import speed_to_rates, tilt_products
+from companion.attitude.kinematics import speed_to_rates
 from companion.attitude.reference import SecondOrderReference
-from companion.attitude.representation import wrap_angle
-from companion.attitude.rotation import attitude_of, within
 from companion.attitude.types import Coefficients, Target
 
 _FURTHEST = sin(1.4)
@@ -20,94 +18,115 @@ def rates_along(
 
     `kinematics.into_body` turns the first two to another heading; the third is the same at all.
     """
-    w, x, y, z = attitude_of(north, east, 0.0)
-    square, ax, ay = tilt_products(w, x, y, z)
+    cosine = sqrt(1.0 - north * north - east * east)
+    square = 0.5 + 0.5 * cosine  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
     return speed_to_rates(
-        w, z, ax, ay, 1.0 / square, 1.0 / (2.0 * square - 1.0), speed_east, -speed_north
+        sqrt(square),
+        0.0,
+        0.5 * east,
+        -0.5 * north,
+        1.0 / square,
+        1.0 / cosine,
+        speed_east,
+        -speed_north,
     )
 
 
 class ReferenceModel:
-    """c̈ = (v − ċ)/τ with v = p·(c_d − c) limited, and the heading likewise with its own τ.
+    """c̈ = (v − ċ)/τ with v = p·(c_d − c), limited.
 
     v is scaled as a whole, so a step moves on a straight line. It is limited such that the body
     rates that go with it stay within the limits; and since ċ + τ·c̈ = v, so does what is commanded,
-    led by the lag, where τ is the vehicle's.
+    led by the lag, where τ is at least the vehicle's. Where the autopilot limits the acceleration
+    of the rates it aims at, v changes no faster than that, and is never more than can be slowed
+    down in time: so the autopilot's limit is never felt.
 
     Args:
         constants: gains and limits.
-        lag: τ of the coefficients, s.
-        yaw_lag: τ of the heading, s.
+        lag: τ, s.
+        acceleration: the autopilot's limit, rad/s².
 
     Attributes:
         north, east: coefficients of the reference.
         speed_north, speed_east: their speed, 1/s.
-        heading: rad, not wrapped.
-        turn_rate: its speed, rad/s.
     """
 
     __slots__ = (
+        "_acceleration",
         "_constants",
         "_free",
         "_lag",
-        "_yaw_lag",
+        "_tilt_rate_weight",
+        "_v_east",
+        "_v_north",
         "east",
-        "heading",
         "north",
         "speed_east",
         "speed_north",
-        "turn_rate",
     )
 
-    def __init__(self, constants: Constants, lag: float, yaw_lag: float) -> None:
+    def __init__(self, constants: Constants, lag: float, acceleration: float = inf) -> None:
         self._constants = constants
         self._free = SecondOrderReference.with_lag(constants.gain, lag)
         self._lag = lag
-        self._yaw_lag = yaw_lag
-        self.north = self.east = self.speed_north = self.speed_east = 0.0
-        self.heading = self.turn_rate = 0.0
+        self._acceleration = acceleration
+        # Near the target v falls by p·v a second.
+        slowed_in_time = acceleration / constants.gain
+        self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
+        self.place(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
-    def place(self, c: Coefficients, speed: Coefficients, heading: float, turn_rate: float) -> None:
-        """Start with these coefficients, their speed (1/s), heading (rad) and its speed (rad/s)."""
+    def place(self, c: Coefficients, speed: Coefficients) -> None:
+        """Start with these coefficients and their speed (1/s)."""
         length = hypot(c.north, c.east)
         scale = _FURTHEST / length if length > _FURTHEST else 1.0
         self.north, self.east = scale * c.north, scale * c.east
-        self.speed_north, self.speed_east = speed
-        self.heading, self.turn_rate = heading, turn_rate
+        self.speed_north, self.speed_east = self._v_north, self._v_east = speed
+
+    def rates(self) -> tuple[float, float, float]:
+        """Body rates that go with the reference as it stands, at heading 0, rad/s."""
+        return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
     def advance(self, target: Target, dt: float) -> None:
         """Move on by `dt` seconds towards an admissible target."""
         north, east = self.north, self.east
-        v_north, v_east = self._demand(target)
-        if v_north == self._constants.gain * (target.north - north):
+        if self._aim(target, dt):
+            self._follow(dt)
+        else:
             (self.north, self.east), (self.speed_north, self.speed_east) = self._free.after(
                 Coefficients(north, east),
                 Coefficients(self.speed_north, self.speed_east),
                 Coefficients(target.north, target.east),
                 dt,
             )
-        else:
-            self._follow(v_north, v_east, dt)
         self._stay_inside(north, east, dt)
-        v = self._constants.yaw_gain * wrap_angle(target.heading - self.heading)
-        v = within(v + target.heading_rate, self._constants.max_yaw_rate)
-        kept = exp(-dt / self._yaw_lag)
-        self.heading += v * dt + (self.turn_rate - v) * self._yaw_lag * (1.0 - kept)
-        self.turn_rate = v + (self.turn_rate - v) * kept
 
-    def _demand(self, target: Target) -> tuple[float, float]:
-        """V = p·(c_d − c), scaled to the limits."""
+    def _aim(self, target: Target, dt: float) -> bool:
+        """Choose v for the coming sample; whether a limit shaped it."""
         constants = self._constants
         v_north = constants.gain * (target.north - self.north)
         v_east = constants.gain * (target.east - self.east)
         roll, pitch, _ = rates_along(self.north, self.east, v_north, v_east)
-        excess = constants.tilt_rate_weight * (roll * roll + pitch * pitch)
+        excess = self._tilt_rate_weight * (roll * roll + pitch * pitch)
         excess = max(excess, constants.speed_weight * (v_north * v_north + v_east * v_east))
-        scale = 1.0 / sqrt(excess) if excess > 1.0 else 1.0
-        return scale * v_north, scale * v_east
+        limited = excess > 1.0
+        if limited:
+            scale = 1.0 / sqrt(excess)
+            v_north *= scale
+            v_east *= scale
+        if self._acceleration < inf:
+            more_north, more_east = v_north - self._v_north, v_east - self._v_east
+            roll, pitch, _ = rates_along(self.north, self.east, more_north, more_east)
+            share = self._acceleration * dt / max(hypot(roll, pitch), 1e-12)
+            if share < 1.0:
+                limited = True
+                v_north = self._v_north + share * more_north
+                v_east = self._v_east + share * more_east
+        self._v_north, self._v_east = v_north, v_east
+        return limited
 
-    def _follow(self, v_north: float, v_east: float, dt: float) -> None:
+    def _follow(self, dt: float) -> None:
         """Exact over the sample with v held."""
+        v_north, v_east = self._v_north, self._v_east
         kept = exp(-dt / self._lag)
         drift = self._lag * (1.0 - kept)
         self.north += v_north * dt + (self.speed_north - v_north) * drift
@@ -117,8 +136,10 @@ class ReferenceModel:
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
         """Not beyond the largest tilt, or no further beyond it than (north, east) was."""
-        longest = max(self._constants.longest_target, hypot(north, east))
         length = hypot(self.north, self.east)
+        if length <= self._constants.longest_target:
+            return
+        longest = max(self._constants.longest_target, hypot(north, east))
         if length > longest:
             self.north *= longest / length
             self.east *= longest / length

@@ -1,4 +1,4 @@
-"""The planned motion against numerical integration, and its lines and limits; where it stood."""
+"""The planned motion against numerical integration, and its lines and limits."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ from scipy.integrate import solve_ivp
 
 from companion.attitude import Coefficients, Limits, Target
 from companion.attitude.constants import make_constants
-from companion.attitude.history import History, Planned
 from companion.attitude.kinematics import into_body
 from companion.attitude.reference_model import ReferenceModel, rates_along
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
@@ -16,24 +15,17 @@ START, GOAL = (-0.4, -0.5), (0.4, -0.5)
 AT_REST = Coefficients(0.0, 0.0)
 
 
-def placed(start, limits=Limits(), lag=0.05, yaw_lag=0.05, speed=AT_REST, gain=5.0):  # noqa: B008
-    model = ReferenceModel(make_constants(gain, 2.0, limits), lag, yaw_lag)
-    model.place(Coefficients(*start), Coefficients(*speed), 0.3, 0.0)
+def placed(start, limits=Limits(), lag=0.05, speed=AT_REST, gain=5.0, acceleration=np.inf):  # noqa: B008
+    model = ReferenceModel(make_constants(gain, 2.0, limits), lag, acceleration)
+    model.place(Coefficients(*start), Coefficients(*speed))
     return model
 
 
 def moved(model, target, seconds, dt):
-    """(S + 1, 6): north, east, their speeds, heading, turn rate."""
+    """(S + 1, 4): north, east, their speeds."""
 
     def state():
-        return (
-            model.north,
-            model.east,
-            model.speed_north,
-            model.speed_east,
-            model.heading,
-            model.turn_rate,
-        )
+        return model.north, model.east, model.speed_north, model.speed_east
 
     rows = [state()]
     for _ in range(round(seconds / dt)):
@@ -55,27 +47,7 @@ def test_unlimited_it_is_the_differential_equation(lag, dt):
         rtol=1e-10,
         atol=1e-12,
     )
-    assert rows[:, :4] == pytest.approx(solved.y.T, abs=1e-8)
-
-
-def test_the_heading_is_the_same_equation_sampled():
-    rows = moved(placed(START, yaw_lag=0.075), Target(*GOAL, 1.3), 3.0, 0.002)
-    solved = solve_ivp(
-        lambda _, s: [s[1], (2.0 * (1.3 - s[0]) - s[1]) / 0.075],
-        (0.0, 3.0),
-        [0.3, 0.0],
-        t_eval=np.linspace(0.0, 3.0, len(rows)),
-        rtol=1e-9,
-    )
-    assert rows[:, 4:] == pytest.approx(solved.y.T, abs=4e-3)  # held over each sample
-
-
-def test_a_turning_target_is_followed_without_error():
-    model = placed(START)
-    for n in range(1000):
-        model.advance(Target(*GOAL, 0.3 + 0.005 * n, 0.5), 0.01)
-    assert model.heading == pytest.approx(0.3 + 5.0, abs=5e-3)
-    assert model.turn_rate == pytest.approx(0.5, abs=1e-6)
+    assert rows == pytest.approx(solved.y.T, abs=1e-8)
 
 
 LIMITS = [
@@ -96,11 +68,34 @@ def test_a_step_moves_on_a_straight_line_within_the_limits(limits, dt):
     r = attitudes(rows[:, :2], np.zeros(len(rows)))
     tilt_rate = np.hypot(*rate_between(r[:-1], r[1:], dt)[:, :2].T)
     assert tilt_rate.max() <= 1.03 * limits.tilt_rate
-    speed = np.hypot(*rows[:, 2:4].T).max()
+    speed = np.hypot(*rows[:, 2:].T).max()
     if limits.shape == "paper":
         assert speed == pytest.approx(W_M * np.cos(np.radians(50)), rel=1e-2)
     else:
         assert tilt_rate.max() >= 0.97 * limits.tilt_rate  # nothing is given away
+
+
+@pytest.mark.parametrize("acceleration", [6.0, 12.0, 19.2])
+@pytest.mark.parametrize("gain", [5.0, 9.0])
+def test_what_is_commanded_changes_no_faster_than_the_autopilot_lets_it(acceleration, gain):
+    """The tilt rate led by the lag, as it is fed forward; and it does not overshoot for that."""
+    lag, dt = 0.25 / gain, 0.004
+    model = placed(START, Limits(None, W_M), lag, gain=gain, acceleration=acceleration)
+    led, path = [], []
+    for _ in range(600):
+        before = np.array(model.rates())
+        model.advance(Target(*GOAL, 0.3), dt)
+        after = np.array(model.rates())
+        led.append(0.5 * (before + after) + lag * (after - before) / dt)
+        path.append((model.north, model.east))
+    led = np.array(led)
+    change = np.hypot(*(led[5:] - led[:-5])[:, :2].T) / (5.0 * dt)
+    assert change.max() <= 1.1 * acceleration
+    assert change.max() >= 0.9 * acceleration  # nothing is given away
+    north, east = np.array(path).T
+    assert np.abs(east + 0.5).max() <= 1e-12
+    assert north.max() <= GOAL[0] + 0.012
+    assert north[-1] == pytest.approx(GOAL[0], abs=1e-3)
 
 
 def test_the_tilt_limit_holds_for_a_motion_that_would_leave_it():
@@ -133,18 +128,3 @@ def test_its_rates_move_the_attitude_along_it():
         got = (coefficients_of(ahead) - coefficients_of(behind))[0] / (2.0 * h)
         assert got == pytest.approx(speed, abs=1e-8)
         assert headings_of(ahead)[0] == pytest.approx(headings_of(behind)[0], abs=1e-12)
-
-
-def test_history_is_linear_between_its_rows_and_moves_evenly_before_and_beyond_them():
-    past = History(0.1)
-    motion = Planned(1.0, 2.0, -1.0, 0.5, 4.0)
-    past.start(Planned(0.0, 1.0, 2.0, 3.0, 0.0), motion)
-    assert past.at(-0.05) == pytest.approx((-0.05, 0.9, 2.05, 2.975, -0.2))
-    assert past.at(-5.0)[1:] == pytest.approx((0.8, 2.1, 2.95, -0.4))  # no longer ago than the span
-    for n in range(1, 101):
-        past.add(Planned(0.01 * n, 1.0 + n, 2.0 - n, 3.0 + n * n, 7.0))
-    middle = 3.0 + (95**2 + 96**2) / 2
-    assert past.at(0.955) == pytest.approx((0.955, 96.5, -93.5, middle, 7.0))
-    assert past.at(0.9) == pytest.approx((0.9, 91.0, -88.0, 3.0 + 90**2, 7.0))
-    assert past.at(1.0) == pytest.approx((1.0, 101.0, -98.0, 3.0 + 100**2, 7.0))
-    assert past.at(1.005)[1:3] == pytest.approx((101.5, -98.5))
