@@ -1,46 +1,39 @@
-"""The commands. Exit codes: 0 done, 1 the flight failed, 2 usage or configuration."""
+"""The command line. Exit codes: 0 done, 1 the flight failed, 2 usage or configuration."""
 
 import argparse
 import asyncio
-import json
-import shutil
-import signal
-import sys
 import traceback
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, suppress
-from datetime import UTC, datetime
+from collections.abc import Sequence
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
-from typing import Any, get_args
+from typing import TypeAlias, get_args
 
 from rich.console import Console
 
 from companion import demo
-from companion.config import Config
-from companion.config_file import changed, json_schema, load
+from companion.commands import flights, identify, tools
+from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_USAGE
+from companion.commands.identify import SHIPPED
 from companion.config_sections import FlightConfig
 from companion.extras import MissingExtraError
-from companion.flight.assembly import link_settings
-from companion.flight.session import Session
-from companion.mavlink import lockstep
-from companion.mavlink import loop as link_loop
-from companion.mavlink.endpoint import parse_endpoint
-from companion.mavlink.errors import EndpointError, LinkError, SigningError
-from companion.recording.figure import FigureError, draw_flight
-from companion.recording.report import flight_table
-from companion.recording.summary import Summary
-from companion.study import needs
+from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
+from companion.recording.figure import FigureError
 from companion.study.names import STUDY_NAMES
-from companion.terminal import FlightConsole, TerminalObserver
 from companion.yaml_file import ConfigError
 
 _PACKAGE = "mavlink-companion"
 
-EXIT_OK, EXIT_FLIGHT, EXIT_USAGE = 0, 1, 2
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
-_USAGE_ERRORS = (ConfigError, EndpointError, FigureError, MissingExtraError, SigningError)
+_USAGE_ERRORS = (
+    ConfigError,
+    EndpointError,
+    FigureError,
+    LogError,
+    MissingExtraError,
+    SigningError,
+)
 _PROGRAMMES = get_args(get_args(FlightConfig.model_fields["programme"].annotation)[0])
 
 
@@ -80,17 +73,26 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"companion {version(_PACKAGE)}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_flights(commands)
+    _add_identify(commands)
+    _add_benches(commands)
+    _add_study(commands)
+    _add_tools(commands)
+    return parser
 
+
+def _add_flights(commands: Commands) -> None:
     fly = commands.add_parser("fly", help="fly the vehicle that the configuration names")
     fly.add_argument(
         "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
     )
-    fly.set_defaults(run=_fly)
+    _add_link_options(fly)
+    fly.set_defaults(run=flights.fly)
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
     show.add_argument(
         "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
     )
-    show.set_defaults(run=_demo)
+    show.set_defaults(run=flights.demo)
     for command in (fly, show):
         command.add_argument(
             "--programme",
@@ -98,11 +100,61 @@ def _parser() -> argparse.ArgumentParser:
             metavar="NAME[,NAME]",
             help=f"fly these instead of flight.programme: {', '.join(_PROGRAMMES)}",
         )
-        command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
-        command.add_argument("--json", action="store_true", help="end with one line of JSON")
-    fly.add_argument("--endpoint", help="instead of link.endpoint")
-    fly.add_argument("--arm", action="store_true", help="arm by ourselves, as flight.arm: true")
+        command.add_argument(
+            "--trajectory",
+            type=Path,
+            metavar="FILE",
+            help="follow it instead, such as configs/trajectories/figure8.yaml, or a CSV table",
+        )
+        command.add_argument(
+            "--slow-down",
+            action="store_true",
+            help="slow a trajectory down that the limits do not allow, instead of refusing it",
+        )
+        _add_flight_options(command)
 
+
+def _add_identify(commands: Commands) -> None:
+    command = commands.add_parser(
+        "identify",
+        help="find dead time, lag and slew of the body rates and the thrust map",
+        description="Fly short doublets of body rates and climb, at most 15° of tilt unless the "
+        "configuration's `identify` says otherwise, fit how the vehicle answered them, and write "
+        "that as a YAML file for the configuration to include. A bad fit is not written.",
+    )
+    which = command.add_mutually_exclusive_group(required=True)
+    which.add_argument("--config", type=Path, metavar="FILE", help="fly the vehicle it names")
+    which.add_argument(
+        "--bundled",
+        type=Path,
+        metavar="FILE",
+        nargs="?",
+        const=SHIPPED,
+        help="start the bundled vehicle and fly it; default: the mock-px4.yaml that ships",
+    )
+    which.add_argument(
+        "--log", type=Path, metavar="PATH", help="a flight's folder, or anybody's .tlog: no flight"
+    )
+    command.add_argument(
+        "--out", type=Path, metavar="FILE", help="default: vehicle.yaml beside the flight's log"
+    )
+    command.add_argument("--force", action="store_true", help="replace FILE if it exists")
+    _add_link_options(command)
+    _add_flight_options(command)
+    command.set_defaults(run=identify.identify, trajectory=None, slow_down=False)
+
+
+def _add_link_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--endpoint", help="instead of link.endpoint")
+    command.add_argument("--arm", action="store_true", help="arm by ourselves, as flight.arm: true")
+
+
+def _add_flight_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
+    command.add_argument("--json", action="store_true", help="end with one line of JSON")
+
+
+def _add_benches(commands: Commands) -> None:
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
     link = benches.add_parser(
@@ -110,13 +162,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     link.add_argument("--seconds", type=float, default=20.0, help="for each program (20)")
     link.add_argument("--rate", type=float, default=250.0, help="samples a second (250)")
-    link.add_argument("--json", action="store_true", help="print the figures as one JSON line")
-    link.set_defaults(run=_bench_link)
+    link.set_defaults(run=tools.bench_link)
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument("--seconds", type=_seconds, default=5.0, help="of measuring (5)")
-    step.add_argument("--json", action="store_true", help="print the figures as one JSON line")
-    step.set_defaults(run=_bench_planner)
+    step.set_defaults(run=tools.bench_planner)
+    for each in (link, step):
+        each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
+
+def _add_study(commands: Commands) -> None:
     study = commands.add_parser(
         "study", help="the paper's experiments, as figures, tables and a page (extra `study`)"
     )
@@ -127,19 +181,20 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument(
         "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
     )
-    study.set_defaults(run=_study)
+    study.set_defaults(run=tools.study)
 
+
+def _add_tools(commands: Commands) -> None:
     plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
-    plot.set_defaults(run=_plot)
+    plot.set_defaults(run=tools.plot)
 
     check = commands.add_parser("check-config", help="check a configuration file")
     which = check.add_mutually_exclusive_group(required=True)
     which.add_argument("file", type=Path, nargs="?", metavar="FILE")
     which.add_argument("--schema", action="store_true", help="print the JSON Schema instead")
-    check.set_defaults(run=_check_config)
-    return parser
+    check.set_defaults(run=tools.check_config)
 
 
 def _programmes(text: str) -> tuple[str, ...]:
@@ -157,146 +212,3 @@ def _seconds(text: str) -> float:
     if not 0.0 < seconds < inf:
         raise argparse.ArgumentTypeError("must be above 0 and finite")
     return seconds
-
-
-def _fly(options: argparse.Namespace) -> int:
-    config = _changed(load(options.config), options)
-    folder = _flight_folder(config)
-    return _fly_in(folder, config, options)
-
-
-def _demo(options: argparse.Namespace) -> int:
-    path = options.config or demo.default_config()
-    port = demo.free_port()
-    options.endpoint, options.arm = f"udpin://127.0.0.1:{port}", True
-    config = _changed(load(path), options)
-    demo.check_mock(path)
-    folder = _flight_folder(config)
-    with demo.bundled_vehicle(path, port, folder / "mock.log", lockstep=config.link.lockstep):
-        return _fly_in(folder, config, options)
-
-
-def _changed(config: Config, options: argparse.Namespace) -> Config:
-    """The configuration with what the command line says otherwise."""
-    link: dict[str, Any] = {}
-    flight: dict[str, Any] = {}
-    if options.endpoint:
-        link["endpoint"] = options.endpoint
-    if options.lockstep:
-        link["lockstep"] = True
-    if options.programme:
-        flight["programme"] = options.programme
-    if options.arm:
-        flight["arm"] = True
-    return changed(config, {"link": link, "flight": flight}, "the command line")
-
-
-def _flight_folder(config: Config) -> Path:
-    """A new folder for one flight, named by its start in UTC.
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
-    base = config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
-    for number in range(1, 100):
-        folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise ConfigError(
-                f"recording.directory: cannot make {folder}: {error.strerror}"
-            ) from error
-        return folder
-    raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
-
-
-def _fly_in(folder: Path, config: Config, options: argparse.Namespace) -> int:
-    console = FlightConsole(stderr=options.json, highlight=False)
-    observer = TerminalObserver(console)
-    session = Session(config, folder, observer, observer.ask_landing)
-    run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
-    with ExitStack() as stack:
-        stack.callback(observer.close)
-        try:
-            summary = run(_interruptible(session))
-        except (EndpointError, SigningError):
-            shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
-            raise
-    # From here on the vehicle is in other hands, and all is on the disk.
-    with suppress(OSError):
-        console.print(flight_table(summary))
-        console.print(f"Recorded in {folder}", soft_wrap=True)
-    if options.json:
-        print(summary.as_json())
-    return EXIT_OK if summary.result == "ok" else EXIT_FLIGHT
-
-
-async def _interruptible(session: Session) -> Summary:
-    """Fly; the first Ctrl-C, SIGTERM or SIGHUP hands back, the second leaves at once."""
-    loop = asyncio.get_running_loop()
-    flight = asyncio.ensure_future(session.fly())
-    interrupts = 0
-
-    def interrupt(name: str) -> None:
-        nonlocal interrupts
-        interrupts += 1
-        if interrupts > 1 or not session.interrupt(f"interrupted by {name}"):
-            flight.cancel()
-
-    loop.add_signal_handler(signal.SIGINT, interrupt, "the user (Ctrl-C)")
-    loop.add_signal_handler(signal.SIGTERM, interrupt, "SIGTERM")
-    loop.add_signal_handler(signal.SIGHUP, interrupt, "SIGHUP (the terminal went away)")
-    return await flight
-
-
-def _bench_link(options: argparse.Namespace) -> int:
-    from companion.bench import link  # noqa: PLC0415  no other command needs it
-
-    figures = link.run(options.seconds, options.rate, options.json)
-    if options.json:
-        print(json.dumps(figures))
-    return EXIT_OK
-
-
-def _bench_planner(options: argparse.Namespace) -> int:
-    from companion.bench import planner  # noqa: PLC0415  no other command needs it
-
-    figures = planner.run(options.seconds, options.json)
-    if options.json:
-        print(json.dumps(figures))
-    return EXIT_OK
-
-
-def _study(options: argparse.Namespace) -> int:
-    needs.check()
-    from companion.study import runner  # noqa: PLC0415  needs the extra
-
-    console = Console()
-    try:
-        page = runner.run(options.name, options.case, options.out, console)
-    except KeyboardInterrupt:
-        console.print(f"Interrupted; what stands in {options.out} is whole.", highlight=False)
-        return EXIT_FLIGHT
-    console.print(f"Open {page}", soft_wrap=True, highlight=False)
-    return EXIT_OK
-
-
-def _plot(options: argparse.Namespace) -> int:
-    out = options.out or options.folder / "flight.png"
-    draw_flight(options.folder, out)
-    print(out)
-    return EXIT_OK
-
-
-def _check_config(options: argparse.Namespace) -> int:
-    if options.schema:
-        sys.stdout.write(json_schema())
-        return EXIT_OK
-    config = load(options.file)
-    parse_endpoint(link_settings(config).endpoint)
-    if config.mock is not None:
-        demo.check_mock(options.file)
-    print(f"{options.file}: ok")
-    return EXIT_OK

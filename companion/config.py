@@ -3,19 +3,21 @@
 The defaults fly the bundled vehicle.
 """
 
-from math import radians, sin, sqrt, tan
+from math import hypot, radians, sin, tan
 from typing import Any
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.config_sections import (
+    AUTO,
     CircleConfig,
     CornersConfig,
     DeadmanConfig,
     FlightConfig,
     GuidanceConfig,
     HoverConfig,
+    IdentifyConfig,
     LimitsConfig,
     LinkConfig,
     PlannerConfig,
@@ -26,6 +28,9 @@ from companion.config_sections import (
 )
 from companion.guidance.reference import GRAVITY
 from companion.yaml_file import Section
+
+_TILT_SHARE = 0.75
+"""Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
 
 
 class Config(Section):
@@ -43,9 +48,19 @@ class Config(Section):
     steps: StepsConfig = StepsConfig()
     corners: CornersConfig = CornersConfig()
     circle: CircleConfig = CircleConfig()
+    identify: IdentifyConfig = IdentifyConfig()
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
     """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
+    include: str | tuple[str, ...] = Field(default=(), exclude=True)
+    """Files whose keys are read as if they stood here, relative to this one; own keys win."""
+
+    @property
+    def planner_name(self) -> str:
+        """The planner that flies: what `planner.name` says, or what `auto` comes to."""
+        if self.planner.name != AUTO:
+            return self.planner.name
+        return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
 
     @model_validator(mode="after")
     def _consistent(self) -> "Config":
@@ -63,8 +78,7 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
     needed = circle.speed_m_s**2 / circle.radius_m + config.guidance.drag_per_s * circle.speed_m_s
     return [
         (
-            config.planner.name == MODEL_FOLLOWING
-            and None in (config.vehicle.lag_ms, config.vehicle.dead_time_ms),
+            config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
             "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms",
         ),
         (
@@ -84,8 +98,11 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
         ),
         (
-            "corners" in flown and sqrt(2.0) * config.corners.coefficient > sin(tilt),
-            "√2 × corners.coefficient must not exceed the sine of limits.max_tilt_deg",
+            "corners" in flown
+            and hypot(config.corners.north_coefficient, config.corners.east_coefficient)
+            > sin(tilt),
+            "√(north² + east²) of corners' coefficients must not exceed the sine of "
+            "limits.max_tilt_deg",
         ),
         (
             "circle" in flown and needed > GRAVITY * tan(tilt),
@@ -94,5 +111,26 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
         (
             "circle" in flown and 2.0 * circle.radius_m > limits.fence_radius_m,
             "the circle (twice circle.radius_m away) leaves limits.fence_radius_m",
+        ),
+        *(_identify_contradictions(config) if "identify" in flown else ()),
+    ]
+
+
+def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
+    """As `_contradictions`, of the programme `identify`."""
+    limits, identify = config.limits, config.identify
+    return [
+        (
+            identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,
+            "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed "
+            f"{_TILT_SHARE} × limits.max_tilt_deg",
+        ),
+        (
+            identify.tilt_rate_deg_s > limits.max_tilt_rate_deg_s,
+            "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s",
+        ),
+        (
+            identify.yaw_rate_deg_s > limits.max_yaw_rate_deg_s,
+            "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s",
         ),
     ]

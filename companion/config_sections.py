@@ -58,11 +58,15 @@ class LinkConfig(Section):
         return self
 
 
+AUTO = "auto"
+
+
 class PlannerConfig(Section):
     """The attitude law."""
 
-    name: Annotated[str, Field(json_schema_extra={"enum": list(PLANNER_NAMES)})] = "first-order"
-    """first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
+    name: Annotated[str, Field(json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})] = AUTO
+    """auto: model-following where `vehicle` tells how the rate loop answers, else first-order.
+    first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
     error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
     needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
@@ -73,22 +77,40 @@ class PlannerConfig(Section):
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
-        if self.name not in PLANNER_NAMES:
-            raise ValueError(f"unknown planner {self.name!r}; known: {', '.join(PLANNER_NAMES)}")
+        if self.name not in (AUTO, *PLANNER_NAMES):
+            known = ", ".join((AUTO, *PLANNER_NAMES))
+            raise ValueError(f"unknown planner {self.name!r}; known: {known}")
         return self
+
+
+Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
+AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
 class VehicleConfig(Section):
     """How the vehicle's own rate loop answers; `model-following` plans with it."""
 
-    lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    lag_ms: Milliseconds | None = None
     """Time constant of the roll and pitch rates after their dead time."""
-    dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    dead_time_ms: Milliseconds | None = None
     """From an attitude sample to the first effect of its answer on roll and pitch."""
-    yaw_lag_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """The autopilot changes the roll and pitch rates it aims at no faster (ArduPilot); null: it
+    does not limit this (PX4)."""
+    yaw_lag_ms: Milliseconds | None = None
     """The same time constant for yaw; null: that of roll and pitch."""
-    yaw_dead_time_ms: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    yaw_dead_time_ms: Milliseconds | None = None
     """The same dead time for yaw; null: that of roll and pitch."""
+    yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """The same limit for yaw; null: that of roll and pitch."""
+    yaw_frame_lead_ms: Milliseconds = 0.0
+    """By how long the axes along which the autopilot takes our rates turn before the body does, in
+    yaw more than in tilt: ArduPilot's attitude target. 0: they are the body's own (PX4)."""
+
+    @property
+    def known(self) -> bool:
+        """Whether `model-following` can plan with it."""
+        return self.lag_ms is not None and self.dead_time_ms is not None
 
 
 class LimitsConfig(Section):
@@ -153,14 +175,21 @@ class DeadmanConfig(Section):
 
 
 class GuidanceConfig(Section):
-    """Position and height hold above the attitude law: a PD with feed-forward."""
+    """Linear guidance above the attitude law: a reference followed without lag."""
 
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """How often guidance makes a new target."""
-    position_gain_per_s2: NotNegative = 0.9
-    """Horizontal acceleration per metre of position error."""
-    velocity_gain_per_s: NotNegative = 1.6
-    """Horizontal acceleration per m/s of velocity error."""
+    position_weight_per_s4: Positive = 40.0
+    """Weight of the horizontal position error against the acceleration spent on it; a larger one
+    makes a stiffer hold. The gains follow from it (LQR)."""
+    velocity_weight_per_s2: NotNegative = 8.0
+    """Weight of the horizontal velocity error; a larger one makes a calmer hold."""
+    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] = 5.0
+    """How quickly wind is found, from how the vehicle moves against what its tilt gives."""
+    max_disturbance_m_s2: NotNegative = 6.0
+    """Largest acceleration by wind that is believed."""
+    lead: bool = True
+    """Lead the targets through the known inner response, so that the vehicle is not late."""
     height_gain_per_s: NotNegative = 1.5
     """Vertical speed per metre of height error."""
     climb_gain_per_s: NotNegative = 3.5
@@ -174,10 +203,22 @@ class ThrustConfig(Section):
 
     hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
     """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER)."""
-    correction_limit: Annotated[float, Field(ge=0.0, le=0.6)] = 0.4
-    """How far flight may correct hover_thrust, as a share of it."""
+    correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
+    """By which share flight may correct hover_thrust at most: up to 1.8 times, down to 1/1.8."""
     correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
-    """Time constant of that correction."""
+    """Time constant with which flight follows a slow change; what is wrong at first is put right at
+    once."""
+    curve_factor: Share = 0.0
+    """f in thrust = f·u² + (1 − f)·u; 0 where the autopilot makes up for the curve itself, by an f
+    of its own (PX4: THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
+    battery_exponent: Annotated[float, Field(ge=0.0, le=3.0)] = 2.0
+    """Thrust goes with the battery's voltage to this power; 0: the autopilot sees to it, or its
+    voltage means nothing."""
+    lag_ms: Milliseconds | None = None
+    """Time constant of the rotors' thrust, which is then led; null: not known."""
+    autopilot_compensates_tilt: StrictBool = False
+    """Whether it divides thrust by cos(tilt) itself, so that we must not (ArduPilot:
+    ATC_ANGLE_BOOST; PX4 does not)."""
 
 
 class FlightConfig(Section):
@@ -186,13 +227,18 @@ class FlightConfig(Section):
     takeoff_height_m: Annotated[float, Field(ge=1.5, le=100.0)] = 5.0
     """Height above home to which the autopilot takes off."""
     programme: Annotated[
-        tuple[Literal["hover", "steps", "circle", "corners"], ...], Field(min_length=1)
+        tuple[Literal["hover", "steps", "circle", "corners", "identify", "trajectory"], ...],
+        Field(min_length=1),
     ] = (
         "hover",
         "steps",
         "circle",
     )
     """Flown in this order."""
+    trajectory: Path | None = None
+    """File of what the programme `trajectory` follows: configs/trajectories/figure8.yaml, say."""
+    slow_down: bool = False
+    """Slow a trajectory down that the limits do not allow, instead of refusing it."""
     arm: StrictBool = False
     """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
     connect_timeout_s: Seconds = 30.0
@@ -228,8 +274,10 @@ class StepsConfig(Section):
 class CornersConfig(Section):
     """Programme `corners`: acceleration steps past level, where the planners differ."""
 
-    coefficient: Annotated[float, Field(gt=0.0, le=0.45)] = 0.35
-    """Of each axis; the tilt at a corner has the sine √2 times this."""
+    north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
+    """North at each corner, but for the sign; the tilt has the sine √(north² + east²)."""
+    east_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
+    """East at each corner. North 0.4, east 0.5 are the steps of the paper's figure 2."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
     """How long each corner is held."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
@@ -245,6 +293,25 @@ class CircleConfig(Section):
     """Speed along the circle, reached and left smoothly."""
     laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     """How often round, gathering speed and braking included."""
+
+
+class IdentifyConfig(Section):
+    """Programme `identify`, flown by `companion identify`: doublets of body rates and of climb."""
+
+    tilt_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 60.0
+    """Roll and pitch rate of the larger doublets; the smaller ones have half of it."""
+    tilt_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
+    """How long their first part lasts; with the rate it gives how far the vehicle tilts."""
+    yaw_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 50.0
+    """Yaw rate of the larger doublet; the smaller one has half of it."""
+    yaw_duration_s: Annotated[float, Field(ge=0.2, le=3.0)] = 1.2
+    """The same for yaw, which answers more slowly."""
+    climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
+    """Vertical acceleration of the doublets that tell the thrust."""
+    climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
+    """How long their first part lasts; the vehicle rises by climb_m_s2 times its square."""
+    settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
+    """Position hold before each doublet and at the end."""
 
 
 class RecordingConfig(Section):

@@ -1,6 +1,7 @@
 """Reading YAML into a typed model, with errors that say what, where and how to mend it."""
 
 import difflib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -41,13 +42,22 @@ def load(path: Path, model: type[Model]) -> Model:
     Raises:
         ConfigError: the file is missing, not YAML, or holds an unknown key or a bad value.
     """
+    return validated(read(path, model), str(path), model)
+
+
+def read(path: Path, model: type[BaseModel]) -> dict[str, Any]:
+    """The keys and values of a YAML file, not yet checked against `model`.
+
+    Raises:
+        ConfigError: the file is missing, not YAML, or holds no keys.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot read the configuration: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: not a text file in UTF-8") from error
-    return parse(text, str(path), model)
+    return _keys(text, str(path), model)
 
 
 def parse(text: str, name: str, model: type[Model]) -> Model:
@@ -56,6 +66,10 @@ def parse(text: str, name: str, model: type[Model]) -> Model:
     Raises:
         ConfigError: as `load`.
     """
+    return validated(_keys(text, name, model), name, model)
+
+
+def _keys(text: str, name: str, model: type[BaseModel]) -> dict[str, Any]:
     try:
         data = yaml.load(text, _UniqueKeys)
     except yaml.YAMLError as error:
@@ -67,7 +81,7 @@ def parse(text: str, name: str, model: type[Model]) -> Model:
     if not isinstance(data, dict):
         first = next(iter(model.model_fields))
         raise ConfigError(f"{name}: expected keys such as `{first}:` at the top level")
-    return validated({key: _filled(key, value, model) for key, value in data.items()}, name, model)
+    return {key: _filled(key, value, model) for key, value in data.items()}
 
 
 def _filled(key: Any, value: Any, model: type[BaseModel]) -> Any:
@@ -81,8 +95,19 @@ def _filled(key: Any, value: Any, model: type[BaseModel]) -> Any:
     return {} if has_keys else None
 
 
-def validated(data: dict[str, Any], name: str, model: type[Model]) -> Model:
+def validated(
+    data: dict[str, Any],
+    name: str,
+    model: type[Model],
+    sources: Mapping[tuple[str, ...], str] | None = None,
+) -> Model:
     """Check data already read; `name` stands for it in errors.
+
+    Args:
+        data: keys and values.
+        name: of the file.
+        model: to check against.
+        sources: the file in which a section, or a key of it, stands, if that is another one.
 
     Raises:
         ConfigError: an unknown key or a bad value.
@@ -91,8 +116,13 @@ def validated(data: dict[str, Any], name: str, model: type[Model]) -> Model:
         return model.model_validate(data)
     except ValidationError as error:
         details = _without_consequences(error.errors())
-        lines = [_explain(detail["loc"], detail, model) for detail in details]
-        raise ConfigError(f"{name}: " + "; ".join(lines)) from error
+        faults: dict[str, list[str]] = {}
+        for detail in details:
+            place = detail["loc"]
+            file = (sources or {}).get(place[:2]) or (sources or {}).get(place[:1]) or name
+            faults.setdefault(file, []).append(_explain(place, detail, model))
+        sentences = [f"{file}: " + "; ".join(lines) for file, lines in faults.items()]
+        raise ConfigError("; ".join(sentences)) from error
 
 
 def _without_consequences(details: list[Any]) -> list[Any]:
@@ -125,6 +155,7 @@ def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel
 def _keys_beside(location: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
     for part in location[:-1]:
         field = model.model_fields[str(part)].annotation
-        if isinstance(field, type) and issubclass(field, BaseModel):
-            model = field
+        for kind in (field, *get_args(field)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                model = kind
     return list(model.model_fields)

@@ -5,7 +5,7 @@ import sys
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.flight.assembly import hover_thrust, planner
+from companion.flight.assembly import hover_thrust, planner, rate_limits
 from companion.flight.control_loop import Command, ControlLoop, Deadlines
 from companion.mavlink import Link, LinkSettings
 from companion.mavlink import loop as link_loop
@@ -25,6 +25,7 @@ async def fly(port: int) -> None:
             link.send_setpoint,
             Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
             FlightTrace(),
+            rate_limits(config),
         )
         loop.on = True
         link.on_attitude = loop.on_sample

@@ -3,31 +3,24 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians, tan
+from math import radians
 from pathlib import Path
 
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop, Deadlines
+from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
+from companion.flight.follow import Follow
 from companion.flight.guide import Guide
 from companion.flight.observer import Observer
+from companion.flight.outer_loop import linear_guidance, motion_estimate
+from companion.flight.programmes import programme
 from companion.flight.rig import Rig
 from companion.flight.safety import Fence, SafetyMonitors
 from companion.flight.watch import Watch
-from companion.guidance import (
-    Circle,
-    Corners,
-    HoldGains,
-    Hover,
-    HoverThrust,
-    PositionHold,
-    Programme,
-    Sequence,
-    Steps,
-)
-from companion.guidance.reference import GRAVITY
+from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
@@ -61,63 +54,73 @@ def _signing(key_file: Path | None) -> Signing | None:
 
 def planner(config: Config) -> Planner:
     """The planner with its limits, and with the vehicle's response if it plans with that."""
-    limits = config.limits
-    response: dict[str, float] = {}
-    if config.planner.name == MODEL_FOLLOWING:
-        times = config.vehicle.model_dump(exclude_none=True)
-        response = {key.removesuffix("_ms"): 1e-3 * value for key, value in times.items()}
+    following = config.planner_name == MODEL_FOLLOWING
     return make_planner(
-        config.planner.name,
+        config.planner_name,
         gain=config.planner.gain_per_s,
         yaw_gain=config.planner.yaw_gain_per_s,
-        limits=Limits(
-            max_tilt=radians(limits.max_tilt_deg),
-            max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
-            max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
-            shape=limits.rate_limit,
-        ),
-        recovery_angle=radians(limits.recovery_angle_deg),
-        **response,
+        limits=rate_limits(config),
+        recovery_angle=radians(config.limits.recovery_angle_deg),
+        **(vehicle_response(config) if following else {}),
     )
 
 
-def programme(config: Config) -> Sequence:
-    """The programmes of `flight.programme`, one after the other."""
-    known: dict[str, Programme] = {
-        "hover": Hover(config.hover.duration_s),
-        "corners": Corners(
-            config.corners.coefficient, config.corners.duration_s, config.corners.settle_s
-        ),
-        "steps": Steps(config.steps.coefficient, config.steps.duration_s, config.steps.settle_s),
-        "circle": Circle(config.circle.radius_m, config.circle.speed_m_s, config.circle.laps),
+def vehicle_response(config: Config) -> dict[str, float]:
+    """What `vehicle` says, as `make_planner` takes it; keys that are null are left out."""
+    vehicle = config.vehicle
+    times = {
+        "lag": vehicle.lag_ms,
+        "dead_time": vehicle.dead_time_ms,
+        "yaw_lag": vehicle.yaw_lag_ms,
+        "yaw_dead_time": vehicle.yaw_dead_time_ms,
+        "frame_lead": vehicle.yaw_frame_lead_ms,
     }
-    return Sequence([known[name] for name in config.flight.programme])
+    limits = {
+        "acceleration": vehicle.acceleration_limit_deg_s2,
+        "yaw_acceleration": vehicle.yaw_acceleration_limit_deg_s2,
+    }
+    response = {key: _MS * value for key, value in times.items() if value is not None}
+    return response | {key: radians(value) for key, value in limits.items() if value is not None}
+
+
+def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
+    """What `vehicle` says of roll, pitch and yaw; what it does not say of yaw is as for the two."""
+    known = vehicle_response(config)
+    tilt = RateLoop(known.get("lag"), known.get("dead_time"), known.get("acceleration"))
+    yaw = RateLoop(
+        known.get("yaw_lag", tilt.lag),
+        known.get("yaw_dead_time", tilt.dead_time),
+        known.get("yaw_acceleration", tilt.acceleration_limit),
+    )
+    return tilt, tilt, yaw
+
+
+def rate_limits(config: Config) -> Limits:
+    """What we never ask of the vehicle, whoever asks."""
+    limits = config.limits
+    return Limits(
+        max_tilt=radians(limits.max_tilt_deg),
+        max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
+        max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+        shape=limits.rate_limit,
+    )
 
 
 def hover_thrust(config: Config) -> HoverThrust:
     """The map from specific thrust to 0..1."""
+    thrust = config.thrust
     return HoverThrust(
-        config.thrust.hover_thrust,
-        config.thrust.correction_limit,
-        config.thrust.correction_time_s,
-        config.limits.min_thrust,
-        config.limits.max_thrust,
-    )
-
-
-def position_hold(config: Config) -> PositionHold:
-    """The outer loop; in a hover it asks for no more than the tilt limit gives."""
-    gains, limits = config.guidance, config.limits
-    return PositionHold(
-        HoldGains(
-            position=gains.position_gain_per_s2,
-            velocity=gains.velocity_gain_per_s,
-            height=gains.height_gain_per_s,
-            climb=gains.climb_gain_per_s,
-            drag=gains.drag_per_s,
-            max_climb=limits.max_climb_m_s,
-            max_descent=limits.max_descent_m_s,
-            max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
+        ThrustSettings(
+            hover=thrust.hover_thrust,
+            correction_limit=thrust.correction_limit,
+            correction_time=thrust.correction_time_s,
+            lowest=config.limits.min_thrust,
+            highest=config.limits.max_thrust,
+            curve_factor=thrust.curve_factor,
+            battery_exponent=thrust.battery_exponent,
+            lag=_MS * (thrust.lag_ms or 0.0),
+            tilt_compensated=thrust.autopilot_compensates_tilt,
+            drag=config.guidance.drag_per_s,
         )
     )
 
@@ -129,6 +132,7 @@ class Assembled:
     flight: Flight
     rig: Rig
     trace: FlightTrace
+    dead_time_watch: DeadTimeWatch
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
@@ -159,13 +163,16 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
             deadline=deadman.deadline_ms * _MS,
         ),
         trace,
+        rate_limits(config),
     )
     guide = Guide(
         loop,
-        position_hold(config),
+        linear_guidance(config),
+        motion_estimate(config),
         thrust,
         link.state,
         trace,
+        max_tilt=radians(config.limits.max_tilt_deg),
         period=1.0 / config.guidance.rate_hz,
         position_stale=deadman.position_stale_ms * _MS,
         clock=clock,
@@ -180,4 +187,11 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
     rig = Rig(config, link, loop, guide, monitors, programme(config))
     watch = Watch(rig, silence_limit=deadman.silence_limit_ms * _MS, clock=clock)
     loop.ask_mode = watch.ask_mode
-    return Assembled(Flight(rig, watch, observer, ask_landing), rig, trace)
+    flight = Flight(rig, watch, observer, ask_landing)
+    for part in rig.programme.parts:
+        if isinstance(part, Follow) and part.slowed > 1.0:
+            flight.note(f"{part.name} is slowed down {part.slowed:.2f} times to keep the limits")
+    # In lockstep there is one clock, and a round trip takes a step however quick the link is.
+    offset = (lambda: 0.0) if config.link.lockstep else lambda: link.timesync.offset_s
+    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), offset, flight.note)
+    return Assembled(flight, rig, trace, dead_time_watch)

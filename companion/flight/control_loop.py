@@ -6,10 +6,10 @@ from math import inf
 from time import perf_counter_ns
 from typing import NamedTuple
 
-from companion.attitude import AttitudeError, BodyRates, Planner, Target
-from companion.attitude.kinematics import cos_tilt
+from companion.attitude import AttitudeError, BodyRates, Limits, Planner, Target
+from companion.attitude.rotation import within_limits
 from companion.flight.freshness import SampleClock
-from companion.guidance import HoverThrust, specific_thrust
+from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.mavlink.samples import AttitudeSample
 from companion.recording.trace import FlightTrace
@@ -29,6 +29,7 @@ class Command(NamedTuple):
         made_at: when, s on our clock.
         idle: on the ground: no rates, no thrust.
         is_step: an open-loop step, whose response is measured.
+        body_rates: instead of the planner's, rad/s; sent as far as the limits allow.
     """
 
     target: Target
@@ -36,6 +37,7 @@ class Command(NamedTuple):
     made_at: float
     idle: bool = False
     is_step: bool = False
+    body_rates: BodyRates | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +74,7 @@ class ControlLoop:
         send: SendSetpoint,
         deadlines: Deadlines,
         trace: FlightTrace,
+        limits: Limits,
     ) -> None:
         self.command: Command | None = None
         self.on = False
@@ -85,6 +88,7 @@ class ControlLoop:
         self._send = send
         self._deadlines = deadlines
         self._trace = trace
+        self._limits = limits
         self._clock = SampleClock()
         self._last_time = -inf
         self._planned_at = -inf
@@ -113,14 +117,13 @@ class ControlLoop:
         ):
             self.stale += 1
             return
-        cosine = cos_tilt(sample.q[1], sample.q[2])
         try:
             if command.idle:
                 rates, thrust = BodyRates(0.0, 0.0, 0.0), 0.0
             else:
-                rates = self._plan(sample, command.target, dt)
+                rates = self._rates(sample, command, dt)
                 thrust = self._hover_thrust.normalised(
-                    specific_thrust(command.acceleration_down, cosine)
+                    command.acceleration_down, sample.q, sample.body_rates
                 )
             left = self._send(sample.time_boot_ms, rates, thrust)
         except (AttitudeError, InvalidSetpoint):
@@ -128,7 +131,14 @@ class ControlLoop:
         if not left:
             self.refused += 1
             return
-        self._account(sample, command, thrust * cosine)
+        self._account(sample, command, rates, thrust)
+
+    def _rates(self, sample: AttitudeSample, command: Command, dt: float) -> BodyRates:
+        """The planner's answer, or the rates that guidance asks for within the same limits."""
+        if command.body_rates is None:
+            return self._plan(sample, command.target, dt)
+        limits = self._limits
+        return BodyRates(*within_limits(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
     def _plan(self, sample: AttitudeSample, target: Target, dt: float) -> BodyRates:
         """Ask the planner; after a gap, or at the first sample, it is to begin anew."""
@@ -158,12 +168,22 @@ class ControlLoop:
             self.ask_mode()
         return self.held_back
 
-    def _account(self, sample: AttitudeSample, command: Command, vertical: float) -> None:
+    def _account(
+        self,
+        sample: AttitudeSample,
+        command: Command,
+        rates: BodyRates,
+        thrust: float,
+    ) -> None:
         self.setpoints += 1
-        self._hover_thrust.sent(vertical)
         self.last_answer = self._gap_from = sample.received
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9
         self._trace.add_latency(latency)
+        if self.guarded:
+            self._hover_thrust.sent(thrust, sample.q)
+            self._trace.add_rates(
+                sample.vehicle_time, sample.received, rates, thrust, sample.body_rates
+            )
         if command.is_step:
             self._trace.add_response(sample.vehicle_time, sample.q, command.target)

@@ -2,18 +2,24 @@
 
 import asyncio
 from collections.abc import Callable
-from math import nan
+from math import acos, degrees, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
+from companion.attitude.kinematics import cos_tilt
 from companion.flight.control_loop import Command, ControlLoop
+from companion.flight.hover_learning import HoverLearning
+from companion.flight.motion_estimate import MotionEstimate
 from companion.guidance import (
+    GRAVITY,
     HoverThrust,
+    LinearGuidance,
     Pose,
-    PositionHold,
     Programme,
     Reference,
+    Situation,
     VehicleMotion,
 )
+from companion.guidance.linear import ReferenceAt
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.state import VehicleState
 from companion.recording.trace import FlightTrace
@@ -25,32 +31,40 @@ class Guide:
     """Leaves a new `Command` with the control loop at a steady rate, while position is fresh.
 
     On the ground the command is idle. In the air and without a programme it damps the motion where
-    the vehicle is; `hold` keeps a pose; `follow` flies a programme from it.
+    the vehicle is; `hold` keeps a pose; `follow` flies a programme from it. A programme's open-loop
+    rates are given up, and the vehicle held where it is, once it tilts too far.
 
     Attributes:
         begun_at: when the programme began, s on our clock, or None.
         pose: the pose that is held, or None.
+        given_up: why the programme was given up, or None.
+        learning: of the hover thrust.
     """
 
     def __init__(
         self,
         loop: ControlLoop,
-        hold: PositionHold,
+        guidance: LinearGuidance,
+        estimate: MotionEstimate,
         hover_thrust: HoverThrust,
         state: VehicleState,
         trace: FlightTrace,
         *,
+        max_tilt: float,
         period: float,
         position_stale: float,
         clock: Callable[[], float],
     ) -> None:
         self.begun_at: float | None = None
         self.pose: Pose | None = None
+        self.given_up: str | None = None
         self._loop = loop
-        self._hold = hold
-        self._hover_thrust = hover_thrust
+        self._guidance = guidance
+        self._estimate = estimate
+        self.learning = HoverLearning(hover_thrust, state)
         self._state = state
         self._trace = trace
+        self._max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
         self._clock = clock
@@ -61,6 +75,7 @@ class Guide:
         """Keep the newest attitude that has a heading."""
         if is_unit(sample.q):
             self._q = sample.q
+            self._estimate.note_attitude(sample)
 
     def stand_by(self) -> None:
         """Hold nothing: idle on the ground, damp the motion in the air."""
@@ -69,7 +84,7 @@ class Guide:
     def hold_here(self) -> None:
         """Hold the present position and heading."""
         self.stand_by()
-        self.pose = Pose(self._motion().position_ned, self._heading())
+        self.pose = Pose(self._situation(self._clock()).now.position_ned, self._heading())
 
     def follow(self, programme: Programme) -> None:
         """Fly `programme` from the pose that is held."""
@@ -98,51 +113,70 @@ class Guide:
         now = self._clock()
         position = self._state.position
         if position is None or now - position.received > self._position_stale:
-            self._hover_thrust.pause()
+            self.learning.pause()
             return
         # In control a vehicle that says it has landed is the watch's matter: no thrust would make
         # it true.
         if self._state.landed and not self._loop.guarded:
-            self._hover_thrust.pause()
+            self.learning.stand()
             self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
             return
-        motion = self._motion()
-        reference = self._reference(now, motion)
-        target, down = self._hold.command(reference, motion)
-        self._loop.command = Command(target, down, now, is_step=reference.coefficients is not None)
+        self._estimate.note_position(position)
+        situation = self._situation(now)
+        self._give_up_if_tilted()
+        reference_at = self._reference(situation.now)
+        reference = reference_at(now)
+        target, down = self._guidance.command(reference_at, now, situation)
+        self._estimate.vertical = GRAVITY - down
+        self._loop.command = Command(
+            target,
+            down,
+            now,
+            is_step=reference.coefficients is not None,
+            body_rates=reference.body_rates,
+        )
+        self.learning.step(
+            now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
+        )
         if self._loop.guarded:
-            self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
             measured_at = position.vehicle_time + (now - position.received)
-            self._note_tracking(measured_at, reference, motion)
-        else:
-            self._hover_thrust.pause()  # nobody obeys our thrust: nothing to learn from it
+            self._note_tracking(measured_at, reference, situation.now)
 
     def _heading(self) -> float:
         return heading(self._q)
 
-    def _motion(self) -> VehicleMotion:
-        """The newest position, moved on by its age."""
-        position = self._state.position
-        if position is None:
-            raise RuntimeError("guidance was asked to hold before any position came")
-        age = self._clock() - position.received
-        north, east, down = position.position_ned
-        v_north, v_east, v_down = velocity = position.velocity_ned
-        return VehicleMotion(
-            (north + age * v_north, east + age * v_east, down + age * v_down), velocity
-        )
+    def _situation(self, now: float) -> Situation:
+        return self._estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)
 
-    def _reference(self, now: float, motion: VehicleMotion) -> Reference:
-        if self.pose is None:
-            return Reference(motion.position_ned, heading=self._heading())
-        if self._programme is None or self.begun_at is None:
-            return Reference(self.pose.position_ned, heading=self.pose.heading)
-        return self._programme.at(now - self.begun_at, self.pose)
+    def _reference(self, motion: VehicleMotion) -> ReferenceAt:
+        """What is to be flown, by our clock."""
+        pose, programme, begun_at = self.pose, self._programme, self.begun_at
+        if pose is None:
+            here = Reference(motion.position_ned, heading=self._heading())
+            return lambda _: here
+        if programme is None or begun_at is None:
+            held = Reference(pose.position_ned, heading=pose.heading)
+            return lambda _: held
+        return lambda time: programme.at(time - begun_at, pose)
+
+    def _give_up_if_tilted(self) -> None:
+        """Hold where we are if open-loop rates have tilted the vehicle too far."""
+        if self.pose is None or self._programme is None or self.begun_at is None:
+            return
+        tilt = acos(cos_tilt(self._q[1], self._q[2]))
+        within = self._clock() - self.begun_at
+        if self._programme.at(within, self.pose).body_rates is None or tilt <= self._max_tilt:
+            return
+        self.given_up = (
+            f"{self._programme.name} was given up at {degrees(tilt):.0f}° of tilt, more than "
+            "limits.max_tilt_deg"
+        )
+        self.hold_here()
 
     def _note_tracking(
         self, vehicle_time: float, reference: Reference, motion: VehicleMotion
     ) -> None:
         north, east, down = reference.position_ned
-        if reference.coefficients is not None:
+        if not reference.closed_loop:
             north = east = nan  # open loop: only the height is meant
         self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

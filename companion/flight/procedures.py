@@ -60,7 +60,7 @@ async def offboard(rig: Rig) -> None:
 
 
 async def programme(rig: Rig) -> None:
-    """Fly the programme to its end."""
+    """Fly the programme to its end, or until it is given up."""
     now = asyncio.get_running_loop().time
     began, sent = now(), rig.loop.setpoints
     rig.guide.follow(rig.programme)
@@ -68,6 +68,8 @@ async def programme(rig: Rig) -> None:
     def over() -> bool:
         elapsed = now() - began
         rig.rate_hz = (rig.loop.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        if rig.guide.given_up is not None:
+            raise FlightEnded(rig.guide.given_up)
         part, _ = rig.programme.part_at(elapsed)
         rig.detail = f"{part.name}, {elapsed:.0f} of {rig.programme.duration:.0f} s flown"
         return rig.guide.finished

@@ -50,7 +50,7 @@ class Session:
         return True
 
     async def fly(self) -> Summary:
-        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, two CSV files.
+        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
 
         Raises:
             LinkError: the link could not be opened; nothing was sent.
@@ -79,10 +79,13 @@ class Session:
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
         flight, loop, guide = assembled.flight, assembled.rig.loop, assembled.rig.guide
+        dead_time_watch = assembled.dead_time_watch
 
         def on_attitude(sample: AttitudeSample) -> None:
             loop.on_sample(sample)
             guide.note_attitude(sample)
+            if loop.guarded:
+                dead_time_watch.after_answer(sample.received)
 
         link.on_attitude = on_attitude
         link.on_error = lambda error: flight.end(FlightEnded(f"internal error: {error!r}"))
@@ -108,16 +111,21 @@ class Session:
             name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
         }
         flight = assembled.flight
+        dead_times = assembled.dead_time_watch.over_the_flight()
+        surprise = assembled.rig.guide.learning.surprise()
+        if surprise is not None:
+            flight.note(surprise)
         summary = Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
-            planner=self._config.planner.name,
+            planner=self._config.planner_name,
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={**counts, "not_recorded": tlog_dropped},
             trace=assembled.trace,
             events=flight.events,
             log=self._folder,
+            dead_times=dead_times,
         )
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")

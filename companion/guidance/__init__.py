@@ -1,22 +1,40 @@
 """Pure maths of the outer loop: what to fly, which acceleration that takes, and how much thrust."""
 
-from companion.guidance.hold import HoldGains, PositionHold
+from companion.guidance.doublets import Doublets
+from companion.guidance.height import HeightGains
+from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
+from companion.guidance.inner_response import IMMEDIATE, InnerResponse
+from companion.guidance.linear import LinearGuidance, LinearSettings, Situation
+from companion.guidance.lqr import Weights, chain_gains
+from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.programmes import Circle, Corners, Hover, Programme, Sequence, Steps
-from companion.guidance.reference import Pose, Reference, VehicleMotion
-from companion.guidance.thrust import HoverThrust, specific_thrust
+from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
+from companion.guidance.thrust import height_first, specific_thrust
 
 __all__ = [
+    "GRAVITY",
+    "IMMEDIATE",
     "Circle",
     "Corners",
-    "HoldGains",
+    "Doublets",
+    "HeightGains",
     "Hover",
     "HoverThrust",
+    "InnerResponse",
+    "LinearGuidance",
+    "LinearSettings",
+    "MotionObserver",
+    "ObserverSettings",
     "Pose",
-    "PositionHold",
     "Programme",
     "Reference",
     "Sequence",
+    "Situation",
     "Steps",
+    "ThrustSettings",
     "VehicleMotion",
+    "Weights",
+    "chain_gains",
+    "height_first",
     "specific_thrust",
 ]

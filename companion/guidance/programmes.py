@@ -86,19 +86,21 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """Acceleration steps between the corners of a square, none of them through level.
+    """Acceleration steps between the corners of a rectangle, none of them through level.
 
     There the methods differ, as in the paper's figure 2; steps through level run straight with any
     of them. Twice round, the second time mirrored, brings the vehicle, on an ideal response, back
     to where it was and to rest; what remains is taken out by position hold for `settle` seconds.
 
     Attributes:
-        coefficient: of each axis; the tilt at a corner has the sine √2 times this.
+        north, east: coefficients of the corners, up to their signs; the tilt there has the sine
+            √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
         step: how long each corner is held, s.
         settle: s.
     """
 
-    coefficient: float
+    north: float
+    east: float
     step: float
     settle: float
     name: str = "corners"
@@ -126,9 +128,7 @@ class Corners:
         if which >= len(self.CORNERS):
             return rest
         north, east = self.CORNERS[which]
-        return rest._replace(
-            coefficients=Coefficients(self.coefficient * north, self.coefficient * east)
-        )
+        return rest._replace(coefficients=Coefficients(self.north * north, self.east * east))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from companion.attitude import Coefficients
+from companion.attitude import BodyRates, Coefficients
 
 Vector = tuple[float, float, float]
 """(north, east, down)."""
@@ -29,7 +29,7 @@ class Reference(NamedTuple):
     """Where the vehicle ought to be at one instant.
 
     With `coefficients` given, the horizontal acceleration is commanded open loop, and position and
-    velocity count for the height only.
+    velocity count for the height only. With `body_rates` given the same holds of these.
     """
 
     position_ned: Vector
@@ -38,3 +38,15 @@ class Reference(NamedTuple):
     heading: float = 0.0
     heading_rate: float = 0.0
     coefficients: Coefficients | None = None
+    body_rates: BodyRates | None = None
+    thrust_steps: bool = False
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether the horizontal position is meant, and not only the height."""
+        return self.coefficients is None and self.body_rates is None
+
+    @property
+    def height_is_steady(self) -> bool:
+        """Whether thrust changes no faster than the rotors follow: in no doublet."""
+        return not self.thrust_steps and self.body_rates is None

@@ -1,18 +1,13 @@
-"""Thrust: from the wanted vertical acceleration to m/s², and from there to MAVLink's 0..1."""
+"""Thrust: from the wanted acceleration to specific thrust in m/s², height first."""
 
-from companion.guidance.reference import GRAVITY
+from math import hypot, sqrt
+
+from companion.attitude import BodyRates, Quaternion
+from companion.attitude.kinematics import cos_tilt
+from companion.guidance.reference import GRAVITY, Vector
 
 _MIN_COSINE = 0.5
 """Beyond 60° of tilt height is given up rather than thrust raised without end."""
-
-_WINDOW = 0.2
-"""Velocity is differenced over at least this long, s: its noise is divided by the window."""
-
-_LONGEST_WINDOW = 0.5
-"""Beyond it the thrust in between is not known well enough to learn from, s."""
-
-_PLAUSIBLE = (0.5 * GRAVITY, 2.0 * GRAVITY)
-"""Measured specific thrust outside this is not learned from (free fall, a bump), m/s²."""
 
 
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
@@ -27,69 +22,38 @@ def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     return wanted / cos_tilt
 
 
-class HoverThrust:
-    """Maps specific thrust linearly to 0..1, and corrects the map from how the vehicle moved.
+def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
+    """Cosine of the tilt that the vehicle will have in `ahead` seconds if it rotates on like this.
 
-    The normalised thrust at which the vehicle hovers is learned as u·g/T, with T from the measured
-    vertical acceleration; bounded about the configured value, and only while `observe` is called,
-    which is only in the air and in control.
+    Thrust for this tilt instead of the present one makes up for the lag of the rotors while the
+    vehicle tilts: T + lag·Ṫ, to first order. From Ṙ = R·[ω]ₓ, third row.
+    """
+    w, x, y, z = q
+    north, east = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    cosine = cos_tilt(x, y) + ahead * (north * body_rates.pitch - east * body_rates.roll)
+    return min(max(cosine, -1.0), 1.0)
+
+
+def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
+    """The acceleration nearest to `wanted` that thrust within its limits gives.
+
+    What thrust cannot give is taken from the horizontal part, whose direction is kept: the target's
+    tilt shrinks and the height stays. Only with too little thrust asked for, as in a fast descent,
+    the vertical part gives way, for thrust cannot be less.
 
     Args:
-        hover: configured normalised thrust at hover.
-        correction_limit: largest correction as a share of `hover`.
-        correction_time: time constant of the correction, s.
-        lowest: smallest normalised thrust given out.
-        highest: largest normalised thrust given out.
+        wanted: acceleration NED, m/s².
+        smallest: specific thrust, m/s².
+        largest: specific thrust, m/s².
+
+    Returns:
+        Acceleration NED, m/s².
     """
-
-    def __init__(
-        self,
-        hover: float,
-        correction_limit: float,
-        correction_time: float,
-        lowest: float,
-        highest: float,
-    ) -> None:
-        self.hover = hover
-        self._bounds = hover * (1.0 - correction_limit), hover * (1.0 + correction_limit)
-        self._time_constant = correction_time
-        self._lowest = lowest
-        self._highest = highest
-        self._began: tuple[float, float] | None = None
-        self._sum = 0.0
-        self._count = 0
-
-    def normalised(self, thrust: float) -> float:
-        """Normalised thrust for a specific thrust in m/s², inside the bounds."""
-        return min(max(self.hover * thrust / GRAVITY, self._lowest), self._highest)
-
-    def sent(self, vertical: float) -> None:
-        """Note the vertical part of a normalised thrust that was really sent: u·cos(tilt)."""
-        self._sum += vertical
-        self._count += 1
-
-    def observe(self, time: float, velocity_down: float) -> None:
-        """Learn from a measured vertical velocity (m/s) at a vehicle time (s)."""
-        if self._began is None:
-            self._begin(time, velocity_down)
-            return
-        span = time - self._began[0]
-        if 0.0 <= span < _WINDOW:
-            return
-        if span <= _LONGEST_WINDOW and self._count:
-            vertical = GRAVITY - (velocity_down - self._began[1]) / span
-            if _PLAUSIBLE[0] <= vertical <= _PLAUSIBLE[1]:
-                measured = self._sum / self._count * GRAVITY / vertical
-                step = min(1.0, span / self._time_constant)
-                corrected = self.hover + step * (measured - self.hover)
-                self.hover = min(max(corrected, self._bounds[0]), self._bounds[1])
-        self._begin(time, velocity_down)
-
-    def pause(self) -> None:
-        """Forget the window that was begun: control ended, or the vehicle is on the ground."""
-        self._began = None
-
-    def _begin(self, time: float, velocity_down: float) -> None:
-        self._began = (time, velocity_down)
-        self._sum = 0.0
-        self._count = 0
+    north, east, down = wanted
+    lift = min(max(GRAVITY - down, 0.0), largest)
+    length, most = hypot(north, east), sqrt(largest * largest - lift * lift)
+    if length > most:
+        north, east, length = north * most / length, east * most / length, most
+    if lift * lift + length * length < smallest * smallest:
+        lift = sqrt(smallest * smallest - length * length)
+    return north, east, GRAVITY - lift

@@ -13,16 +13,21 @@ from companion.identification.response import (
     RateResponse,
     fit_rate_response,
 )
+from companion.identification.table import vehicle_table
 from companion.identification.thrust_map import ThrustMap, fit_thrust_map
+from companion.identification.vehicle import IdentifiedVehicle, identify_vehicle
 
 __all__ = [
     "BadFitError",
     "FitNeeds",
     "FitQuality",
+    "IdentifiedVehicle",
     "RateResponse",
     "ThrustMap",
     "dead_time_by_correlation",
     "fit_rate_response",
     "fit_thrust_map",
+    "identify_vehicle",
     "vehicle_fragment",
+    "vehicle_table",
 ]

@@ -4,12 +4,16 @@ Between two knots the lag's input is a straight line v + m·(t − t_i), and the
 τ·ẋ = v + m·(t − t_i) − x:  x(t) = v + m·(t − t_i − τ) + (x_i − v + m·τ)·exp(−(t − t_i)/τ).
 """
 
+from math import exp
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+_LONGEST_PART = 500.0
+"""e to this power still is a number."""
 
 
 class Knots(NamedTuple):
@@ -26,10 +30,18 @@ class Knots(NamedTuple):
     slope: Floats
 
 
-def held(time: Floats, commanded: Floats) -> Knots:
-    """Commands (n,) held from their times (n,) on; repetitions make no piece of their own."""
-    new = np.concatenate(([True], commanded[1:] != commanded[:-1]))
-    return Knots(time[new], commanded[new], np.zeros(int(new.sum())))
+def held(time: Floats, commanded: Floats, alike: float = 0.0) -> Knots:
+    """Commands (n,) held from their times (n,) on.
+
+    A command makes a piece of its own where it differs by more than `alike` from the latest that
+    does: what a noisy sensor makes a planner ask for would else be most of the work.
+    """
+    kept, latest = [], np.inf
+    for number, value in enumerate(commanded.tolist()):
+        if abs(value - latest) > alike:
+            kept.append(number)
+            latest = value
+    return Knots(time[kept], commanded[kept], np.zeros(len(kept)))
 
 
 def slewed(commands: Knots, slew: float) -> Knots:
@@ -58,16 +70,32 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
     No time in `at` may lie before the first knot.
     """
     steady = commands.value - commands.slope * lag
-    decays = np.exp(-np.diff(commands.time) / lag).tolist()
-    after = (steady[:-1] + commands.slope[:-1] * np.diff(commands.time)).tolist()
-    excess = [float(commands.value[0] - steady[0])]
-    for decay, end, start in zip(decays, after, steady[1:].tolist(), strict=True):
-        excess.append(end + excess[-1] * decay - start)
+    ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
+    jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
+    excess = _decaying(commands.time / lag, jumps)
     piece = np.searchsorted(commands.time, at, side="right") - 1
     since = at - commands.time[piece]
     straight = steady[piece] + commands.slope[piece] * since
-    response: Floats = straight + np.array(excess)[piece] * np.exp(-since / lag)
+    response: Floats = straight + excess[piece] * np.exp(-since / lag)
     return response
+
+
+def _decaying(ages: Floats, jumps: Floats) -> Floats:
+    """(n,), at each age (n,) the sum of the jumps (n,) so far, each decayed since its own age.
+
+    As running sums, in as long parts as exponentials allow.
+    """
+    sums = np.empty(jumps.size)
+    start, before, begun = 0, 0.0, float(ages[0])
+    while start < jumps.size:
+        end = int(np.searchsorted(ages, begun + _LONGEST_PART, side="right"))
+        growth = np.exp(ages[start:end] - begun)
+        sums[start:end] = (before + np.cumsum(jumps[start:end] * growth)) / growth
+        if end < jumps.size:
+            step = min(float(ages[end] - ages[end - 1]), _LONGEST_PART)
+            before, begun = float(sums[end - 1]) * exp(-step), float(ages[end])
+        start = end
+    return sums
 
 
 def value_at(commands: Knots, at: Floats) -> Floats:

@@ -5,15 +5,15 @@ y(t) = gain·x(t − dead time) + offset + what is left of the start, with x the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.fitting import Solution, minimise, project
 from companion.identification.first_order_lag import Knots, held, lagged, slewed, value_at
-from companion.identification.least_squares import Solution, minimise, project
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,8 @@ _CLEARLY = 0.6
 """A slew limit is believed if it leaves less than this share of the squared residuals."""
 _ON_ITS_WAY = 0.02
 """Excited: further from the command than this share of the commands' range."""
+_ALIKE = 0.005
+"""Commands that differ by less than this share of their range count as one."""
 _COARSE = 500
 """About so many samples find where to begin."""
 _FEWEST = 10
@@ -37,7 +39,7 @@ _NEIGHBOUR = 0.005  # s
 class Ranges(NamedTuple):
     """Between what is searched, s."""
 
-    lag: tuple[float, float] = (0.001, 2.0)
+    lag: tuple[float, float] = (0.001, 1.0)
     dead_time: tuple[float, float] = (0.0, LONGEST_DEAD_TIME - 0.01)
 
 
@@ -51,7 +53,7 @@ class LagFit:
     Attributes:
         dead_time: s.
         lag: s.
-        gain: measured per commanded.
+        gain: measured per commanded, found freely even where lag and dead time are for a known one.
         offset: measured at a command of zero.
         slew: of the command, per second; None where there is no sign of a limit.
         explained: R².
@@ -73,25 +75,38 @@ class LagFit:
     excited: int
 
 
-def fit_lag(record: list[Stretch], gain: float | None = None) -> LagFit | None:
+def fit_lag(
+    record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
+) -> LagFit | None:
     """The best fit, or None where no command changed or next to nothing was measured.
 
     Args:
         record: what was commanded and measured.
-        gain: the known gain; None finds it too.
+        gain: what lag and dead time are to be found for; None finds it with them.
+        may_slew: whether a slew limit is looked for.
     """
     samples = sum(part.measured.size for part in record)
     if samples < _FEWEST or all(np.ptp(part.commanded) == 0.0 for part in record):
         return None
-    data = _Data(record, gain)
-    best = _settled(data, _start(_Data(record, gain, thinning=1 + samples // _COARSE)))
+    data, coarse = _Data(record, gain), _Data(record, gain, thinning=1 + samples // _COARSE)
+    best = _settled(data, _start(coarse))
+    if may_slew:
+        best = _slewed_if_clearly(best, data, coarse)
+    found = data.described(best)
+    if gain is not None:
+        freely = _Data(record, None).search(best.unknown)
+        found = replace(found, gain=float(freely.weights[0]))
+    return found
+
+
+def _slewed_if_clearly(best: Solution, data: "_Data", coarse: "_Data") -> Solution:
+    """The best fit behind a slew limit, if it is clearly better than the one without."""
     limited = [
-        data.search(np.append(best.unknown, log(data.largest_change / ramp)))
+        coarse.search(np.append(best.unknown, log(data.largest_change / ramp)))
         for ramp in _TRIED_RAMPS
     ]
-    best_limited = min(limited, key=lambda found: found.squares)
-    believed = best_limited.squares < _CLEARLY * best.squares
-    return data.described(best_limited if believed else best)
+    best_limited = data.search(min(limited, key=lambda found: found.squares).unknown)
+    return best_limited if best_limited.squares < _CLEARLY * best.squares else best
 
 
 class _Data:
@@ -99,7 +114,8 @@ class _Data:
 
     def __init__(self, record: list[Stretch], gain: float | None, thinning: int = 1) -> None:
         self.gain = gain
-        self.commands = [held(part.time, part.commanded) for part in record]
+        span = max(float(np.ptp(part.commanded)) for part in record)
+        self.commands = [held(part.time, part.commanded, _ALIKE * span) for part in record]
         self.times = [part.measured_time[::thinning] for part in record]
         self.measured = np.concatenate([part.measured[::thinning] for part in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]

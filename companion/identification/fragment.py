@@ -1,49 +1,51 @@
-"""The `vehicle:` section of the configuration, written from fits that may be used."""
+"""What the configuration includes of an identified vehicle, written from fits that may be used."""
 
-from companion.identification.response import NEEDS, BadFitError, FitNeeds, RateResponse
-from companion.identification.thrust_map import ThrustMap
+from math import degrees
+
+from companion.identification.response import BadFitError, RateResponse
+from companion.identification.vehicle import IdentifiedVehicle
 
 
-def vehicle_fragment(
-    roll: RateResponse,
-    pitch: RateResponse,
-    yaw: RateResponse,
-    thrust: ThrustMap | None = None,
-    needs: FitNeeds = NEEDS,
-) -> str:
-    """YAML that the configuration takes, a comment on how good each fit is above it.
+def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float) -> str:
+    """YAML that the configuration includes, a comment on how good each fit is above it.
 
-    The configuration has one lag and one dead time for roll and pitch: the mean of the two.
+    The configuration has one value for roll and pitch: the mean of the two. A slew limit stands in
+    it where one was found, the hover thrust where the thrust map is good.
 
     Args:
-        roll: as fitted.
-        pitch: as fitted.
-        yaw: as fitted.
-        thrust: noted in a comment if it is good.
-        needs: what each response must reach.
+        vehicle: as identified.
+        gravity: m/s², at which it hovers.
 
     Raises:
-        BadFitError: one of the responses does not; it says why, one sentence an axis.
+        BadFitError: a response must not be used; it says why, one sentence an axis.
     """
-    axes = {"roll": roll, "pitch": pitch, "yaw": yaw}
-    faults = [(name, response.reason(needs)) for name, response in axes.items()]
-    if any(reason for _, reason in faults):
-        raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults if reason))
-    lines = [f"# {name}: {_described(response)}" for name, response in axes.items()]
-    if thrust is not None and thrust.is_good():
-        lines.append(
-            f"# thrust: T/m = {thrust.slope:.2f}·u {thrust.offset:+.2f} m/s² for u in 0..1, "
-            f"rotor lag {1e3 * thrust.lag:.0f} ms, explains {thrust.explained:.1%}"
-        )
-    values = {
-        "lag_ms": 0.5 * (roll.lag + pitch.lag),
-        "dead_time_ms": 0.5 * (roll.dead_time + pitch.dead_time),
-        "yaw_lag_ms": yaw.lag,
-        "yaw_dead_time_ms": yaw.dead_time,
-    }
+    faults = vehicle.faults()
+    if faults:
+        raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults.items()))
+    lines = [f"# {name}: {_described(response)}" for name, response in vehicle.axes.items()]
+    thrust = vehicle.thrust
+    if thrust is not None and thrust.is_good(gravity):
+        lines.append(f"# thrust: {thrust.described()}")
+        lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     lines.append("vehicle:")
-    lines.extend(f"  {key}: {1e3 * value:.1f}" for key, value in values.items())
+    lines += _response_keys("", (vehicle.roll, vehicle.pitch))
+    lines += _response_keys("yaw_", (vehicle.yaw,))
     return "\n".join(lines) + "\n"
+
+
+def _response_keys(prefix: str, axes: tuple[RateResponse, ...]) -> list[str]:
+    lines = [
+        f"  {prefix}lag_ms: {1e3 * _mean([axis.lag for axis in axes]):.1f}",
+        f"  {prefix}dead_time_ms: {1e3 * _mean([axis.dead_time for axis in axes]):.1f}",
+    ]
+    slews = [axis.slew for axis in axes if axis.slew is not None]
+    if slews:
+        lines.append(f"  {prefix}acceleration_limit_deg_s2: {degrees(_mean(slews)):.0f}")
+    return lines
+
+
+def _mean(values: list[float]) -> float:
+    return sum(values) / len(values)
 
 
 def _described(response: RateResponse) -> str:

@@ -64,7 +64,7 @@ class RateResponse:
     Attributes:
         dead_time: from the sample that a command answers to its first effect, s; NaN if not found.
         lag: time constant, s; NaN if not found.
-        gain: of the steady rate; NaN if not found.
+        gain: of the steady rate, as measured; NaN if not found.
         slew: largest change of the rate that the autopilot asks of itself, rad/s², in front of the
             lag; None where the response shows none.
         fit: how good it is.
@@ -149,8 +149,9 @@ def fit_rate_response(
         commanded: (n,), body rates of one axis, rad/s; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
-        gain: known beforehand. None finds it too, which repeats better from flight to flight: a
-            wrong gain is made up for by lag and dead time.
+        gain: what lag and dead time are found for, such as the 1 that a planner takes it to be:
+            they then make up, as well as they can, for what the true one differs. None finds it
+            with them.
 
     Returns:
         The response; without any change of command, one of NaN whose `reason` says so.

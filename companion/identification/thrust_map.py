@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.identification.fit import fit_lag
-from companion.identification.record import stretches
+from companion.identification.record import Stretch, stretches
 
 _LEAST_EXPLAINED = 0.8
+_FAR = 0.2
+"""From the usual thrust by this share of the range: it is excited, and for some time after."""
+_HOVER = 0.05, 0.95
+"""Normalised thrust in hover, between what the configuration takes."""
 _LARGEST_DELAY = 0.5
 """Rotors and their commands are not slower than this together, s."""
 
@@ -30,13 +35,48 @@ class ThrustMap:
     dead_time: float
     explained: float
 
-    def is_good(self) -> bool:
-        """Whether the thrust followed the commands upwards, soon, and by little else."""
+    def normalised(self, specific_thrust: float) -> float:
+        """The normalised thrust that gives a specific thrust in m/s²."""
+        return (specific_thrust - self.offset) / self.slope
+
+    def is_good(self, gravity: float) -> bool:
+        """Whether the thrust followed the commands upwards, soon, and by little else.
+
+        Args:
+            gravity: m/s²; the vehicle must hover between 0.05 and 0.95.
+        """
         return (
             self.slope > 0.0
             and self.explained >= _LEAST_EXPLAINED
             and self.lag + self.dead_time < _LARGEST_DELAY
+            and _HOVER[0] < self.normalised(gravity) < _HOVER[1]
         )
+
+    def described(self) -> str:
+        """In one line."""
+        return (
+            f"T/m = {self.slope:.2f}·u {self.offset:+.2f} m/s² for u in 0..1, lag "
+            f"{1e3 * self.lag:.0f} ms, dead time {1e3 * self.dead_time:.0f} ms, explains "
+            f"{self.explained:.1%}"
+        )
+
+
+def _excited(record: list[Stretch]) -> list[Stretch]:
+    """The record without the samples of steady thrust: they tell of vibration and gusts only."""
+    if not record:
+        return []
+    thrust = np.concatenate([part.commanded for part in record])
+    usual, far = float(np.median(thrust)), _FAR * float(np.ptp(thrust))
+    excited = []
+    for part in record:
+        changed = part.time[np.abs(part.commanded - usual) > far]
+        latest = np.searchsorted(changed, part.measured_time, side="right")
+        since = part.measured_time - np.concatenate(([-np.inf], changed))[latest]
+        told = since < _LARGEST_DELAY
+        if told.any():
+            measured = part.measured_time[told], part.measured[told]
+            excited.append(Stretch(part.time, part.commanded, *measured))
+    return excited
 
 
 def fit_thrust_map(
@@ -54,12 +94,13 @@ def fit_thrust_map(
         specific_thrust: (m,), m/s²: the accelerometer's −z (FRD), or (g − v̇_down)/cos(tilt).
 
     Returns:
-        The map, or None where the thrust never changed.
+        The map, or None where the thrust never changed. Samples of steady thrust are left out.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length.
     """
-    found = fit_lag(stretches(time, thrust, measured_time, specific_thrust))
+    record = _excited(stretches(time, thrust, measured_time, specific_thrust))
+    found = fit_lag(record, may_slew=False)
     if found is None:
         return None
     return ThrustMap(found.gain, found.offset, found.lag, found.dead_time, found.explained)

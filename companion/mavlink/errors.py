@@ -29,6 +29,10 @@ class UnknownMessage(LinkError):  # noqa: N818
     """The dialect has no message of that name."""
 
 
+class LogError(LinkError):
+    """A recording cannot be used; the message says why."""
+
+
 class SigningError(LinkError):
     """The signing key cannot be used."""
 

@@ -72,6 +72,7 @@ class Px4:
             "ATTITUDE_QUATERNION": 250.0,
             "LOCAL_POSITION_NED": 50.0,
             "EXTENDED_SYS_STATE": 5.0,
+            "ATTITUDE_TARGET": 10.0,
             "SYS_STATUS": 5.0,
             "BATTERY_STATUS": 1.0,
             "GPS_RAW_INT": 5.0,

@@ -57,6 +57,18 @@ class Battery(NamedTuple):
     remaining: float | None
 
 
+class ToldThrust(NamedTuple):
+    """ATTITUDE_TARGET: what the autopilot's attitude and rate control are told, by whomever.
+
+    Attributes:
+        received: Event-loop time, s.
+        thrust: Collective, 0..1.
+    """
+
+    received: float
+    thrust: float
+
+
 class Gps(NamedTuple):
     """GPS_RAW_INT.
 

@@ -15,6 +15,7 @@ from companion.mavlink.records import (
     Heartbeat,
     Home,
     LocalPosition,
+    ToldThrust,
     Vector,
 )
 from companion.mavlink.router import Router
@@ -35,6 +36,7 @@ class _Values:
     landed_state: int | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
+    told_thrust: ToldThrust | None = None
     gps: Gps | None = None
     home: Home | None = None
     estimator: Estimator | None = None
@@ -50,6 +52,7 @@ class VehicleState(_Values):
         landed_state: MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing.
         position: See `LocalPosition`.
         battery: See `Battery`.
+        told_thrust: See `ToldThrust`.
         gps: See `Gps`.
         home: See `Home`.
         estimator: See `Estimator`.
@@ -74,6 +77,7 @@ class VehicleState(_Values):
             "LOCAL_POSITION_NED": self._on_local_position,
             "SYS_STATUS": self._on_sys_status,
             "BATTERY_STATUS": self._on_battery,
+            "ATTITUDE_TARGET": self._on_attitude_target,
             "GPS_RAW_INT": self._on_gps,
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
@@ -188,6 +192,12 @@ class VehicleState(_Values):
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:
         remaining = None if percent < 0 else percent / 100.0
         self.battery = Battery(self._clock(), voltage_v, remaining)
+
+    def _on_attitude_target(self, message: Message) -> None:
+        if 0.0 <= message.thrust <= 1.0:
+            self.told_thrust = ToldThrust(self._clock(), message.thrust)
+        elif not isfinite(message.thrust):
+            self._stats.non_finite += 1
 
     def _on_gps(self, message: Message) -> None:
         seen = message.satellites_visible

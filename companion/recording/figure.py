@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.attitude import coefficients
 from companion.extras import require
-from companion.recording.response import first_order, split_doublets
+from companion.recording.response import first_order
+from companion.recording.second_order import nearest_second_order
+from companion.recording.step_run import StepRun, step_runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
 
-_MEASURED, _IDEAL, _TARGET = "#0072b2", "#d55e00", "#999999"  # readable by the colour-blind
+# Readable by the colour-blind.
+_MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
 _STYLES = ("-", "--", ":")
+_FOR_LEGEND = 0.2
+"""Room above the curves, as a share of their height."""
 
 
 class FigureError(Exception):
@@ -41,9 +45,10 @@ def draw_flight(folder: Path, out: Path) -> None:
 
     response, tracking = _rows(folder / "response.csv"), _rows(folder / "tracking.csv")
     panels: list[Callable[[Axes], None]] = []
-    if response is not None:
-        rows, gain = response, _gain(folder)
-        panels += [lambda axes: _draw_steps(axes, rows, gain), lambda axes: _draw_plane(axes, rows)]
+    runs = [] if response is None else step_runs(response)
+    if runs:
+        gain = _gain(folder)
+        panels += [lambda axes: _draw_steps(axes, runs, gain), lambda axes: _draw_plane(axes, runs)]
     if tracking is not None:
         track = tracking
         panels.append(lambda axes: _draw_ground(axes, track))
@@ -82,43 +87,47 @@ def _gain(folder: Path) -> float:
         ) from error
 
 
-def _coefficients(rows: Floats) -> Floats:
-    return np.array([coefficients(tuple(row[1:5])) for row in rows])
-
-
-def _draw_steps(axes: "Axes", response: Floats, gain: float) -> None:
-    """The first doublet: along its own direction, with the ideal first-order answer."""
-    rows = split_doublets(response)[0]
-    measured, target = _coefficients(rows), rows[:, 5:7]
-    along = target[0] / np.hypot(*target[0])
-    time = rows[:, 0] - rows[0, 0]
-    ideal = first_order(rows[:, 0], target, measured[0], 1.0 / gain)
-    axes.plot(time, target @ along, color=_TARGET, label="target")
-    axes.plot(time, ideal @ along, "--", color=_IDEAL, label=f"ideal, 1/p = {1 / gain:.2g} s")
-    axes.plot(time, measured @ along, color=_MEASURED, label="measured")
+def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
+    """The first doublet: along its own direction, with the ideal and the nearest linear answer."""
+    run, model = runs[0], nearest_second_order(runs)
+    along = run.target[0] / np.hypot(*run.target[0])
+    time = run.time - run.time[0]
+    nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
+    axes.plot(time, run.target @ along, color=_TARGET, label="target")
+    axes.plot(
+        time,
+        first_order(run, 1.0 / gain) @ along,
+        "--",
+        color=_IDEAL,
+        label=f"ideal, 1/p = {1 / gain:.2g} s",
+    )
+    axes.plot(time, run.measured @ along, color=_MEASURED, label="measured")
+    axes.plot(time, model.path(run) @ along, ":", color=_NEAREST, label=nearest)
     axes.set(
         title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
     )
-    axes.legend(loc="upper center", fontsize="small")
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + _FOR_LEGEND * (high - low))
+    axes.legend(loc="upper center", fontsize="small", ncols=2)
     axes.grid(alpha=0.3)
 
 
-def _draw_plane(axes: "Axes", response: Floats) -> None:
+def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
     """All doublets in the plane of the coefficients: a linear response moves on straight lines."""
-    for number, rows in enumerate(split_doublets(response)):
-        c = _coefficients(rows)
+    for number, run in enumerate(runs):
         style = _STYLES[number % len(_STYLES)]
-        axes.plot(c[:, 1], c[:, 0], style, color=_MEASURED, label=_direction(rows))
-        axes.plot(rows[:, 6], rows[:, 5], "o", color=_TARGET, markersize=4)
+        north, east = run.measured.T
+        axes.plot(east, north, style, color=_MEASURED, label=_direction(run))
+        axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET, markersize=4)
     axes.set(title="Straightness", xlabel="east: $a_E$", ylabel="north: $a_N$")
     axes.set_aspect("equal")
     axes.legend(loc="upper right", fontsize="small")
     axes.grid(alpha=0.3)
 
 
-def _direction(rows: Floats) -> str:
+def _direction(run: StepRun) -> str:
     """Where the first step of a doublet points, in words."""
-    north, east = np.sign(np.round(rows[0, 5:7], 6))
+    north, east = np.sign(np.round(run.target[0], 6))
     words = {-1.0: "south", 1.0: "north"}.get(north), {-1.0: "west", 1.0: "east"}.get(east)
     return "-".join(word for word in words if word)
 

@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from companion.recording.dead_time import AxisDeadTime
 from companion.recording.summary import Summary
 
 
@@ -16,6 +17,8 @@ def flight_table(summary: Summary) -> RenderableType:
         parts.append(_response(summary))
     if len(summary.trace.tracking):
         parts.append(_tracking(summary))
+    if len(summary.trace.rates):
+        parts += _dead_times(summary)
     if summary.counts.setpoints:
         parts += [_loop(summary), _loop_words(summary)]
     return Group(*parts)
@@ -46,11 +49,45 @@ def _response(summary: Summary) -> RenderableType:
         ("east", response.time_constant_east_s),
     ):
         table.add_row(f"time constant {axis}", _number(value, "s", 3), f"{ideal:.3f} s")
+    table.add_row("largest deviation from ċ = p(c_d − c)", _pure(response.model_deviation_max), "0")
     table.add_row(
-        "largest deviation from ċ = p(c_d − c)", f"{response.model_deviation_max:.4f}", "0"
+        "straightness: largest distance from a step's line", _pure(response.cross_axis_max), "0"
     )
-    table.add_row("largest cross-axis movement", f"{response.cross_axis_max:.4f}", "0")
+    model = response.second_order
+    table.add_section()
+    table.add_row("nearest second order: frequency ω", f"{model.frequency:.1f} rad/s", "")
+    table.add_row("damping ζ", f"{model.damping:.2f}", "")
+    table.add_row("dead time", f"{1e3 * model.dead_time:.0f} ms", "")
+    table.add_row("largest deviation from it", _pure(response.second_order_deviation_max), "0")
     return table
+
+
+def _dead_times(summary: Summary) -> list[RenderableType]:
+    """How long the vehicle takes to answer, and a warning where it was told otherwise."""
+    found = summary.dead_times
+    if not found.lag_known:
+        words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
+        return [Text(words, style="dim")]
+    table = _table("Dead time, from a sample to its answer's effect", "measured", "configured")
+    for name, axis in found.axes.items():
+        table.add_row(name, _measured(axis), _milliseconds(axis.configured))
+    age = found.sample_age
+    if not isnan(age.p50):
+        table.add_row(
+            "of it a sample's age (p50, p99)",
+            f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms",
+            "",
+        )
+    warning = found.warning()
+    return [table] if warning is None else [table, Text(warning, style="bold yellow")]
+
+
+def _measured(axis: AxisDeadTime) -> str:
+    return "too little turned to tell" if axis.measured is None else _milliseconds(axis.measured)
+
+
+def _milliseconds(value: float | None) -> str:
+    return "–" if value is None else f"{1e3 * value:.0f} ms"
 
 
 def _tracking(summary: Summary) -> RenderableType:
@@ -83,6 +120,11 @@ def _loop_words(summary: Summary) -> Text:
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite"
     )
+
+
+def _pure(value: float) -> str:
+    """A coefficient has no unit."""
+    return f"{value:.4f}"
 
 
 def _number(value: float, unit: str, digits: int) -> str:

@@ -3,11 +3,13 @@
 import json
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from companion.recording.dead_time import DeadTimes
 from companion.recording.response import StepResponse, measure_response
 from companion.recording.trace import FlightTrace
 
@@ -33,7 +35,7 @@ class LoopCounts:
     rate_hz: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Summary:
     """A finished flight.
 
@@ -47,6 +49,7 @@ class Summary:
         trace: rows to measure from.
         events: what happened, each with its time in s.
         log: the flight's folder.
+        dead_times: how long the vehicle took to answer.
     """
 
     result: str
@@ -58,9 +61,14 @@ class Summary:
     trace: FlightTrace
     events: list[tuple[float, str]] = field(default_factory=list)
     log: Path | None = None
+    dead_times: DeadTimes = field(default_factory=DeadTimes)
 
     def response(self) -> StepResponse | None:
         """The measured step response, or None where no step was flown."""
+        return self._response
+
+    @cached_property
+    def _response(self) -> StepResponse | None:
         return measure_response(self.trace.response_rows(), self.gain)
 
     def latency_us(self) -> dict[str, float]:
@@ -86,7 +94,6 @@ class Summary:
 
     def as_dict(self) -> dict[str, Any]:
         """What `--json` prints; values that were not measured are null."""
-        response = self.response()
         return {
             "result": self.result,
             "phase": self.phase,
@@ -99,22 +106,8 @@ class Summary:
             "refused": self.counts.refused,
             "rate_hz": self.counts.rate_hz,
             "latency_us": _without_nan(self.latency_us()),
-            "response": {
-                "time_constant_s": _without_nan(
-                    {
-                        "north": response.time_constant_north_s if response else math.nan,
-                        "east": response.time_constant_east_s if response else math.nan,
-                    }
-                ),
-                **_without_nan(
-                    {
-                        "cross_axis_max": response.cross_axis_max if response else math.nan,
-                        "model_deviation_max": (
-                            response.model_deviation_max if response else math.nan
-                        ),
-                    }
-                ),
-            },
+            "response": _response_as_dict(self.response()),
+            "dead_time_s": _dead_times_as_dict(self.dead_times),
             "tracking": _without_nan(self.tracking()),
             "link": self.link,
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
@@ -124,6 +117,40 @@ class Summary:
     def as_json(self) -> str:
         """`as_dict` on one line."""
         return json.dumps(self.as_dict(), ensure_ascii=False, allow_nan=False)
+
+
+def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:
+    if response is None:
+        return {
+            "time_constant_s": dict.fromkeys(("north", "east")),
+            "cross_axis_max": None,
+            "model_deviation_max": None,
+            "second_order": dict.fromkeys(
+                ("frequency_rad_s", "damping", "dead_time_s", "deviation_max")
+            ),
+        }
+    model = response.second_order
+    return {
+        "time_constant_s": _without_nan(
+            {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
+        ),
+        "cross_axis_max": response.cross_axis_max,
+        "model_deviation_max": response.model_deviation_max,
+        "second_order": {
+            "frequency_rad_s": model.frequency,
+            "damping": model.damping,
+            "dead_time_s": model.dead_time,
+            "deviation_max": response.second_order_deviation_max,
+        },
+    }
+
+
+def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
+    age = dead_times.sample_age
+    return {
+        **{name: axis.measured for name, axis in dead_times.axes.items()},
+        **_without_nan({"sample_age_p50": age.p50, "sample_age_p99": age.p99}),
+    }
 
 
 def _rms(values: "np.ndarray[Any, np.dtype[np.float64]]") -> float:

@@ -35,7 +35,7 @@ def config(tmp_path, text):
         ("planner: {name: so4}", "unknown planner 'so4'"),
         ("planner: {gain_per_s: .nan}", "finite"),
         ("planner: {name: model-following}", "needs vehicle.lag_ms and vehicle.dead_time_ms"),
-        ("flight: {programme: [corners]}\nlimits: {max_tilt_deg: 25}", "√2 × corners.coefficient"),
+        ("flight: {programme: [corners]}\nlimits: {max_tilt_deg: 25}", "of corners' coefficients"),
         ("flight: {programme: [loop]}", "`flight.programme.0`"),
         ("flight: {programme: []}", "`flight.programme`"),
         ("steps: {settle_s: .inf}", "`steps.settle_s`"),
@@ -49,6 +49,18 @@ def config(tmp_path, text):
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "too fast for circle.radius_m"),
         ("circle: {radius_m: 26}", "leaves limits.fence_radius_m"),
+        (
+            "flight: {programme: [identify]}\nlimits: {max_tilt_deg: 15}",
+            "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",
+        ),
+        (
+            "flight: {programme: [identify]}\nlimits: {max_tilt_rate_deg_s: 50}",
+            "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s",
+        ),
+        (
+            "flight: {programme: [identify]}\nlimits: {max_yaw_rate_deg_s: 40}",
+            "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s",
+        ),
         ("a: [", "not valid YAML"),
         ("flight: {arm: 'yes'}", "`flight.arm`"),
         ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
@@ -145,7 +157,9 @@ def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):
     assert "no flight with anything to draw is recorded there" in err
 
 
-@pytest.mark.parametrize("arguments", [(), ("fly",), ("bench",), ("check-config",), ("hover",)])
+@pytest.mark.parametrize(
+    "arguments", [(), ("fly",), ("bench",), ("check-config",), ("identify",), ("hover",)]
+)
 def test_wrong_usage_exits_with_2(capsys, arguments):
     code, _, err = run(capsys, *arguments)
     assert code == 2

@@ -9,10 +9,12 @@ from pydantic import BaseModel
 from companion.cli import main
 from companion.config import Config
 from companion.config_file import json_schema, load
+from companion.config_sections import VehicleConfig
 from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-FILES = sorted(path for path in CONFIGS.glob("*.yaml") if path.name != "study-case.yaml")
+VEHICLES = sorted(CONFIGS.glob("vehicle-*.yaml"))
+FILES = [CONFIGS / "mock-px4.yaml", CONFIGS / "px4.yaml"]
 
 
 @pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
@@ -21,12 +23,21 @@ def test_a_shipped_configuration_is_right_and_names_every_key(path, capsys):
     assert main(["check-config", str(path)]) == 0
     assert capsys.readouterr().out == f"{path}: ok\n"
     data = yaml.safe_load(path.read_text())
+    data |= yaml.safe_load((CONFIGS / data["include"]).read_text())
     for section, field in Config.model_fields.items():
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
             assert list(data[section]) == list(field.annotation.model_fields), section
 
 
-@pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
+@pytest.mark.parametrize("path", VEHICLES, ids=[p.name for p in VEHICLES])
+def test_a_shipped_vehicle_is_one_that_can_be_planned_with(path):
+    data = yaml.safe_load(path.read_text())
+    assert list(data) == ["vehicle"]
+    assert list(data["vehicle"]) == list(VehicleConfig.model_fields)
+    assert load(path).planner_name == "model-following"
+
+
+@pytest.mark.parametrize("path", [*FILES, *VEHICLES], ids=lambda p: p.name)
 def test_what_differs_from_the_default_is_marked_so(path):
     """A comment `# default: …` stands exactly at the keys that differ, and tells the truth."""
     default = Config()

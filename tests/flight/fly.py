@@ -43,8 +43,9 @@ def merged(base, changes):
 class Mock:
     """A running mock vehicle and its control channel."""
 
-    def __init__(self, process, port, control_port, config):
+    def __init__(self, process, port, control_port, config, in_lockstep):
         self.process, self.port, self.config = process, port, config
+        self.in_lockstep = in_lockstep
         self._address = ("127.0.0.1", control_port)
 
     def ask(self, request):
@@ -83,19 +84,15 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
             command + ["--lockstep"] * in_lockstep, stdout=log, stderr=log, env=os.environ
         )
         try:
-            yield Mock(process, port, control_port, config)
+            yield Mock(process, port, control_port, config, in_lockstep)
         finally:
             process.terminate()
             assert process.wait(timeout=10) == 0, (folder / "mock.log").read_text()
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
-    text = yaml.safe_dump(
-        merged(
-            merged(QUICK_FLIGHT, changes),
-            {"link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": True}},
-        )
-    )
+    link = {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep}
+    text = yaml.safe_dump(merged(merged(QUICK_FLIGHT, changes), {"link": link}))
     folder.mkdir(exist_ok=True)
     return Session(
         parse(text, "test", Config), folder, observer or Silent(), ask_landing or decline

@@ -8,28 +8,31 @@ import pytest
 from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.flight.control_loop import Command, ControlLoop, Deadlines
 from companion.flight.freshness import SampleClock
-from companion.guidance import HoverThrust
+from companion.guidance import HoverThrust, ThrustSettings
+from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.samples import AttitudeSample
 from companion.recording.trace import FlightTrace
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 TARGET = Target(0.1, 0.0, 0.0)
+LIMITS = Limits(0.6, 1.5, 1.0)
 
 
 class Bench:
     """A loop with its setpoints caught, and samples every 4 ms."""
 
-    def __init__(self):
+    def __init__(self, planner=None, send=None):
         self.sent = []
         self.connected = True
         self.asked = 0
         self.time = 10.0
         self.loop = ControlLoop(
-            make_planner("first-order", limits=Limits(0.6, 1.5, 1.0)),
-            HoverThrust(0.5, 0.4, 1.5, 0.1, 0.9),
-            self.send,
+            planner or make_planner("first-order", limits=LIMITS),
+            HoverThrust(ThrustSettings(0.5, 0.4, 1.5, 0.1, 0.9)),
+            send or self.send,
             Deadlines(telemetry_stale=0.1, target_stale=0.15, deadline=0.004),
             FlightTrace(),
+            LIMITS,
         )
         self.loop.ask_mode = self.ask
         self.loop.on = True
@@ -188,3 +191,70 @@ def test_sample_clock_ages_against_the_quickest_and_forgives_drift():
     for second in range(2, 3600):  # a vehicle clock that loses 50 ppm
         age = clock.age(second * (1 - 5e-5), 99.0 + second)
     assert age == pytest.approx(0.0, abs=1e-3)
+
+
+ASKED = BodyRates(0.3, -0.4, 0.5)
+
+
+class CountingPlanner:
+    """Asks for nothing, and counts how often it was asked and told to begin anew."""
+
+    def __init__(self):
+        self.resets = self.asked = 0
+
+    def reset(self, q, body_rates=None):
+        self.resets += 1
+
+    def rates(self, q, target, dt, body_rates=None):
+        self.asked += 1
+        return BodyRates(0.0, 0.0, 0.0)
+
+
+def test_rates_that_guidance_asks_for_are_sent_instead_of_the_planners():
+    bench = Bench()
+    bench.refresh(body_rates=ASKED)
+    bench.sample(vehicle_time=3.1)
+    _, rates, thrust = bench.sent[-1]
+    assert rates == ASKED
+    assert thrust == pytest.approx(0.5)
+
+
+def test_they_are_sent_within_the_limits():
+    bench = Bench()
+    bench.refresh(body_rates=BodyRates(3.0, -4.0, 5.0))
+    bench.sample(vehicle_time=3.1)
+    rates = bench.sent[-1][1]
+    assert rates == pytest.approx((0.9, -1.2, 1.0))  # limits of 1.5 and 1.0 rad/s
+
+
+def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
+    bench = Bench()
+    bench.refresh(body_rates=ASKED)
+    bench.sample(vehicle_time=3.1)
+    bench.time += 0.2  # the command is older than 0.15 s
+    bench.sample(vehicle_time=3.3)
+    assert (len(bench.sent), bench.loop.stale) == (1, 1)
+    encoder = SetpointEncoder(1, 191, 1, 1, signed=False)
+
+    def send(stamp, rates, thrust):
+        encoder.frame(0, stamp, rates, thrust)
+        return True
+
+    bench = Bench(send=send)
+    bench.refresh(body_rates=BodyRates(math.nan, 0.0, 0.0))
+    bench.sample(vehicle_time=3.1)
+    assert (bench.loop.setpoints, bench.loop.refused) == (0, 1)
+
+
+def test_after_them_the_planner_begins_anew():
+    planner = CountingPlanner()
+    bench = Bench(planner=planner)
+    bench.run(10)
+    assert (planner.asked, planner.resets) == (10, 1)
+    for _ in range(50):
+        bench.time += 0.004
+        bench.refresh(body_rates=ASKED)
+        bench.sample()
+    assert (planner.asked, planner.resets) == (10, 1)
+    bench.run(1)
+    assert (planner.asked, planner.resets) == (11, 2)

@@ -1,12 +1,17 @@
 """Every planner chosen as a user chooses it, in the YAML, and flown whole against the mock."""
 
+import asyncio
 import math
+from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
+import yaml
 from pymavlink import mavutil
 
 from companion.attitude import (
     LAW_NAMES,
+    BodyRates,
     Coefficients,
     Limits,
     Target,
@@ -15,7 +20,10 @@ from companion.attitude import (
 )
 from companion.config_file import load
 from companion.flight import assembly
-from tests.flight.fly import fly, mock_vehicle
+from companion.mavlink import loop
+from tests.flight.fly import fly, merged, mock_vehicle, session_for
+
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 
@@ -61,43 +69,110 @@ def test_every_setpoint_is_within_the_limits(flown):
     assert max(yaw_rates) <= MAX_YAW_RATE * (1.0 + 1e-6)
 
 
-def cross_axis(folder, name):
-    """The largest movement across the steps of `corners`, flown with PX4's measured response."""
-    vehicle = {"lag_ms": 47, "dead_time_ms": 40, "yaw_lag_ms": 370, "yaw_dead_time_ms": 102}
-    with mock_vehicle(folder, seed=3) as mock:
-        summary = fly(
-            mock,
-            folder / "log",
-            planner={"name": name},
-            vehicle=vehicle,
-            flight={"programme": ["corners"], "takeoff_height_m": 5.0},
-        )
-    assert summary.result == "ok", summary.events
-    return summary.response().cross_axis_max
+FIGURE_2 = {
+    "corners": {"north_coefficient": 0.4, "east_coefficient": 0.5},
+    "limits": {"max_tilt_deg": 45, "max_tilt_rate_deg_s": 400},
+    "flight": {"programme": ["corners"], "takeoff_height_m": 5.0},
+}
+"""The step of the paper's figure 2, at several heights of its rectangle, without its rate limit."""
 
 
-def test_model_following_is_the_straightest_on_a_real_rate_loop(tmp_path):
-    across = {}
+QUICK_CORNERS = {
+    "corners": {"duration_s": 0.8, "settle_s": 0.5},
+    "flight": {"takeoff_height_m": 3.0},
+}
+
+
+def shipped_vehicle(loop):
+    """What the configuration that ships for it says of this rate loop."""
+    return yaml.safe_load((CONFIGS / f"vehicle-{loop}.yaml").read_text())["vehicle"]
+
+
+@pytest.mark.parametrize("loop", ["px4", "ardupilot"])
+def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop, tmp_path):
+    """By the flight's own table; and nearest to second order with a dead time."""
+    across, away = {}, {}
     for name in ("model-following", "first-order", "quaternion"):
-        (tmp_path / name).mkdir()
-        across[name] = cross_axis(tmp_path / name, name)
-    assert across["model-following"] < across["first-order"] / 4
-    assert across["model-following"] < across["quaternion"] / 3
+        folder = tmp_path / name
+        folder.mkdir()
+        with mock_vehicle(folder, seed=3, rate_loop=loop) as mock:
+            summary = fly(
+                mock,
+                folder / "log",
+                planner={"name": name},
+                vehicle=shipped_vehicle(loop),
+                **FIGURE_2,
+            )
+        assert summary.result == "ok", summary.events
+        response = summary.as_dict()["response"]
+        across[name] = response["cross_axis_max"]
+        away[name] = response["second_order"]["deviation_max"]
+    assert across["model-following"] < 0.2 * across["first-order"]
+    assert across["model-following"] < 0.2 * across["quaternion"]
+    assert away["model-following"] < min(away["first-order"], away["quaternion"])
+
+
+def test_the_order_is_the_same_in_real_time(tmp_path):
+    """Two vehicles flown at once, without lockstep."""
+    names = ("model-following", "first-order")
+    with ExitStack() as stack:
+        sessions = []
+        for name in names:
+            folder = tmp_path / name
+            folder.mkdir()
+            mock = stack.enter_context(
+                mock_vehicle(folder, in_lockstep=False, seed=3, speed=1.0, rate_loop="px4")
+            )
+            changes = {"planner": {"name": name}, "vehicle": shipped_vehicle("px4")}
+            changes = merged(merged(FIGURE_2, changes), QUICK_CORNERS)
+            sessions.append(session_for(mock, folder / "log", **changes))
+
+        async def fly_all():
+            return await asyncio.gather(*(session.fly() for session in sessions))
+
+        followed, first_order = loop.run(fly_all())
+    for summary in (followed, first_order):
+        assert summary.result == "ok", summary.events
+    assert followed.response().cross_axis_max < 0.3 * first_order.response().cross_axis_max
 
 
 def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
     path = tmp_path / "vehicle.yaml"
     path.write_text(
-        "planner: {name: model-following}\n"
-        "vehicle: {lag_ms: 30, dead_time_ms: 45, yaw_lag_ms: 90}\n"
+        "vehicle: {lag_ms: 30, dead_time_ms: 45, acceleration_limit_deg_s2: 900, yaw_lag_ms: 90,\n"
+        "  yaw_acceleration_limit_deg_s2: 200, yaw_frame_lead_ms: 50}\n"
     )
-    q = attitude(Coefficients(0.1, 0.2), 0.3)
-    target = Target(0.3, -0.1, 0.5)
+    q, rates = attitude(Coefficients(0.1, 0.2), 0.3), BodyRates(0.0, 0.2, -0.4)
+    target = Target(0.3, -0.1, 2.5)
     limits = Limits(*(math.radians(angle) for angle in (35, 90, 60)))
     expected = make_planner(
-        "model-following", limits=limits, lag=0.03, dead_time=0.045, yaw_lag=0.09
+        "model-following",
+        limits=limits,
+        lag=0.03,
+        dead_time=0.045,
+        acceleration=math.radians(900),
+        yaw_lag=0.09,
+        yaw_acceleration=math.radians(200),
+        frame_lead=0.05,
     )
-    assert assembly.planner(load(path)).rates(q, target, 0.01) == expected.rates(q, target, 0.01)
+    planner = assembly.planner(load(path))
+    for _ in range(30):
+        assert planner.rates(q, target, 0.01, rates) == expected.rates(q, target, 0.01, rates)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("vehicle: {lag_ms: 30, dead_time_ms: 45}", "model-following"),
+        ("vehicle: {lag_ms: 30}", "first-order"),
+        ("{}", "first-order"),
+        ("vehicle: {lag_ms: 30, dead_time_ms: 45}\nplanner: {name: so3}", "so3"),
+    ],
+)
+def test_model_following_flies_where_the_vehicles_response_is_known(text, name, tmp_path):
+    path = tmp_path / "vehicle.yaml"
+    path.write_text(text)
+    assert load(path).planner_name == name
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)

@@ -74,7 +74,7 @@ def test_sequence_plays_its_parts_in_order(time):
 
 
 def test_corners_bring_an_ideal_vehicle_back_and_never_step_through_level():
-    corners = Corners(0.3, 1.0, 2.0)
+    corners = Corners(0.3, 0.4, 1.0, 2.0)
     dt = 1e-3
     times = np.arange(0.0, corners.duration, dt) + 0.5 * dt
     asked = [corners.at(float(t), START).coefficients for t in times]
@@ -86,4 +86,4 @@ def test_corners_bring_an_ideal_vehicle_back_and_never_step_through_level():
     steps = np.diff(c, axis=0)
     for k in np.flatnonzero(np.any(steps, axis=1)):
         middle = 0.5 * (c[k] + c[k + 1])
-        assert np.abs(middle).max() == pytest.approx(0.3)  # half way it is not level
+        assert np.abs(middle).max() >= 0.3 - 1e-9  # half way it is not level

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import Coefficients, Target, attitude
+from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.response import measure_response
 from companion.recording.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
@@ -51,9 +52,10 @@ def test_without_steps_there_is_no_response():
     assert measure_response(FlightTrace().response_rows(), 5.0) is None
 
 
-def summary(trace):
+def summary(trace, dead_times=DeadTimes()):  # noqa: B008
+    counts = LoopCounts(7, 6, 1)
     return Summary(
-        "ok", "disarm", "exact", 5.0, LoopCounts(7, 6, 1), {"lost": 0}, trace, [], Path("x")
+        "ok", "disarm", "exact", 5.0, counts, {"lost": 0}, trace, [], Path("x"), dead_times
     )
 
 
@@ -62,13 +64,28 @@ def test_json_has_the_promised_keys():
     trace.add_latency(40_000)
     trace.add_tracking(0.0, (0.0, 0.0, -5.0), (0.3, 0.4, -5.1))
     trace.add_tracking(0.1, (math.nan, math.nan, -5.0), (9.0, 9.0, -4.9))
-    data = json.loads(summary(trace).as_json())
+    dead_times = DeadTimes(
+        {"roll": AxisDeadTime(0.042, 0.04), "pitch": AxisDeadTime(), "yaw": AxisDeadTime()},
+        SampleAge(0.002, 0.004),
+    )
+    data = json.loads(summary(trace, dead_times).as_json())
     assert data["result"] == "ok"
     assert data["phase"] == "disarm"
     assert (data["samples"], data["setpoints"], data["missed_deadlines"]) == (7, 6, 1)
     assert data["latency_us"] == {"p50": 40.0, "p99": 40.0, "max": 40.0}
     assert set(data["response"]["time_constant_s"]) == {"north", "east"}
     assert {"cross_axis_max", "model_deviation_max"} <= set(data["response"])
+    model = data["response"]["second_order"]
+    assert set(model) == {"frequency_rad_s", "damping", "dead_time_s", "deviation_max"}
+    assert model["deviation_max"] < 0.05
+    assert model["frequency_rad_s"] > 5.0
+    assert data["dead_time_s"] == {
+        "roll": 0.042,
+        "pitch": None,
+        "yaw": None,
+        "sample_age_p50": 0.002,
+        "sample_age_p99": 0.004,
+    }
     assert data["tracking"]["position_rms_m"] == pytest.approx(np.sqrt(0.26))
     assert data["tracking"]["height_rms_m"] == pytest.approx(0.1)
     assert data["log"] == "x"
@@ -78,4 +95,6 @@ def test_json_of_a_flight_that_measured_nothing_is_null_not_nan():
     data = json.loads(summary(FlightTrace()).as_json())
     assert data["latency_us"]["p50"] is None
     assert data["response"]["cross_axis_max"] is None
+    assert set(data["response"]["second_order"].values()) == {None}
+    assert set(data["dead_time_s"].values()) == {None}
     assert data["tracking"]["position_max_m"] is None

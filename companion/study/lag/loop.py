@@ -24,9 +24,43 @@ class LagFlight(NamedTuple):
     commanded: Floats
 
 
+class LagBody:
+    """An attitude that follows body rates ω̇ = (ω_commanded(t − θ) − ω)/τ, in steps of 1/STEP_HZ.
+
+    Args:
+        q: attitude at the start, at rest.
+        lag_ms: τ.
+        dead_time_ms: θ.
+
+    Attributes:
+        q: attitude, body → world.
+        rates: body rates, rad/s.
+    """
+
+    def __init__(self, q: Quaternion, lag_ms: int, dead_time_ms: int) -> None:
+        self.q = q
+        self.rates = BodyRates(0.0, 0.0, 0.0)
+        self._kept = exp(-1e3 / (STEP_HZ * lag_ms))
+        self._mean = 1e-3 * lag_ms * (1.0 - self._kept) * STEP_HZ  # of what is kept, over the step
+        self._under_way = deque([self.rates] * (dead_time_ms + 1))
+
+    def turn(self, commanded: BodyRates, steps: int) -> None:
+        """Hold a command for so many steps."""
+        kept, mean, (roll, pitch, yaw) = self._kept, self._mean, self.rates
+        for _ in range(steps):
+            self._under_way.append(commanded)
+            self._under_way.popleft()
+            p, r, y = self._under_way[0]
+            roll, pitch, yaw = roll - p, pitch - r, yaw - y
+            rates = (p + mean * roll, r + mean * pitch, y + mean * yaw)
+            self.q = turned(self.q, rates, 1.0 / STEP_HZ)
+            roll, pitch, yaw = p + kept * roll, r + kept * pitch, y + kept * yaw
+        self.rates = BodyRates(roll, pitch, yaw)
+
+
 @dataclass(frozen=True)
 class LagLoop:
-    """Body rates follow ω̇ = (ω_commanded(t − θ) − ω)/τ; the attitude follows the body rates.
+    """A planner in front of a `LagBody`.
 
     Attributes:
         lag_ms: τ.
@@ -44,24 +78,14 @@ class LagLoop:
         Raises:
             ValueError: a sample is not a whole number of steps.
         """
-        dt = 1.0 / STEP_HZ
         steps = round(STEP_HZ / rate_hz)
         if steps * rate_hz != STEP_HZ:
             raise ValueError(f"rate_hz must divide {STEP_HZ}, not {rate_hz}")
-        kept = exp(-1e3 * dt / self.lag_ms)
-        mean = 1e-3 * self.lag_ms * (1.0 - kept) / dt  # of what is kept, over the step
-        under_way = deque([BodyRates(0.0, 0.0, 0.0)] * (self.dead_time_ms + 1))
-        q, roll, pitch, yaw = start, 0.0, 0.0, 0.0
-        attitudes, commanded = [q], []
+        body = LagBody(start, self.lag_ms, self.dead_time_ms)
+        attitudes, commanded = [start], []
         for _ in range(round(seconds * rate_hz)):
-            rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(roll, pitch, yaw))
+            rates = planner.rates(body.q, target, 1.0 / rate_hz, body.rates)
             commanded.append(rates)
-            for _ in range(steps):
-                under_way.append(rates)
-                under_way.popleft()
-                p, r, y = under_way[0]
-                roll, pitch, yaw = roll - p, pitch - r, yaw - y
-                q = turned(q, (p + mean * roll, r + mean * pitch, y + mean * yaw), dt)
-                roll, pitch, yaw = p + kept * roll, r + kept * pitch, y + kept * yaw
-            attitudes.append(q)
+            body.turn(rates, steps)
+            attitudes.append(body.q)
         return LagFlight(np.array(attitudes), np.array(commanded))

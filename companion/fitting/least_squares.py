@@ -41,7 +41,12 @@ class Solution(NamedTuple):
 
 
 def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
-    """Weights (c,) of the columns (m, c) that come nearest to the (m,) measured, and the rest."""
+    """Weights of the columns (m, c) that come nearest to what was measured, and the rest.
+
+    Args:
+        columns: (m, c).
+        measured: (m,), or (m, k) for k series at once; the weights are (c,) or (c, k) then.
+    """
     weights = np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0], dtype=np.float64)
     residual: Floats = measured - columns @ weights
     return weights, residual

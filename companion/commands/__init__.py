@@ -1,0 +1,1 @@
+"""The commands, one file each; `companion.cli` reads the command line for them."""

@@ -1,0 +1,135 @@
+"""What the commands that fly have in common: what they change, where they record, how they end."""
+
+import argparse
+import asyncio
+import shutil
+import signal
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from companion import demo
+from companion.config import Config
+from companion.config_file import changed, load
+from companion.flight.programmes import programme
+from companion.flight.session import Session
+from companion.mavlink import lockstep
+from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import EndpointError, SigningError
+from companion.recording.report import flight_table
+from companion.recording.summary import Summary
+from companion.terminal import FlightConsole, TerminalObserver
+from companion.yaml_file import ConfigError
+
+
+def as_told(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
+    """The configuration with what the command line says otherwise.
+
+    Raises:
+        ConfigError: the two do not go together.
+    """
+    link: dict[str, Any] = {}
+    flight: dict[str, Any] = {}
+    if options.endpoint:
+        link["endpoint"] = options.endpoint
+    if options.lockstep:
+        link["lockstep"] = True
+    if options.programme:
+        flight["programme"] = options.programme
+    if options.trajectory:
+        flight["programme"], flight["trajectory"] = ("trajectory",), options.trajectory
+    if options.slow_down:
+        flight["slow_down"] = True
+    if options.arm:
+        flight["arm"] = True
+    changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
+    told = changed(config, changes, "the command line")
+    programme(told)  # what cannot be flown is to be found out before anything is begun
+    return told
+
+
+def flight_folder(config: Config) -> Path:
+    """A new folder for one flight, named by its start in UTC.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    base = config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    for number in range(1, 100):
+        folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise ConfigError(
+                f"recording.directory: cannot make {folder}: {error.strerror}"
+            ) from error
+        return folder
+    raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
+
+
+def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
+    """Fly as configured, record it in `folder`, tell it on `console`, table included.
+
+    Raises:
+        LinkError: the link could not be opened; nothing was sent.
+        OSError: the folder cannot be written; nothing was sent.
+    """
+    observer = TerminalObserver(console)
+    session = Session(config, folder, observer, observer.ask_landing)
+    run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
+    with ExitStack() as stack:
+        stack.callback(observer.close)
+        try:
+            summary = run(_interruptible(session))
+        except (EndpointError, SigningError):
+            shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
+            raise
+    # From here on the vehicle is in other hands, and all is on the disk.
+    with suppress(OSError):
+        console.print(flight_table(summary))
+        console.print(f"Recorded in {folder}", soft_wrap=True)
+    return summary
+
+
+def fly_bundled(
+    path: Path | None,
+    options: argparse.Namespace,
+    console: FlightConsole,
+    planner: str | None = None,
+) -> Summary:
+    """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
+
+    Raises:
+        ConfigError: the configuration, or the vehicle's own section of it, is wrong.
+        VehicleStoppedError: the vehicle ended before the flight did.
+    """
+    path = path or demo.default_config()
+    port = demo.free_port()
+    options.endpoint, options.arm = f"udpin://127.0.0.1:{port}", True
+    config = as_told(load(path), options, planner)
+    demo.check_mock(path)
+    folder = flight_folder(config)
+    with demo.bundled_vehicle(path, port, folder / "mock.log", lockstep=config.link.lockstep):
+        return fly(config, folder, console)
+
+
+async def _interruptible(session: Session) -> Summary:
+    """Fly; the first Ctrl-C, SIGTERM or SIGHUP hands back, the second leaves at once."""
+    loop = asyncio.get_running_loop()
+    flight = asyncio.ensure_future(session.fly())
+    interrupts = 0
+
+    def interrupt(name: str) -> None:
+        nonlocal interrupts
+        interrupts += 1
+        if interrupts > 1 or not session.interrupt(f"interrupted by {name}"):
+            flight.cancel()
+
+    loop.add_signal_handler(signal.SIGINT, interrupt, "the user (Ctrl-C)")
+    loop.add_signal_handler(signal.SIGTERM, interrupt, "SIGTERM")
+    loop.add_signal_handler(signal.SIGHUP, interrupt, "SIGHUP (the terminal went away)")
+    return await flight

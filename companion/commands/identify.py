@@ -1,0 +1,118 @@
+"""`companion identify`: fly doublets, or read a flight, and write how the vehicle answers."""
+
+import argparse
+import json
+import os
+from contextlib import suppress
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+from companion.commands import flying
+from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.config_file import load
+from companion.guidance.reference import GRAVITY
+from companion.identification import (
+    BadFitError,
+    IdentifiedVehicle,
+    identify_vehicle,
+    vehicle_fragment,
+    vehicle_table,
+)
+from companion.mavlink.flight_log import read_flight_log
+from companion.recording.summary import Summary
+from companion.terminal import FlightConsole
+from companion.yaml_file import ConfigError
+
+SHIPPED = Path()
+"""Stands for the configuration that ships, where `--bundled` names none."""
+_PROGRAMME = "identify"
+_PLANNER = "first-order"
+"""It needs no knowledge of the vehicle: that is what is looked for."""
+_LOG, _FRAGMENT = "flight.tlog", "vehicle.yaml"
+
+
+def identify(options: argparse.Namespace) -> int:
+    """Fly and fit, or fit a recorded flight; write the fit if it is good."""
+    console = FlightConsole(stderr=options.json, highlight=False)
+    if options.log is not None:
+        log = options.log / _LOG if options.log.is_dir() else options.log
+        out = _writable(options.out or log.with_name(_FRAGMENT), options.force)
+        return _fitted(log, out, options, console)
+    if options.out is not None:
+        _writable(options.out, options.force)  # not to be found out after the flight
+    summary = _flown(options, console)
+    if summary.result != "ok" or summary.log is None:
+        _tell(options, {"result": summary.result, "log": str(summary.log)})
+        return EXIT_FLIGHT
+    log = summary.log / _LOG
+    return _fitted(log, options.out or log.with_name(_FRAGMENT), options, console)
+
+
+def _writable(out: Path, force: bool) -> Path:
+    if out.exists() and not force:
+        raise ConfigError(f"{out} exists; name another file with --out, or replace it with --force")
+    if not out.parent.is_dir():
+        raise ConfigError(f"{out}: there is no folder {out.parent}")
+    return out
+
+
+def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
+    options.programme = (_PROGRAMME,)
+    if options.bundled is not None:
+        path = None if options.bundled == SHIPPED else options.bundled
+        return flying.fly_bundled(path, options, console, _PLANNER)
+    config = flying.as_told(load(options.config), options, _PLANNER)
+    return flying.fly(config, flying.flight_folder(config), console)
+
+
+def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
+    """Fit what a log holds, show it, and write it to `out` if it is good."""
+    rows = read_flight_log(log)
+    vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
+    try:
+        text = vehicle_fragment(vehicle, GRAVITY)
+    except BadFitError as error:
+        with suppress(OSError):
+            console.print(vehicle_table(vehicle, GRAVITY))
+            console.print("Not written, for the fit is bad:", style="bold red")
+            for axis, reason in vehicle.faults().items():
+                console.print(f"  {axis}: {reason}", soft_wrap=True)
+        _tell(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
+        return EXIT_FLIGHT
+    out.write_text(text, encoding="utf-8")
+    with suppress(OSError):
+        console.print(vehicle_table(vehicle, GRAVITY))
+        console.print(_how_to_include(out, options.config), soft_wrap=True)
+    _tell(options, {"result": "ok", "log": str(log), "file": str(out), **_figures(vehicle)})
+    return EXIT_OK
+
+
+def _how_to_include(out: Path, config: Path | None) -> str:
+    place = out if config is None else Path(os.path.relpath(out, config.parent))
+    return (
+        f"Written to {out}. Let your configuration say\n  include: {place}\n"
+        "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win."
+    )
+
+
+def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
+    """What `--json` tells of each axis; null where nothing was found."""
+    return {
+        name: {
+            "lag_ms": _in_ms(response.lag),
+            "dead_time_ms": _in_ms(response.dead_time),
+            "slew_rad_s2": response.slew,
+            "explained": round(response.fit.explained, 4),
+        }
+        for name, response in vehicle.axes.items()
+    }
+
+
+def _in_ms(seconds: float) -> float | None:
+    return None if isnan(seconds) else round(1e3 * seconds, 1)
+
+
+def _tell(options: argparse.Namespace, result: dict[str, Any]) -> None:
+    if options.json:
+        print(json.dumps(result, ensure_ascii=False, allow_nan=False))

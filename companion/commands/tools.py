@@ -1,0 +1,71 @@
+"""The commands that do not fly: `bench`, `study`, `plot`, `check-config`."""
+
+import argparse
+import json
+import sys
+
+from rich.console import Console
+
+from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.config_file import json_schema, load
+from companion.demo import check_mock
+from companion.flight.assembly import link_settings
+from companion.mavlink.endpoint import parse_endpoint
+from companion.recording.figure import draw_flight
+from companion.study import needs
+
+
+def bench_link(options: argparse.Namespace) -> int:
+    """Measure our latency beside others'."""
+    from companion.bench import link  # noqa: PLC0415  no other command needs it
+
+    figures = link.run(options.seconds, options.rate, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
+def bench_planner(options: argparse.Namespace) -> int:
+    """Measure a step of each planner."""
+    from companion.bench import planner  # noqa: PLC0415  no other command needs it
+
+    figures = planner.run(options.seconds, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
+def study(options: argparse.Namespace) -> int:
+    """Fly the paper's experiments."""
+    needs.check()
+    from companion.study import runner  # noqa: PLC0415  needs the extra
+
+    console = Console()
+    try:
+        page = runner.run(options.name, options.case, options.out, console)
+    except KeyboardInterrupt:
+        console.print(f"Interrupted; what stands in {options.out} is whole.", highlight=False)
+        return EXIT_FLIGHT
+    console.print(f"Open {page}", soft_wrap=True, highlight=False)
+    return EXIT_OK
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a recorded flight."""
+    out = options.out or options.folder / "flight.png"
+    draw_flight(options.folder, out)
+    print(out)
+    return EXIT_OK
+
+
+def check_config(options: argparse.Namespace) -> int:
+    """Check a configuration file, or print the schema."""
+    if options.schema:
+        sys.stdout.write(json_schema())
+        return EXIT_OK
+    config = load(options.file)
+    parse_endpoint(link_settings(config).endpoint)
+    if config.mock is not None:
+        check_mock(options.file)
+    print(f"{options.file}: ok")
+    return EXIT_OK

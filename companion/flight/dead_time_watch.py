@@ -1,0 +1,133 @@
+"""How long the vehicle takes to answer, measured all the time: in flight, and over all of it."""
+
+from collections import deque
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.identification import dead_time_by_correlation
+from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.trace import FlightTrace
+
+_PERIOD = 2.0
+"""Between two looks, s. Each is at one axis, so every axis has its turn after three."""
+_LOOKS = 4
+"""A look is at what was flown within so many periods; the first one is a period early."""
+_UNSURE = 1.5
+"""So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
+_AXES = ("roll", "pitch", "yaw")
+_COMMANDED, _MEASURED = 2, 6
+"""Columns of `FlightTrace.rates` at which roll, pitch and yaw begin."""
+
+
+class RateLoop(NamedTuple):
+    """What the configuration says of how one axis answers body rates; None where it does not.
+
+    Attributes:
+        lag: s.
+        dead_time: s.
+        acceleration_limit: rad/s².
+    """
+
+    lag: float | None = None
+    dead_time: float | None = None
+    acceleration_limit: float | None = None
+
+
+class DeadTimeWatch:
+    """Compares commands with the rates that follow, and warns once if the configuration is wrong.
+
+    It looks right after an answer has left, when the longest pause until the next sample begins: a
+    look takes about 1 ms (2 to 3 ms behind an acceleration limit), while Python may let what runs
+    in a thread hold up a sample for 5 ms.
+
+    Args:
+        trace: the flight's rows.
+        rate_loops: of roll, pitch and yaw.
+        clock_offset: vehicle time minus ours in s, None while it is not known.
+        note: takes the warning.
+    """
+
+    def __init__(
+        self,
+        trace: FlightTrace,
+        rate_loops: tuple[RateLoop, RateLoop, RateLoop],
+        clock_offset: Callable[[], float | None],
+        note: Callable[[str], None],
+    ) -> None:
+        self._trace = trace
+        self._rate_loops = dict(zip(_AXES, rate_loops, strict=True))
+        self._clock_offset = clock_offset
+        self._note = note
+        self._due = -inf
+        self._looks = 0
+        self._row_counts = deque([0], maxlen=_LOOKS + 1)  # at the last looks
+        self._ages: list[NDArray[np.float64]] = []
+        self._suspected: set[str] = set()
+        self._warned = False
+
+    def after_answer(self, now: float) -> None:
+        """Look, if it is time to; `now` is our clock, s."""
+        if now < self._due:
+            return
+        self._due = now + _PERIOD
+        self._note_ages()
+        if len(self._row_counts) > _LOOKS:
+            name = _AXES[self._looks % len(_AXES)]
+            self._looks += 1
+            self._judge(name, self._dead_time(name, self._trace.rates_rows(self._row_counts[0])))
+
+    def over_the_flight(self) -> DeadTimes:
+        """Measure over all that was flown, and warn if that is still to be done."""
+        rows = self._trace.rates_rows()
+        ages = np.concatenate(self._ages) if self._ages else np.empty(0)
+        measured = DeadTimes(
+            {name: self._dead_time(name, rows) for name in _AXES},
+            SampleAge(*np.percentile(ages, (50, 99)).tolist()) if ages.size else SampleAge(),
+            lag_known=any(loop.lag is not None for loop in self._rate_loops.values()),
+        )
+        self._warn(measured)
+        return measured
+
+    def _note_ages(self) -> None:
+        """How old the samples since the last look were when they arrived."""
+        rows = self._trace.rates_rows(self._row_counts[-1])
+        self._row_counts.append(self._row_counts[-1] + len(rows))
+        offset = self._clock_offset()
+        if offset is not None:
+            self._ages.append(rows[:, 1] + offset - rows[:, 0])
+
+    def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
+        """What the rows say of one axis."""
+        loop, axis = self._rate_loops[name], _AXES.index(name)
+        measured = None
+        if loop.lag is not None:
+            time, commanded, followed = rows[:, [0, _COMMANDED + axis, _MEASURED + axis]].T
+            sure = time < time[-1:] - _UNSURE
+            measured = dead_time_by_correlation(
+                time[sure],
+                commanded[sure],
+                time[sure],
+                followed[sure],
+                loop.lag,
+                loop.acceleration_limit,
+            )
+        return AxisDeadTime(measured, loop.dead_time)
+
+    def _judge(self, name: str, found: AxisDeadTime) -> None:
+        """Warn at the second look in a row that finds the axis wrong: one may be a gust's doing."""
+        if not found.is_wrong:
+            self._suspected.discard(name)
+        elif name in self._suspected:
+            self._warn(DeadTimes({name: found}))
+        else:
+            self._suspected.add(name)
+
+    def _warn(self, found: DeadTimes) -> None:
+        warning = found.warning()
+        if warning is not None and not self._warned:
+            self._warned = True
+            self._note(warning)

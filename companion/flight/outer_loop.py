@@ -1,0 +1,94 @@
+"""The outer loop put together from the configuration."""
+
+from math import radians, tan
+
+from companion.attitude.planner import MODEL_FOLLOWING
+from companion.config import Config
+from companion.flight.motion_estimate import MotionEstimate
+from companion.guidance import (
+    GRAVITY,
+    IMMEDIATE,
+    HeightGains,
+    InnerResponse,
+    LinearGuidance,
+    LinearSettings,
+    MotionObserver,
+    ObserverSettings,
+    Weights,
+    chain_gains,
+)
+
+_MS = 1e-3
+_CALM = Weights(position=1.0, velocity=1.5)
+_CALM_BANDWIDTH = 1.0
+"""Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
+_POSITION_TIME = 0.1
+"""With which the position follows the measured one, s."""
+
+
+def tilt_response(config: Config) -> InnerResponse:
+    """How the coefficients answer their targets: the planner behind the vehicle's rate loop."""
+    gain, vehicle = config.planner.gain_per_s, config.vehicle
+    lag, follows = _MS * (vehicle.lag_ms or 0.0), config.planner_name == MODEL_FOLLOWING
+    if follows:
+        lag = max(0.25 / gain, lag)  # as the planner's own model has it
+    return InnerResponse(gain, lag, _acts_after(config, vehicle.dead_time_ms), follows)
+
+
+def heading_response(config: Config) -> InnerResponse:
+    """How the heading answers its target."""
+    vehicle = config.vehicle
+    lag = vehicle.lag_ms if vehicle.yaw_lag_ms is None else vehicle.yaw_lag_ms
+    dead_time = (
+        vehicle.dead_time_ms if vehicle.yaw_dead_time_ms is None else vehicle.yaw_dead_time_ms
+    )
+    return InnerResponse(
+        config.planner.yaw_gain_per_s,
+        _MS * (lag or 0.0),
+        _acts_after(config, dead_time),
+        config.planner_name == MODEL_FOLLOWING,
+    )
+
+
+def _acts_after(config: Config, dead_time_ms: float | None) -> float:
+    """A command is held for a period of guidance: on average it is half of one late, s."""
+    return _MS * (dead_time_ms or 0.0) + 0.5 / config.guidance.rate_hz
+
+
+def linear_guidance(config: Config) -> LinearGuidance:
+    """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
+    guidance, limits = config.guidance, config.limits
+    tilt, heading = tilt_response(config), heading_response(config)
+    weights = Weights(guidance.position_weight_per_s4, guidance.velocity_weight_per_s2)
+    if _identifies(config):
+        weights = _CALM
+    if not guidance.lead:
+        tilt = heading = IMMEDIATE
+    return LinearGuidance(
+        LinearSettings(
+            gains=chain_gains(weights, tilt_response(config).slowness, guidance.drag_per_s),
+            height=HeightGains(
+                height=guidance.height_gain_per_s,
+                climb=guidance.climb_gain_per_s,
+                max_climb=limits.max_climb_m_s,
+                max_descent=limits.max_descent_m_s,
+            ),
+            tilt=tilt,
+            heading=heading,
+            drag=guidance.drag_per_s,
+            max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
+            thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
+        )
+    )
+
+
+def motion_estimate(config: Config) -> MotionEstimate:
+    """The observer of the motion, with the drag that is fed forward."""
+    guidance = config.guidance
+    bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
+    settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
+    return MotionEstimate(MotionObserver(settings), guidance.drag_per_s)
+
+
+def _identifies(config: Config) -> bool:
+    return "identify" in config.flight.programme

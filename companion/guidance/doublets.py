@@ -1,0 +1,115 @@
+"""Programme `identify`: doublets that tell how the vehicle answers body rates and thrust."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from companion.attitude import BodyRates
+from companion.guidance.reference import Pose, Reference
+
+_SMALL = 0.5
+"""Size of the first doublet of an axis: one size alone cannot tell a slew limit from a lag."""
+_REST = 0.5
+"""Zero rates after a doublet, until the slowest axis has come to rest, s."""
+_CLIMBS = 3
+
+
+class _Part(NamedTuple):
+    """One doublet, +1, −1, +1 for T, 2T, T, of these rates (rad/s) or of this climb (m/s²)."""
+
+    step: float
+    body_rates: BodyRates | None = None
+    climb: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """With the rest after it, s."""
+        return 4.0 * self.step + (0.0 if self.body_rates is None else _REST)
+
+    def at(self, time: float, hold: Reference) -> Reference:
+        """The reference `time` seconds after its beginning; `hold` is what is held otherwise."""
+        if self.body_rates is None:
+            return self._climbing(time, hold)
+        sign = self._sign(time)
+        return hold._replace(body_rates=BodyRates(*(sign * rate for rate in self.body_rates)))
+
+    def _climbing(self, time: float, hold: Reference) -> Reference:
+        step = self.step
+        if time < step:
+            speed, height = time, 0.5 * time * time
+        elif time < 3.0 * step:
+            speed = 2.0 * step - time
+            height = step * step - 0.5 * speed * speed
+        else:
+            speed = time - 4.0 * step
+            height = 0.5 * speed * speed
+        north, east, down = hold.position_ned
+        return hold._replace(
+            position_ned=(north, east, down - self.climb * height),
+            velocity_ned=(0.0, 0.0, -self.climb * speed),
+            acceleration_ned=(0.0, 0.0, -self.climb * self._sign(time)),
+            thrust_steps=True,
+        )
+
+    def _sign(self, time: float) -> float:
+        if time >= 4.0 * self.step:
+            return 0.0
+        return -1.0 if self.step <= time < 3.0 * self.step else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Doublets:
+    """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
+
+    Each axis is excited in half its size, then in full. The angle, A·T at most, returns to where it
+    was; what drift remains is taken out by position hold, which lasts `settle` seconds before each
+    doublet and at the end. Climbs are flown closed loop about a reference that moves so.
+
+    Attributes:
+        tilt_rate: of roll and pitch, rad/s.
+        tilt_step: T in s.
+        yaw_rate: rad/s.
+        yaw_step: T in s; yaw answers more slowly.
+        climb: vertical acceleration, m/s².
+        climb_step: T in s.
+        settle: s.
+    """
+
+    tilt_rate: float
+    tilt_step: float
+    yaw_rate: float
+    yaw_step: float
+    climb: float
+    climb_step: float
+    settle: float
+    name: str = "identify"
+
+    @property
+    def duration(self) -> float:
+        """All doublets with their rests, and the hold around each, s."""
+        return self.settle + sum(part.duration + self.settle for part in self._parts)
+
+    @property
+    def _parts(self) -> tuple[_Part, ...]:
+        tilt, yaw = self.tilt_rate, self.yaw_rate
+        rates = [
+            _Part(step, BodyRates(*(size * rate for rate in axis)))
+            for step, axis in (
+                (self.tilt_step, (tilt, 0.0, 0.0)),
+                (self.tilt_step, (0.0, tilt, 0.0)),
+                (self.yaw_step, (0.0, 0.0, yaw)),
+            )
+            for size in (_SMALL, 1.0)
+        ]
+        return *rates, *(_CLIMBS * [_Part(self.climb_step, climb=self.climb)])
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference: open-loop rates in a doublet, position hold between them."""
+        hold = Reference(start.position_ned, heading=start.heading)
+        for part in self._parts:
+            time -= self.settle
+            if time < 0.0:
+                break
+            if time < part.duration:
+                return part.at(time, hold)
+            time -= part.duration
+        return hold

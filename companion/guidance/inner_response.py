@@ -1,0 +1,75 @@
+"""The response of the attitude loop to its targets, and the lead that undoes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+
+from companion.attitude import Coefficients
+from companion.attitude.representation import wrap_angle
+
+Path = Callable[[float], Coefficients]
+"""Coefficients over time, s."""
+
+_STEP = 2e-3
+"""Over which a path is differentiated, s: its error is some 1e-7 on what a multirotor can fly."""
+
+
+@dataclass(frozen=True, slots=True)
+class InnerResponse:
+    """ċ + lag·c̈ = gain·(c_d − c), some time later.
+
+    Attributes:
+        gain: p, 1/s.
+        lag: of the second order, s; 0 where there is none.
+        dead_time: s.
+        follows_model: whether the planner accounts for its dead time, so that the response is the
+            model's, `dead_time` late: ċ + lag·c̈ = gain·(c_d(t − dead_time) − c). Else the planner
+            compares its target with what it measures, and both act late:
+            ċ + lag·c̈ = gain·(c_d − c)(t − dead_time).
+    """
+
+    gain: float
+    lag: float
+    dead_time: float
+    follows_model: bool
+
+    @property
+    def slowness(self) -> float:
+        """The response as a single lag, s: the delay it has on a steadily moving path."""
+        return 1.0 / self.gain + self.lag + self.dead_time
+
+    def target(self, path: Path, time: float) -> Coefficients:
+        """The target to ask for at `time`, so that the coefficients follow `path` without error."""
+        acts = time + self.dead_time
+        before, there, after = path(acts - _STEP), path(acts), path(acts + _STEP)
+        held = there if self.follows_model or self.dead_time == 0.0 else path(time)
+        return Coefficients(
+            held.north + self._lead(before.north, there.north, after.north),
+            held.east + self._lead(before.east, there.east, after.east),
+        )
+
+    def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
+        """Heading (rad) and its rate (rad/s) to ask for, so that the heading follows its path.
+
+        The planner turns with gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ is left to lead.
+        """
+        acts = time + self.dead_time
+        there = heading(acts)
+        before = there - wrap_angle(there - heading(acts - _STEP))
+        after = there + wrap_angle(heading(acts + _STEP) - there)
+        rate = 0.5 * (after - before) / _STEP
+        held = there if self.follows_model else heading(time)
+        if self.gain == 0.0:
+            return held, rate
+        bend = (after - 2.0 * there + before) / (_STEP * _STEP)
+        return held + self.lag * bend / self.gain, rate
+
+    def _lead(self, before: float, there: float, after: float) -> float:
+        """(ċ + lag·c̈)/gain by central differences."""
+        speed = 0.5 * (after - before) / _STEP
+        bend = (after - 2.0 * there + before) / (_STEP * _STEP)
+        return (speed + self.lag * bend) / self.gain
+
+
+IMMEDIATE = InnerResponse(gain=inf, lag=0.0, dead_time=0.0, follows_model=True)
+"""No delay at all, so nothing is led."""

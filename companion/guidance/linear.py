@@ -1,0 +1,156 @@
+"""Linear guidance: a reference followed without lag through the known linear inner response."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot, sqrt
+from typing import NamedTuple
+
+from companion.attitude import Coefficients, Target
+from companion.guidance.height import HeightGains, acceleration_down
+from companion.guidance.inner_response import InnerResponse
+from companion.guidance.lqr import ChainGains
+from companion.guidance.motion_observer import Horizontal
+from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+from companion.guidance.thrust import height_first
+
+ReferenceAt = Callable[[float], Reference]
+"""The reference over time, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinearSettings:
+    """What linear guidance is computed with.
+
+    Attributes:
+        gains: of the horizontal feedback.
+        height: of the height hold.
+        tilt: response of the coefficients to their targets.
+        heading: response of the heading to its target.
+        drag: linear drag per mass, 1/s.
+        max_horizontal: largest horizontal acceleration asked for, m/s².
+        thrust_lag: of the rotors, s.
+    """
+
+    gains: ChainGains
+    height: HeightGains
+    tilt: InnerResponse
+    heading: InnerResponse
+    drag: float
+    max_horizontal: float
+    thrust_lag: float
+
+
+class Situation(NamedTuple):
+    """What guidance knows when it makes a command.
+
+    Attributes:
+        now: motion as it is.
+        acts: motion as it will be when what is commanded now acts.
+        thrust: horizontal acceleration by the thrust there is, m/s².
+        disturbance: horizontal acceleration that nobody asked for, m/s².
+        thrust_limits: smallest and largest specific thrust there is, m/s².
+    """
+
+    now: VehicleMotion
+    acts: VehicleMotion
+    thrust: Horizontal
+    disturbance: Horizontal
+    thrust_limits: tuple[float, float]
+
+
+class LinearGuidance:
+    """Acceleration = the reference's + feedback of the chain position – velocity – acceleration.
+
+    Drag and the observed disturbance are fed forward. What comes out is a path of coefficients, and
+    the target is led such that they follow it through the inner response (`InnerResponse.target`).
+    """
+
+    def __init__(self, settings: LinearSettings) -> None:
+        self._settings = settings
+
+    @property
+    def acts_after(self) -> float:
+        """How long after it is made a command acts, s."""
+        return self._settings.tilt.dead_time
+
+    def command(
+        self, reference_at: ReferenceAt, time: float, situation: Situation
+    ) -> tuple[Target, float]:
+        """One step.
+
+        Args:
+            reference_at: the reference; asked for a little ahead of `time` too.
+            time: now, s.
+            situation: the vehicle.
+
+        Returns:
+            The planner's target, and the wanted acceleration downwards in m/s².
+        """
+        reference = reference_at(time)
+        lifted = reference_at(time + self._settings.thrust_lag).acceleration_ned
+        down = acceleration_down(
+            self._settings.height, reference._replace(acceleration_ned=lifted), situation.now
+        )
+        heading, heading_rate = self._heading(reference_at, time)
+        if reference.coefficients is not None:
+            north, east = reference.coefficients
+            return Target(north, east, heading, heading_rate), down
+        feedback = self._feedback(reference, reference_at(time + self.acts_after), situation)
+
+        def path(at: float) -> Coefficients:
+            return self._coefficients(reference_at(at), feedback, down, situation.thrust_limits)
+
+        north, east = self._settings.tilt.target(path, time)
+        return Target(north, east, heading, heading_rate), down
+
+    def _feedback(self, now: Reference, acts: Reference, situation: Situation) -> Horizontal:
+        """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
+        settings, gains = self._settings, self._settings.gains
+        wanted = []
+        for axis in (0, 1):
+            place = situation.acts.position_ned[axis] - acts.position_ned[axis]
+            speed = situation.acts.velocity_ned[axis] - acts.velocity_ned[axis]
+            acceleration = (
+                situation.thrust[axis]
+                - settings.drag * situation.now.velocity_ned[axis]
+                + situation.disturbance[axis]
+                - now.acceleration_ned[axis]
+            )
+            wanted.append(
+                -gains.position * place
+                - gains.velocity * speed
+                - gains.acceleration * acceleration
+                - situation.disturbance[axis]
+            )
+        return _limited(wanted[0], wanted[1], settings.max_horizontal)
+
+    def _coefficients(
+        self,
+        reference: Reference,
+        more: Horizontal,
+        down: float,
+        thrust_limits: tuple[float, float],
+    ) -> Coefficients:
+        """Of the thrust that gives the reference's acceleration and `more` against drag."""
+        settings = self._settings
+        north, east = _limited(
+            reference.acceleration_ned[0] + settings.drag * reference.velocity_ned[0] + more[0],
+            reference.acceleration_ned[1] + settings.drag * reference.velocity_ned[1] + more[1],
+            settings.max_horizontal,
+        )
+        north, east, down = height_first((north, east, down), *thrust_limits)
+        # Its vertical part carries g − a_D, the rest is horizontal.
+        vertical = GRAVITY - down
+        thrust = sqrt(north * north + east * east + vertical * vertical)
+        return Coefficients(north / thrust, east / thrust)
+
+    def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
+        """Heading and its rate to ask for, so that the heading follows the reference's."""
+        return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)
+
+
+def _limited(north: float, east: float, most: float) -> Horizontal:
+    length = hypot(north, east)
+    if length <= most:
+        return north, east
+    return north * most / length, east * most / length

@@ -1,0 +1,111 @@
+"""Where the vehicle is now, how fast, and which acceleration nobody asked for: wind and bias."""
+
+from dataclasses import dataclass
+from math import exp, hypot
+
+from companion.guidance.reference import Vector, VehicleMotion
+
+Horizontal = tuple[float, float]
+"""(north, east)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObserverSettings:
+    """How quickly it believes what it measures.
+
+    Attributes:
+        bandwidth: of the disturbance, rad/s: both poles of the observer.
+        position_time: with which the position follows the measured one, s.
+        largest: bound on the disturbance, m/s².
+    """
+
+    bandwidth: float
+    position_time: float
+    largest: float
+
+
+class MotionObserver:
+    """A model that is carried along by the measured attitude and corrected by the measured motion.
+
+    The horizontal acceleration is that of the thrust, which the measured tilt gives, plus drag,
+    plus a disturbance that changes slowly. Since it is the thrust there was and not the one asked
+    for, a saturated command does not wind the disturbance up.
+
+    Attributes:
+        disturbance: horizontal, m/s².
+    """
+
+    def __init__(self, settings: ObserverSettings) -> None:
+        self.disturbance: Horizontal = (0.0, 0.0)
+        self._settings = settings
+        self._motion: VehicleMotion | None = None
+        self._time = 0.0
+
+    def reset(self) -> None:
+        """Forget all: nobody obeyed, or the estimator jumped."""
+        self._motion = None
+        self.disturbance = (0.0, 0.0)
+
+    def observe(self, time: float, measured: VehicleMotion, known: Horizontal) -> None:
+        """Take a measured position and velocity.
+
+        Args:
+            time: of the measurement, vehicle time, s.
+            measured: m and m/s, NED.
+            known: horizontal acceleration by thrust and drag since the last measurement, m/s².
+        """
+        motion, dt = self._motion, time - self._time
+        self._time = time
+        if motion is None or not 0.0 < dt < 1.0:
+            self._motion = measured
+            return
+        settings, disturbance = self._settings, self.disturbance
+        believed = 1.0 - exp(-2.0 * settings.bandwidth * dt)
+        learned = (1.0 - exp(-settings.bandwidth * dt)) ** 2 / dt
+        near = 1.0 - exp(-dt / settings.position_time) if settings.position_time > 0.0 else 1.0
+        position, velocity = list(measured.position_ned), list(measured.velocity_ned)
+        found = [0.0, 0.0]
+        for axis in (0, 1):
+            acceleration = known[axis] + disturbance[axis]
+            p = motion.position_ned[axis] + dt * (
+                motion.velocity_ned[axis] + 0.5 * dt * acceleration
+            )
+            v = motion.velocity_ned[axis] + dt * acceleration
+            position[axis] = p + near * (position[axis] - p)
+            off = velocity[axis] - v
+            velocity[axis] = v + believed * off
+            found[axis] = disturbance[axis] + learned * off
+        self._motion = VehicleMotion(_vector(position), _vector(velocity))
+        self.disturbance = self._bounded(found[0], found[1])
+
+    def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
+        """The motion at a vehicle time (s), moved on from the newest measurement.
+
+        Args:
+            time: vehicle time, s.
+            known: horizontal acceleration by thrust and drag until then, m/s².
+        """
+        motion, dt = self._motion, time - self._time
+        if motion is None:
+            return None
+        (north, east, down), (v_north, v_east, v_down) = motion
+        a_north, a_east = known[0] + self.disturbance[0], known[1] + self.disturbance[1]
+        return VehicleMotion(
+            (
+                north + dt * (v_north + 0.5 * dt * a_north),
+                east + dt * (v_east + 0.5 * dt * a_east),
+                down + dt * v_down,
+            ),
+            (v_north + dt * a_north, v_east + dt * a_east, v_down),
+        )
+
+    def _bounded(self, north: float, east: float) -> Horizontal:
+        length = hypot(north, east)
+        if length <= self._settings.largest:
+            return north, east
+        return north * self._settings.largest / length, east * self._settings.largest / length
+
+
+def _vector(values: list[float]) -> Vector:
+    north, east, down = values
+    return north, east, down

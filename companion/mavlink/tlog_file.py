@@ -1,0 +1,56 @@
+"""Reading a `.tlog`, ours or another program's: the frames in it, with their messages.
+
+A record is the time in microseconds since 1970, 8 bytes big endian, then one frame as it was on
+the wire.
+"""
+
+from collections.abc import Iterator, Set
+from pathlib import Path
+
+from companion.mavlink.codec import CRC_EXTRA, MESSAGE_IDS, Message, decode
+from companion.mavlink.errors import LogError
+from companion.mavlink.framing import V1, V2, Frame, FrameScanner
+
+_STAMP_BYTES = 8
+_V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
+
+
+def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
+    """The intact frames of these messages, in the order in which they were recorded.
+
+    What was being written when recording broke off is left out.
+
+    Raises:
+        LogError: the file cannot be read, or is not a `.tlog`.
+    """
+    wanted = {MESSAGE_IDS[name] for name in names}
+    scanner = FrameScanner(CRC_EXTRA)
+    for raw in _records(path):
+        for frame in scanner.feed(raw):
+            if frame.message_id in wanted:
+                yield frame, decode(frame.message_id, frame.payload)
+
+
+def _records(path: Path) -> Iterator[bytes]:
+    """The frames as bytes, without their stamps."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise LogError(f"{path}: cannot read the log: {error.strerror}") from error
+    at = _STAMP_BYTES
+    while at + 3 <= len(data):
+        magic, size, flags = data[at : at + 3]
+        if magic == V2:
+            end = at + _V2_OVERHEAD + size + (_SIGNATURE if flags & 1 else 0)
+        elif magic == V1:
+            end = at + _V1_OVERHEAD + size
+        elif at == _STAMP_BYTES:
+            break
+        else:
+            raise LogError(f"{path}: damaged after {at} bytes; no MAVLink frame stands there")
+        yield data[at:end]
+        at = end + _STAMP_BYTES
+    if at == _STAMP_BYTES:
+        raise LogError(
+            f"{path}: not a .tlog; expected MAVLink frames, each behind 8 bytes of its time"
+        )

@@ -1,0 +1,72 @@
+"""The dead time that a flight showed, beside the one that the planner was told."""
+
+from dataclasses import dataclass, field
+from math import nan
+from typing import NamedTuple
+
+_TOLERATED = 0.3
+"""Share of the configured dead time by which the measured one may differ."""
+_DOUBT = 0.01
+"""And it may always differ by this, s: no rate loop is just a lag behind a dead time, so what is
+measured depends on what is flown, slow circles or steps, by up to 9 ms."""
+
+
+class AxisDeadTime(NamedTuple):
+    """One axis; each from a sample to the first effect of its answer, s.
+
+    Attributes:
+        measured: None where too little was turned to tell, or the lag is not known.
+        configured: None where the configuration names none.
+    """
+
+    measured: float | None = None
+    configured: float | None = None
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the two differ by more than 30 % of the configured one, and beyond doubt."""
+        if self.measured is None or self.configured is None:
+            return False
+        apart = abs(self.measured - self.configured)
+        return apart > max(_TOLERATED * self.configured, _DOUBT)
+
+
+class SampleAge(NamedTuple):
+    """How old a sample is when it arrives, by TIMESYNC, s: the link's share of the dead time.
+
+    TIMESYNC cannot tell the way to us from the way back: it is wrong by half their difference.
+    """
+
+    p50: float = nan
+    p99: float = nan
+
+
+@dataclass(frozen=True, slots=True)
+class DeadTimes:
+    """What a flight showed.
+
+    Attributes:
+        axes: by name: roll, pitch, yaw.
+        sample_age: NaN where the vehicle's clock was never compared with ours.
+        lag_known: whether the configuration has the lag that a dead time is told apart from.
+    """
+
+    axes: dict[str, AxisDeadTime] = field(
+        default_factory=lambda: dict.fromkeys(("roll", "pitch", "yaw"), AxisDeadTime())
+    )
+    sample_age: SampleAge = field(default_factory=SampleAge)
+    lag_known: bool = False
+
+    def warning(self) -> str | None:
+        """What is wrong and what to do about it, one sentence; None if nothing is."""
+        wrong = [
+            f"{name} {1e3 * axis.measured:.0f} ms, not {1e3 * axis.configured:.0f}"
+            for name, axis in self.axes.items()
+            if axis.is_wrong and axis.measured is not None and axis.configured is not None
+        ]
+        if not wrong:
+            return None
+        return (
+            f"dead time is not as configured: {', '.join(wrong)}; "
+            "find what slows the link, or measure anew with `companion identify`"
+        )

@@ -1,0 +1,99 @@
+"""The second-order model with a dead time that the measured steps come nearest to.
+
+One model for all steps of a flight. It says how linear the response was whatever the planner: one
+that is not first order, by design or behind the vehicle's rate loop, may still be linear.
+"""
+
+from dataclasses import dataclass
+from math import exp, log
+
+import numpy as np
+
+from companion.attitude import Coefficients
+from companion.attitude.reference import SecondOrderReference
+from companion.fitting import minimise, project
+from companion.recording.step_run import Floats, StepRun
+
+_ENOUGH = 600
+"""About so many rows find the model."""
+_LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
+"""Between what 2ζ/ω (s), ζ and the dead time (s) are searched. At ζ = 10 it is first order."""
+_TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
+_TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
+_UNANSWERED = 0.03
+"""No vehicle answers sooner, s: until then it moves as it did before the first step."""
+_REST = Coefficients(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrderFit:
+    """c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ.
+
+    Attributes:
+        frequency: ω, rad/s.
+        damping: ζ.
+        dead_time: from the sample at which the target changed, s.
+    """
+
+    frequency: float
+    damping: float
+    dead_time: float
+
+    def path(self, run: StepRun, thinning: int = 1) -> Floats:
+        """(n, 2) coefficients of the model at every `thinning`-th row of `run`.
+
+        It starts as the measurement does, and keeps that speed until the first target has effect.
+        """
+        model = SecondOrderReference(self.frequency, self.damping)
+        time, steps, state = run.time[::thinning], run.steps(), _start(run)
+        effects = [float(step.time[0]) + self.dead_time for step in steps]
+        out: Floats = state[0] + np.outer(time - run.time[0], state[1])
+        state = np.array([state[0] + self.dead_time * state[1], state[1]])
+        for step, effect, end in zip(steps, effects, [*effects[1:], np.inf], strict=True):
+            goal = np.array([step.target[0], (0.0, 0.0)])
+            inside = (time >= effect) & (time < end)
+            moves = [_transition(model, dt)[0] for dt in (time[inside] - effect).tolist()]
+            out[inside] = np.array(moves).reshape(-1, 2) @ (state - goal) + goal[0]
+            if end < np.inf:
+                state = np.array(_transition(model, end - effect)) @ (state - goal) + goal
+        return out
+
+
+def nearest_second_order(runs: list[StepRun]) -> SecondOrderFit:
+    """Least squares over ω, ζ and dead time."""
+    thinning = 1 + sum(run.time.size for run in runs) // _ENOUGH
+
+    def apart(unknown: Floats) -> tuple[Floats, Floats]:
+        fit = _fit(unknown)
+        rest = [run.measured[::thinning] - fit.path(run, thinning) for run in runs]
+        return np.empty(0), np.concatenate(rest).ravel()
+
+    grid = [
+        np.array([log(lag), log(damping), dead_time])
+        for lag in _TRIED_LAGS
+        for damping in _TRIED_DAMPINGS
+        for dead_time in _TRIED_DEAD_TIMES
+    ]
+    start = min(grid, key=lambda point: float(np.sum(apart(point)[1] ** 2)))
+    lowest, highest = np.array([np.log(_LAG), np.log(_DAMPING), _DEAD_TIME]).T
+    return _fit(minimise(apart, start, lowest, highest).unknown)
+
+
+def _fit(unknown: Floats) -> SecondOrderFit:
+    """From (log 2ζ/ω, log ζ, dead time): unlike ω and ζ these hardly depend on one another."""
+    damping = exp(unknown[1])
+    return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))
+
+
+def _start(run: StepRun) -> Floats:
+    """(2, 2), coefficients and their speed (1/s) as measured while nothing was answered yet."""
+    since = run.time - run.time[0]
+    early = since <= _UNANSWERED
+    columns = np.column_stack((np.ones(int(early.sum())), since[early]))
+    start, _ = project(columns, run.measured[early])
+    return start
+
+
+def _transition(model: SecondOrderReference, dt: float) -> tuple[Coefficients, Coefficients]:
+    """What (c, ċ) = (1, 0), as north, and (0, 1), as east, become within `dt` seconds."""
+    return model.after(Coefficients(1.0, 0.0), Coefficients(0.0, 1.0), _REST, dt)

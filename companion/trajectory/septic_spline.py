@@ -1,0 +1,80 @@
+"""Splines of polynomials of degree 7, given by their value, velocity, acceleration and jerk."""
+
+from bisect import bisect_right
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+ORDER = 4
+"""So many numbers make the state at a knot: the value and its derivatives up to the third."""
+
+_DEGREE = 2 * ORDER - 1
+
+
+def derivative_rows(fractions: Floats, derivative: int) -> Floats:
+    """Derivatives of 1, u, … u⁷ at (n,) places u; (n, 8)."""
+    rows = np.zeros((fractions.size, _DEGREE + 1))
+    for power in range(derivative, _DEGREE + 1):
+        factor = np.prod(np.arange(power - derivative + 1, power + 1))
+        rows[:, power] = factor * fractions ** (power - derivative)
+    return rows
+
+
+def _from_ends() -> Floats:
+    """(8, 8): from the states at u = 0 and u = 1 to the coefficients of 1, u, … u⁷."""
+    ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(ORDER)]
+    return np.round(np.linalg.inv(np.array(ends)) * 6.0) / 6.0
+
+
+FROM_ENDS = _from_ends()
+"""Multiples of 1/6: rounded to them they are exact."""
+
+
+class SepticSpline:
+    """Septic pieces between knots, three times continuously differentiable by construction."""
+
+    def __init__(self, knots: Floats, states: Floats) -> None:
+        """Join the states.
+
+        Args:
+            knots: (k,), increasing, s.
+            states: (k, 4, n): value, first, second and third derivative of n series at each knot.
+        """
+        spans = np.diff(knots)
+        scale = spans[:, None] ** np.arange(ORDER)
+        ends = np.concatenate(
+            (states[:-1] * scale[:, :, None], states[1:] * scale[:, :, None]), axis=1
+        )
+        unit = np.einsum("ij,kjn->kni", FROM_ENDS, ends)
+        pieces = unit / (spans[:, None, None] ** np.arange(_DEGREE + 1))
+        self._knots: list[float] = knots.tolist()
+        self._pieces: list[list[list[float]]] = pieces.tolist()
+
+    @property
+    def begin(self) -> float:
+        """The first knot, s."""
+        return self._knots[0]
+
+    @property
+    def end(self) -> float:
+        """The last knot, s."""
+        return self._knots[-1]
+
+    def at(self, time: float) -> list[tuple[float, float, float, float]]:
+        """Value, first, second and third derivative of each series; plain floats, for flight."""
+        which = min(max(bisect_right(self._knots, time) - 1, 0), len(self._pieces) - 1)
+        u = time - self._knots[which]
+        return [_horner(piece, u) for piece in self._pieces[which]]
+
+
+def _horner(c: list[float], u: float) -> tuple[float, float, float, float]:
+    """Of c₀ + c₁u + … c₇u⁷, and its first three derivatives."""
+    c0, c1, c2, c3, c4, c5, c6, c7 = c
+    return (
+        ((((((c7 * u + c6) * u + c5) * u + c4) * u + c3) * u + c2) * u + c1) * u + c0,
+        (((((7 * c7 * u + 6 * c6) * u + 5 * c5) * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1,
+        ((((42 * c7 * u + 30 * c6) * u + 20 * c5) * u + 12 * c4) * u + 6 * c3) * u + 2 * c2,
+        (((210 * c7 * u + 120 * c6) * u + 60 * c5) * u + 24 * c4) * u + 6 * c3,
+    )

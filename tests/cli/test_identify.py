@@ -1,0 +1,194 @@
+"""`companion identify`, as a user calls it: what is written, what is not, and what is told."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from companion.cli import main
+from companion.config_file import load
+from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
+
+RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
+
+
+def run(capsys, *arguments):
+    try:
+        code = main(["identify", *(str(a) for a in arguments)])
+    except SystemExit as exit_:  # argparse's own way
+        code = exit_.code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    return code, " ".join(captured.out.split()), " ".join(captured.err.split())
+
+
+def config_for(folder, endpoint, **changes):
+    path = folder / "my.yaml"
+    places = {
+        "link": {"endpoint": endpoint, "lockstep": True},
+        "recording": {"directory": str(folder / "flights")},
+        "planner": {"name": "model-following"},
+        "vehicle": {"lag_ms": 20, "dead_time_ms": 900},  # not to be flown with
+    }
+    path.write_text(yaml.safe_dump(merged(merged(QUICK_FLIGHT, places), changes)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """A folder with a configuration and one flight of `identify`, and what that printed."""
+    folder = tmp_path_factory.mktemp("identify")
+    with mock_vehicle(folder, seed=2) as mock:
+        config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
+        done = subprocess.run(
+            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, "COLUMNS": "80"},
+        )
+        assert not mock.state()["armed"]
+    assert done.returncode == 0, done.stderr
+    return folder, done
+
+
+def test_it_flies_fits_writes_and_tells_how_to_include_it(flown):
+    folder, done = flown
+    (written,) = (folder / "flights").glob("*/vehicle.yaml")
+    vehicle = yaml.safe_load(written.read_text())["vehicle"]
+    assert vehicle["lag_ms"] == pytest.approx(47.0, rel=0.15)
+    assert vehicle["dead_time_ms"] == pytest.approx(40.0, abs=5.0)
+    assert vehicle["yaw_lag_ms"] == pytest.approx(370.0, rel=0.15)
+    assert vehicle["yaw_dead_time_ms"] == pytest.approx(102.0, abs=5.0)
+    words = " ".join(done.stderr.split())
+    assert f"include: {written.relative_to(folder)}" in words
+    assert "hovers at 0.49" in words
+    result = json.loads(done.stdout)
+    assert (result["result"], result["file"]) == ("ok", str(written))
+    assert result["yaw"]["lag_ms"] == vehicle["yaw_lag_ms"]
+    assert (written.parent / "config.yaml").is_file()
+
+
+def test_it_flies_with_a_planner_that_needs_no_knowledge_of_the_vehicle(flown):
+    (summary,) = (flown[0] / "flights").glob("*/summary.json")
+    assert json.loads(summary.read_text())["planner"] == "first-order"
+
+
+def test_what_it_wrote_can_be_included(flown, capsys):
+    folder, _ = flown
+    (written,) = (folder / "flights").glob("*/vehicle.yaml")
+    path = folder / "with.yaml"
+    path.write_text(f"include: {written.relative_to(folder)}\nplanner: {{name: model-following}}\n")
+    assert main(["check-config", str(path)]) == 0
+    capsys.readouterr()
+    assert load(path).vehicle.lag_ms == yaml.safe_load(written.read_text())["vehicle"]["lag_ms"]
+    assert load(path).thrust.hover_thrust == pytest.approx(0.49, abs=0.005)
+
+
+def test_a_recorded_flight_gives_the_same_again_and_nothing_is_overwritten(flown, capsys, tmp_path):
+    (folder,) = (flown[0] / "flights").iterdir()
+    first = (folder / "vehicle.yaml").read_text()
+    code, _, err = run(capsys, "--log", folder)
+    assert code == 2
+    assert f"{folder}/vehicle.yaml exists; name another file with --out" in err
+    again = tmp_path / "again.yaml"
+    code, out, _ = run(capsys, "--log", folder / "flight.tlog", "--out", again)
+    assert code == 0
+    assert again.read_text() == first
+    assert f"Written to {again}" in out
+    again.write_text("mine")
+    assert run(capsys, "--log", folder, "--out", again)[0] == 2
+    assert again.read_text() == "mine"
+    assert run(capsys, "--log", folder, "--out", again, "--force")[0] == 0
+    assert again.read_text() == first
+
+
+def test_a_bad_fit_is_not_written_and_says_why_of_each_axis(capsys, tmp_path):
+    log = tmp_path / "flight.tlog"
+    shutil.copy(RECORDINGS / "px4-rate-steps.tlog", log)
+    code, out, _ = run(capsys, "--log", tmp_path)
+    assert code == 1
+    assert "Not written, for the fit is bad: yaw: too little excitation: the commands span" in out
+    assert "roll:" not in out  # roll and pitch are good
+    assert list(tmp_path.iterdir()) == [log]
+    code, out, _ = run(capsys, "--log", log, "--json")
+    result = json.loads(out)
+    assert (code, result["result"].startswith("yaw: too little")) == (1, True)
+
+
+@pytest.mark.parametrize(
+    ("size", "expected", "words"),
+    [
+        (20_000, 1, "pitch: too little excitation"),
+        # No heartbeat follows the first: it is not certain that anything was obeyed.
+        (2_000, 2, "no body rates that the vehicle obeyed"),
+    ],
+)
+def test_a_log_that_broke_off_too_soon_is_refused(capsys, tmp_path, size, expected, words):
+    log = tmp_path / "short.tlog"
+    log.write_bytes((RECORDINGS / "px4-rate-steps.tlog").read_bytes()[:size])
+    code, out, err = run(capsys, "--log", log)
+    assert code == expected
+    assert words in out + err
+    assert list(tmp_path.iterdir()) == [log]
+
+
+def test_a_file_that_is_no_log_is_refused_as_usage(capsys, tmp_path):
+    path = tmp_path / "flight.csv"
+    path.write_text("time,roll\n0.0,1.0\n")
+    code, _, err = run(capsys, "--log", path)
+    assert code == 2
+    assert f"{path}: not a .tlog" in err
+    code, _, err = run(capsys, "--log", tmp_path)
+    assert code == 2
+    assert "flight.tlog: cannot read the log" in err
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [("there.yaml", "exists; name another file with --out"), ("no/v.yaml", "there is no folder")],
+)
+def test_a_place_that_cannot_be_written_is_told_before_flying(capsys, tmp_path, out, words):
+    (tmp_path / "there.yaml").write_text("mine")
+    config = config_for(tmp_path, f"udpin://127.0.0.1:{free_port()}")
+    code, _, err = run(capsys, "--config", config, "--out", tmp_path / out)
+    assert code == 2
+    assert words in err
+    assert not (tmp_path / "flights").exists()
+
+
+def test_a_flight_that_failed_is_not_fitted(capsys, tmp_path):
+    endpoint = f"udpin://127.0.0.1:{free_port()}"
+    config = config_for(
+        tmp_path, endpoint, flight={"connect_timeout_s": 0.3}, link={"lockstep": False}
+    )
+    code, out, err = run(capsys, "--config", config, "--json")
+    assert code == 1
+    assert "no heartbeat" in json.loads(out)["result"]
+    assert "Response to body rates" not in err
+    assert not list((tmp_path / "flights").glob("*/vehicle.yaml"))
+
+
+def test_an_interrupted_flight_is_not_fitted(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        config = config_for(tmp_path, f"udpin://127.0.0.1:{mock.port}")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        mock.until(lambda state: state["mode"] == "OFFBOARD" and state["armed"])
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=30)
+        assert mock.state()["mode"] == "LOITER"
+    assert process.returncode == 1, err
+    assert json.loads(out)["result"] == "interrupted by SIGTERM"
+    assert "Response to body rates" not in err
+    assert not list((tmp_path / "flights").glob("*/vehicle.yaml"))

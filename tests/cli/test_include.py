@@ -1,0 +1,119 @@
+"""`include` in a configuration: which key wins, and which file is blamed."""
+
+import json
+
+import pytest
+import yaml
+
+from companion.cli import main
+from companion.config import Config
+from companion.config_file import changed, json_schema, load
+from companion.yaml_file import ConfigError
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Writes files by name, a `/` in it making a folder."""
+
+    def write(**texts):
+        for name, text in texts.items():
+            path = tmp_path / (name + ".yaml")
+            path.write_text(text)
+        return tmp_path / "main.yaml"
+
+    return write
+
+
+def test_included_keys_stand_below_own_ones_and_beside_them(files):
+    main_file = files(
+        main="include: vehicle.yaml\nvehicle: {lag_ms: 11}\nlimits: {max_tilt_deg: 30}\n",
+        vehicle="vehicle: {lag_ms: 50, dead_time_ms: 40}\nthrust: {hover_thrust: 0.4}\n",
+    )
+    config = load(main_file)
+    assert (config.vehicle.lag_ms, config.vehicle.dead_time_ms) == (11.0, 40.0)
+    assert config.thrust.hover_thrust == 0.4
+    assert config.limits.max_tilt_deg == 30.0
+
+
+def test_a_later_include_wins_over_an_earlier_one(files):
+    one = "vehicle: {lag_ms: 1, dead_time_ms: 2}\n"
+    main_file = files(main="include: [a.yaml, b.yaml]\n", a=one, b="vehicle: {lag_ms: 3}\n")
+    vehicle = load(main_file).vehicle
+    assert (vehicle.lag_ms, vehicle.dead_time_ms) == (3.0, 2.0)
+    main_file.write_text("include: [b.yaml, a.yaml]\n")
+    assert load(main_file).vehicle.lag_ms == 1.0
+
+
+def test_it_is_relative_to_the_including_file(files, tmp_path, monkeypatch):
+    (tmp_path / "flights").mkdir()
+    (tmp_path / "flights" / "vehicle.yaml").write_text("vehicle: {lag_ms: 5}\n")
+    main_file = files(main="include: flights/vehicle.yaml\n")
+    monkeypatch.chdir("/")
+    assert load(main_file).vehicle.lag_ms == 5.0
+
+
+def test_an_empty_included_file_or_section_changes_nothing(files):
+    main_file = files(main="include: [a.yaml, b.yaml]\nvehicle:\n", a="", b="vehicle:\n")
+    assert load(main_file) == Config(include=("a.yaml", "b.yaml"))
+
+
+def test_the_command_line_and_the_record_of_a_flight_see_the_merged_keys(files):
+    main_file = files(main="include: a.yaml\n", a="vehicle: {lag_ms: 5}\n")
+    config = changed(load(main_file), {"planner": {"name": "exact"}}, "the command line")
+    assert (config.vehicle.lag_ms, config.planner.name) == (5.0, "exact")
+    flown = yaml.safe_load(yaml.safe_dump(config.model_dump(mode="json")))
+    assert flown["vehicle"]["lag_ms"] == 5.0
+    assert "include" not in flown
+
+
+@pytest.mark.parametrize(
+    ("included", "words"),
+    [
+        ("vehicle: {lag: 5}", "a.yaml: `vehicle.lag` is not a known key; did you mean `lag_ms`?"),
+        ("vehicel: {lag_ms: 5}", "a.yaml: `vehicel` is not a known key; did you mean `vehicle`?"),
+        ("vehicle: {lag_ms: -5}", "a.yaml: `vehicle.lag_ms`: input should be greater"),
+        ("vehicle: 3", "a.yaml: `vehicle` must hold keys, not 3"),
+        ("- vehicle", "a.yaml: expected keys such as"),
+        ("vehicle: {lag_ms: 1, lag_ms: 2}", "a.yaml, line 1: not valid YAML"),
+        ("include: b.yaml", "a.yaml: `include` must not stand here: an included file must not"),
+        ("mock: {seed: 3}", "a.yaml: `mock` must not stand here"),
+    ],
+)
+def test_what_is_wrong_in_an_included_file_is_told_of_that_file(files, included, words):
+    main_file = files(main="include: a.yaml\nvehicle: {dead_time_ms: 30}\n", a=included)
+    with pytest.raises(ConfigError) as raised:
+        load(main_file)
+    assert str(main_file.with_name("a.yaml")) in str(raised.value)
+    assert words in str(raised.value)
+    assert "main.yaml" not in str(raised.value)
+
+
+def test_faults_of_several_files_are_told_each_of_its_own(files):
+    main_file = files(main="include: a.yaml\nlimits: {tilt: 3}\n", a="vehicle: {lag: 5}\n")
+    with pytest.raises(ConfigError, match=r"a\.yaml: `vehicle\.lag`.*main\.yaml: `limits\.tilt`"):
+        load(main_file)
+
+
+def test_a_missing_included_file_is_named(files):
+    main_file = files(main="include: a.yaml\n")
+    with pytest.raises(ConfigError, match=r"a\.yaml: cannot read the configuration: No such file"):
+        load(main_file)
+
+
+@pytest.mark.parametrize("value", ["3", "[3]", "{a: b}", ""])
+def test_what_is_not_a_file_name_cannot_be_included(files, value):
+    main_file = files(main=f"include: {value}\n")
+    with pytest.raises(ConfigError, match="`include` must be a file or a list of files, not"):
+        load(main_file)
+
+
+def test_check_config_tells_it_as_usage(files, capsys):
+    main_file = files(main="include: a.yaml\n", a="vehicle: {lag: 5}\n")
+    assert main(["check-config", str(main_file)]) == 2
+    assert "a.yaml: `vehicle.lag`" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_schema_knows_include():
+    include = json.loads(json_schema())["properties"]["include"]
+    assert {kind["type"] for kind in include["anyOf"]} == {"string", "array"}
+    assert "own keys win" in include["description"]

@@ -1,0 +1,110 @@
+"""What guidance leaves with the control loop while a programme steers by rates."""
+
+from math import cos, radians, sin
+from types import SimpleNamespace
+
+import pytest
+
+from companion.attitude import BodyRates
+from companion.config import Config
+from companion.flight.guide import Guide
+from companion.flight.outer_loop import linear_guidance, motion_estimate
+from companion.guidance import Doublets
+from companion.mavlink.records import LocalPosition
+from companion.recording.trace import FlightTrace
+
+DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
+IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 0.5, DOUBLETS.duration - 1.5
+HERE = (3.0, 4.0, -5.0)
+
+
+class HoverSpy:
+    """Counts what it is told."""
+
+    smallest, largest = 2.0, 18.0
+
+    def __init__(self):
+        self.observed = self.paused = 0
+
+    def observe(self, time, velocity_down):
+        self.observed += 1
+
+    def note_voltage(self, time, voltage):
+        raise AssertionError("no voltage is known here")
+
+    def pause(self):
+        self.paused += 1
+
+
+class Bench:
+    """A guide that flies the doublets, its clock set by hand."""
+
+    def __init__(self):
+        self.now = 10.0
+        self.hover = HoverSpy()
+        self.loop = SimpleNamespace(command=None, guarded=True)
+        self.state = SimpleNamespace(position=None, landed=False, battery=None)
+        self.guide = Guide(
+            self.loop,
+            linear_guidance(Config()),
+            motion_estimate(Config()),
+            self.hover,
+            self.state,
+            FlightTrace(),
+            max_tilt=radians(30.0),
+            period=0.02,
+            position_stale=0.3,
+            clock=lambda: self.now,
+        )
+        self.fly(0.0, HERE)
+        self.guide.hold_here()
+        self.guide.follow(DOUBLETS)
+
+    def fly(self, after, position=HERE, tilt=0.0):
+        """One step of guidance `after` s of the programme, there and so far rolled over."""
+        self.now = 10.0 + after
+        self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
+        half = 0.5 * radians(tilt)
+        self.guide.note_attitude(SimpleNamespace(q=(cos(half), sin(half), 0.0, 0.0)))
+        self.guide.step()
+        return self.loop.command
+
+
+def test_a_doublets_rates_go_to_the_loop_and_hold_gives_it_a_target():
+    bench = Bench()
+    assert bench.fly(IN_FIRST_DOUBLET).body_rates == BodyRates(0.5, 0.0, 0.0)
+    command = bench.fly(IN_HOLD, position=(0.0, 4.0, -5.0))
+    assert command.body_rates is None
+    assert command.target.north > 0.1
+
+
+def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
+    bench = Bench()
+    bench.fly(IN_FIRST_DOUBLET, tilt=29.0)
+    assert bench.guide.given_up is None
+    command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
+    assert command.body_rates is None
+    assert (
+        bench.guide.given_up
+        == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
+    )
+    assert bench.guide.pose.position_ned == pytest.approx(HERE, abs=0.01)
+    assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None
+    assert not bench.guide.finished
+
+
+def test_position_hold_may_tilt_as_it_must():
+    bench = Bench()
+    bench.fly(IN_HOLD, tilt=31.0)
+    assert bench.guide.given_up is None
+
+
+@pytest.mark.parametrize(
+    ("after", "learns"), [(IN_HOLD, True), (IN_FIRST_DOUBLET, False), (IN_CLIMB, False)]
+)
+def test_the_hover_thrust_is_learned_in_hold_only(after, learns):
+    bench = Bench()
+    observed, paused = bench.hover.observed, bench.hover.paused
+    bench.fly(after)
+    assert bench.hover.observed - observed == int(learns)
+    assert bench.hover.paused - paused == int(not learns)

@@ -1,0 +1,161 @@
+"""Thrust in flight: a wrong hover thrust, a battery that sags, gusts up and down."""
+
+from math import cos, sin
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from companion.flight.hover_learning import HoverLearning
+from companion.guidance import HoverThrust, ThrustSettings
+from companion.mavlink.records import Battery, LocalPosition, ToldThrust
+from tests.flight.fly import fly, mock_vehicle
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+SILENT = {"kind": "stop_telemetry", "messages": ["ATTITUDE_TARGET"]}
+NOT_A_NUMBER = {"kind": "nan_field", "message": "ATTITUDE_TARGET", "field": "thrust"}
+
+
+class Learning:
+    """The learning of a vehicle at 5 m by its autopilot's thrust of 0.4, where 0.5 is expected."""
+
+    def __init__(self):
+        self.hover_thrust = HoverThrust(ThrustSettings(0.5, 0.8, 1.5, 0.1, 0.9))
+        self.state = SimpleNamespace(armed=True, height=5.0, battery=None)
+        self.learning = HoverLearning(self.hover_thrust, self.state)
+        self.now = 100.0
+
+    def hover(self, seconds=1.0, q=LEVEL, told=0.4, age=0.0, obeyed=False, steady=True):
+        for _ in range(round(seconds / 0.02)):
+            self.now += 0.02
+            self.state.told_thrust = None if told is None else ToldThrust(self.now - age, told)
+            self.state.position = LocalPosition(self.now, self.now, (0, 0, -5.0), (0, 0, 0))
+            self.learning.step(self.now, q, obeyed=obeyed, steady=steady)
+        return self.hover_thrust.learned
+
+
+def test_it_is_learned_from_the_autopilots_own_thrust():
+    assert Learning().hover() == pytest.approx(0.4, rel=0.02)
+
+
+def test_the_autopilots_thrust_counts_with_its_tilt():
+    tilted = (cos(0.25), 0.0, sin(0.25), 0.0)
+    assert Learning().hover(q=tilted) == pytest.approx(0.4 * cos(0.5), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("state", "hover"),
+    [
+        ({"height": 0.9}, {}),
+        ({"height": None}, {}),
+        ({"armed": False}, {}),
+        ({"armed": None}, {}),
+        ({}, {"told": None}),
+        ({}, {"age": 0.4}),
+    ],
+)
+def test_it_is_not_learned_from_a_thrust_that_does_not_carry_the_vehicle(state, hover):
+    bench = Learning()
+    vars(bench.state).update(state)
+    assert bench.hover(**hover) == 0.5
+
+
+def test_in_control_and_after_it_the_autopilots_words_do_not_count():
+    bench = Learning()
+    assert bench.hover(obeyed=True) == 0.5  # the control loop sent nothing
+    assert bench.hover() == 0.5
+
+
+def test_in_control_it_is_learned_from_what_was_sent_while_that_is_steady():
+    for steady, learned in ((False, 0.5), (True, 0.4)):
+        bench = Learning()
+        for _ in range(50):
+            bench.hover_thrust.sent(0.4, LEVEL)
+            bench.hover(0.02, told=None, obeyed=True, steady=steady)
+        assert bench.hover_thrust.learned == pytest.approx(learned, rel=0.02)
+
+
+def test_the_batterys_voltage_reaches_the_thrust():
+    bench = Learning()
+    bench.hover_thrust = HoverThrust(ThrustSettings(0.5, 0.8, 1.5, 0.1, 0.9, battery_exponent=2.0))
+    bench.learning = HoverLearning(bench.hover_thrust, bench.state)
+    full = bench.hover_thrust.largest
+    for volts in (16.0, 14.4):
+        for _ in range(20):
+            bench.state.battery = Battery(bench.now, volts, 0.5)
+            bench.hover(0.2, told=None, obeyed=True, steady=False)
+    assert bench.hover_thrust.largest == pytest.approx(0.81 * full, rel=1e-3)
+    bench.learning.stand()
+    assert bench.hover_thrust.largest == full
+
+
+@pytest.mark.parametrize("learned", [0.4, 0.5])
+def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
+    bench = Learning()
+    bench.hover(told=learned)
+    assert bench.learning.surprise() is None  # the vehicle never hung on it
+    bench.hover(0.02, obeyed=True)
+    expected = (
+        "the vehicle hovers at a thrust of 0.40, and thrust.hover_thrust says 0.50; set it to 0.40"
+    )
+    assert bench.learning.surprise() == (expected if learned == 0.4 else None)
+
+
+def height_errors(summary):
+    """Vehicle time since control began, s, and the height error, m."""
+    assert summary.result == "ok"
+    rows = summary.trace.tracking_rows()
+    return rows[:, 0] - rows[0, 0], np.abs(rows[:, 6] - rows[:, 3])
+
+
+@pytest.mark.parametrize(
+    ("wrong_by", "faults"),
+    [(0.6, []), (1.4, []), (0.6, [SILENT]), (1.4, [SILENT]), (0.6, [NOT_A_NUMBER])],
+)
+def test_a_wrong_hover_thrust_costs_little_height(tmp_path, wrong_by, faults):
+    """Acceptance 5, also where the autopilot does not tell its thrust before."""
+    configured = 0.49 * wrong_by
+    with mock_vehicle(tmp_path, faults=faults) as mock:
+        summary = fly(
+            mock,
+            tmp_path / "flight",
+            thrust={"hover_thrust": configured},
+            hover={"duration_s": 8.0},
+        )
+    time, error = height_errors(summary)
+    assert error.max() < (0.5 if faults else 0.15)
+    assert error[time > 5.0].max() < 0.1
+    told = [text for _, text in summary.events if "set it to 0.49" in text]
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("exponent", [2.0, 0.0])
+def test_a_battery_that_sags_costs_little_height(tmp_path, exponent):
+    """Acceptance 5: the voltage falls by 15 % within 9 s, and the thrust by 28 %."""
+    battery = {"capacity_ah": 0.035, "empty_cell_v": 3.57}
+    with mock_vehicle(tmp_path, battery=battery) as mock:
+        summary = fly(
+            mock,
+            tmp_path / "flight",
+            thrust={"battery_exponent": exponent},
+            limits={"min_battery_percent": 0.0},
+            hover={"duration_s": 8.0},
+        )
+    assert height_errors(summary)[1].max() < (0.06 if exponent else 0.15)
+
+
+def test_a_battery_that_drops_at_once_costs_little_height(tmp_path):
+    """Acceptance 5 at its worst: 15 % of the thrust are gone from one moment to the next."""
+    drop = {"kind": "low_battery", "remaining": 0.455, "after_offboard_s": 4.0}
+    with mock_vehicle(tmp_path, faults=[drop]) as mock:
+        summary = fly(mock, tmp_path / "flight", hover={"duration_s": 7.0})
+    time, error = height_errors(summary)
+    assert error.max() < 0.15
+    assert error[time > 6.5].max() < 0.06
+
+
+def test_vertical_gusts_cost_little_height(tmp_path):
+    with mock_vehicle(tmp_path, wind={"vertical_gust_m_s": 0.5}) as mock:
+        summary = fly(mock, tmp_path / "flight", hover={"duration_s": 20.0})
+    assert height_errors(summary)[1].max() < 0.25
+    assert summary.tracking()["height_rms_m"] < 0.06

@@ -1,0 +1,147 @@
+"""Linear guidance against a point mass behind the linear inner response it is made for."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.attitude import Coefficients
+from companion.guidance import (
+    GRAVITY,
+    IMMEDIATE,
+    HeightGains,
+    InnerResponse,
+    LinearGuidance,
+    LinearSettings,
+    Reference,
+    Situation,
+    VehicleMotion,
+    Weights,
+    chain_gains,
+    specific_thrust,
+)
+
+REST = (0.0, 0.0, 0.0)
+THRUST = 2.0, 18.0  # m/s²
+TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
+SETTINGS = LinearSettings(
+    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, 0.5),
+    height=HeightGains(1.5, 3.5, 2.0, 1.0),
+    tilt=TILT,
+    heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
+    drag=0.5,
+    max_horizontal=9.0,
+    thrust_lag=0.05,
+)
+DT = 0.002
+numbers = st.floats(-200, 200)
+
+
+def acceleration(target, down):
+    """World acceleration, but for drag, at the commanded tilt with the commanded height thrust."""
+    sine = math.hypot(target.north, target.east)
+    thrust = specific_thrust(down, math.sqrt(1 - sine * sine))
+    return np.array([thrust * target.north, thrust * target.east, down])
+
+
+def circling(time):
+    """5 m, 1 rad/s, with the heading along the path."""
+    s, c = math.sin(time), math.cos(time)
+    return Reference(
+        (5.0 * s, 5.0 - 5.0 * c, -5.0), (5.0 * c, 5.0 * s, 0.0), (-5.0 * s, 5.0 * c, 0.0), time, 1.0
+    )
+
+
+def flown(settings, reference_at, seconds, wind=REST, start=None):
+    """(S, 2) position errors of a point mass whose coefficients follow the inner response."""
+    guidance, response = LinearGuidance(settings), TILT
+    late = round(response.dead_time / DT)
+    begin = start or reference_at(0.0)
+    p, v = np.array(begin.position_ned), np.array(begin.velocity_ned)
+    wind, c, speed, asked, errors = np.array(wind), np.zeros(2), np.zeros(2), [], []
+    for n in range(round(seconds / DT)):
+        t = n * DT
+        thrust = GRAVITY * c / math.sqrt(1.0 - c @ c)
+        motion = VehicleMotion(tuple(p), tuple(v))
+        ahead = guidance.acts_after
+        known = np.array([*thrust, 0.0]) + settings.drag * (wind - v)
+        acts = VehicleMotion(
+            tuple(p + ahead * v + 0.5 * ahead**2 * known), tuple(v + ahead * known)
+        )
+        situation = Situation(motion, acts, tuple(thrust), tuple(settings.drag * wind[:2]), THRUST)
+        target, down = guidance.command(reference_at, t, situation)
+        asked.append((target.north, target.east))
+        wanted = np.array(asked[max(0, len(asked) - 1 - late)])
+        speed = speed + DT * (response.gain * (wanted - c) - speed) / response.lag
+        c = c + DT * speed
+        v = v + DT * np.array([*known[:2], down])
+        p = p + DT * v
+        errors.append((p - reference_at(t + DT).position_ned)[:2])
+    return np.array(errors)
+
+
+def test_a_circle_is_followed_without_lag():
+    errors = np.hypot(*flown(SETTINGS, circling, 12.0)[-3000:].T)
+    assert errors.max() <= 0.01  # Euler's steps of 2 ms
+    late = replace(SETTINGS, tilt=IMMEDIATE)
+    assert np.hypot(*flown(late, circling, 12.0)[-3000:].T).max() >= 0.2
+
+
+def test_a_known_wind_moves_it_off_no_more_than_for_a_moment():
+    errors = np.hypot(*flown(SETTINGS, lambda _: Reference((0.0, 0.0, -5.0)), 8.0, (6.0, 2.0, 0)).T)
+    assert 0.01 <= errors.max() <= 0.3
+    assert errors[-500:].max() <= 1e-3
+
+
+def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
+    goal = Reference((4.0, -3.0, -20.0), heading=0.3)
+    errors = flown(SETTINGS, lambda _: goal, 15.0, start=Reference((0.0, 0.0, -20.0)))
+    assert np.abs(errors[-1]).max() <= 1e-3
+    guidance = LinearGuidance(SETTINGS)
+    motion = VehicleMotion((4.0, -3.0, -5.0), REST)
+    for _ in range(3000):
+        situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), THRUST)
+        target, down = guidance.command(lambda _: goal, 0.0, situation)
+        speed = motion.velocity_ned[2] + 0.01 * down
+        motion = VehicleMotion(
+            (4.0, -3.0, motion.position_ned[2] + 0.01 * speed), (0.0, 0.0, speed)
+        )
+        assert -2.05 <= speed <= 1.05
+        assert target.heading == pytest.approx(0.3)
+    assert motion.position_ned[2] == pytest.approx(-20.0, abs=0.01)
+
+
+@given(
+    st.tuples(numbers, numbers, numbers),
+    st.tuples(numbers, numbers, numbers),
+    st.tuples(numbers, numbers),
+    st.tuples(numbers, numbers),
+)
+def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
+    motion = VehicleMotion(position, velocity)
+    situation = Situation(motion, motion, thrust, disturbance, THRUST)
+    target, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
+    a = acceleration(target, down)
+    assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
+    assert abs(down) <= 0.5 * GRAVITY
+    assert math.hypot(GRAVITY - down, *a[:2]) <= 18.0 * (1 + 1e-9)
+    assert math.hypot(target.north, target.east) < 1.0
+
+
+def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
+    reference = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
+    motion = VehicleMotion((7.0, 7.0, -4.0), (3.0, 3.0, 0.0))
+    situation = Situation(motion, motion, (0.0, 0.0), (1.0, 1.0), THRUST)
+    target, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
+    assert (target.north, target.east) == (0.2, -0.1)
+    assert down < 0.0
+
+
+def test_the_heading_is_asked_for_ahead_of_its_response():
+    motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
+    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), THRUST)
+    target, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
+    assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))

@@ -1,0 +1,78 @@
+"""The table at the end of a flight says what was measured, and fits a terminal."""
+
+import io
+import math
+
+import pytest
+from rich.console import Console
+
+from companion.attitude import BodyRates
+from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.report import flight_table
+from companion.recording.summary import LoopCounts, Summary
+from companion.recording.trace import FlightTrace
+from tests.recording.test_summary import trace_of
+
+AS_CONFIGURED = DeadTimes(
+    {
+        "roll": AxisDeadTime(0.0421, 0.04),
+        "pitch": AxisDeadTime(0.0419, 0.04),
+        "yaw": AxisDeadTime(None, 0.102),
+    },
+    SampleAge(0.0021, 0.0048),
+    lag_known=True,
+)
+
+
+def table(trace, dead_times=AS_CONFIGURED):
+    """The rows of the table as a user sees them, without its lines."""
+    trace.add_rates(1.0, 2.0, BodyRates(0.1, 0.2, 0.3), 0.5, BodyRates(0.0, 0.0, 0.0))
+    summary = Summary(
+        "ok", "disarm", "exact", 5.0, LoopCounts(7, 6, 1), {}, trace, dead_times=dead_times
+    )
+    out = io.StringIO()
+    Console(file=out, width=80).print(flight_table(summary))
+    assert max(len(line) for line in out.getvalue().splitlines()) <= 80
+    return [" ".join(line.strip("│ ").split()) for line in out.getvalue().splitlines()]
+
+
+def cells(lines, name):
+    """What stands beside `name`."""
+    (line,) = [line for line in lines if line.startswith(f"{name} │")]
+    return [cell.strip() for cell in line.split("│")[1:]]
+
+
+def test_straightness_and_the_nearest_second_order_stand_in_it():
+    trace = trace_of(0.25, bend=0.02)
+    lines = table(trace)
+    response = Summary("ok", "", "exact", 5.0, LoopCounts(), {}, trace).response()
+    straightness = cells(lines, "straightness: largest distance from a step's line")
+    assert straightness == [f"{response.cross_axis_max:.4f}", "0"]
+    model = response.second_order
+    assert cells(lines, "nearest second order: frequency ω")[0] == f"{model.frequency:.1f} rad/s"
+    assert cells(lines, "damping ζ")[0] == f"{model.damping:.2f}"
+    assert cells(lines, "dead time")[0] == f"{1e3 * model.dead_time:.0f} ms"
+    deviation = cells(lines, "largest deviation from it")[0]
+    assert float(deviation) == pytest.approx(response.second_order_deviation_max, abs=1e-4)
+
+
+def test_dead_times_stand_beside_what_was_configured():
+    lines = table(FlightTrace())
+    assert cells(lines, "roll") == ["42 ms", "40 ms"]
+    assert cells(lines, "yaw") == ["too little turned to tell", "102 ms"]
+    assert cells(lines, "of it a sample's age (p50, p99)")[0] == "2.1, 4.8 ms"
+    assert "not as configured" not in " ".join(lines)
+
+
+def test_a_wrong_dead_time_is_told_below_the_table():
+    wrong = DeadTimes({**AS_CONFIGURED.axes, "pitch": AxisDeadTime(0.08, 0.04)}, lag_known=True)
+    lines = table(FlightTrace(), wrong)
+    assert "pitch 80 ms, not 40" in " ".join(lines)
+    assert not any("sample's age" in line for line in lines)  # the clocks were never compared
+
+
+def test_without_a_lag_it_says_where_one_comes_from():
+    lines = table(FlightTrace(), DeadTimes())
+    assert "vehicle.lag_ms is not set (`companion identify` finds it)" in " ".join(lines)
+    assert not any(line.startswith("roll") for line in lines)
+    assert math.isnan(DeadTimes().sample_age.p50)
