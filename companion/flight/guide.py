@@ -60,7 +60,7 @@ class Guide:
         self.given_up: str | None = None
         self._loop = loop
         self._guidance = guidance
-        self._estimate = estimate
+        self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self._state = state
         self._trace = trace
@@ -75,7 +75,7 @@ class Guide:
         """Keep the newest attitude that has a heading."""
         if is_unit(sample.q):
             self._q = sample.q
-            self._estimate.note_attitude(sample)
+            self.estimate.note_attitude(sample)
 
     def stand_by(self) -> None:
         """Hold nothing: idle on the ground, damp the motion in the air."""
@@ -121,13 +121,13 @@ class Guide:
             self.learning.stand()
             self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
             return
-        self._estimate.note_position(position)
+        self.estimate.note_position(position, obeyed=self._loop.guarded)
         situation = self._situation(now)
         self._give_up_if_tilted()
         reference_at = self._reference(situation.now)
         reference = reference_at(now)
         target, down = self._guidance.command(reference_at, now, situation)
-        self._estimate.vertical = GRAVITY - down
+        self.estimate.vertical = GRAVITY - down
         self._loop.command = Command(
             target,
             down,
@@ -146,7 +146,7 @@ class Guide:
         return heading(self._q)
 
     def _situation(self, now: float) -> Situation:
-        return self._estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)
+        return self.estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)
 
     def _reference(self, motion: VehicleMotion) -> ReferenceAt:
         """What is to be flown, by our clock."""

@@ -1,13 +1,17 @@
 """What guidance knows of the motion: measured positions, carried on by the measured attitude."""
 
 from companion.attitude.kinematics import tilt_products
-from companion.guidance import GRAVITY, MotionObserver, Situation, VehicleMotion
+from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
 from companion.guidance.motion_observer import Horizontal
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
 
 _LEAST_COSINE = 0.2
 """Of the tilt; beyond 78° the thrust is not what height hold asked for."""
+_LONGEST = 0.2
+"""Between two positions, s: further apart they say nothing of what happened between."""
+_WORTH_TELLING = 0.15
+"""By so much the drag must be off to be told, 1/s."""
 
 
 class MotionEstimate:
@@ -18,10 +22,10 @@ class MotionEstimate:
 
     Args:
         observer: of position, velocity and disturbance.
-        drag: linear drag per mass, 1/s.
+        drag: of the vehicle.
     """
 
-    def __init__(self, observer: MotionObserver, drag: float) -> None:
+    def __init__(self, observer: MotionObserver, drag: DragEstimate) -> None:
         self.vertical = GRAVITY
         self._observer = observer
         self._drag = drag
@@ -39,17 +43,22 @@ class MotionEstimate:
         self._east += east
         self._samples += 1
 
-    def note_position(self, position: LocalPosition) -> None:
-        """Take a measured position and velocity; the same one twice counts once."""
-        if self._position is not None and position.vehicle_time == self._position.vehicle_time:
+    def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
+        """Take a measured position and velocity; the same one twice counts once.
+
+        Drag is learned only while the autopilot obeys, since only then our thrust is known.
+        """
+        before, self._position = self._position, position
+        if before is not None and position.vehicle_time == before.vehicle_time:
             return
-        self._position = position
         slope = self._slope
         if self._samples:
             slope = self._north / self._samples, self._east / self._samples
         measured = VehicleMotion(position.position_ned, position.velocity_ned)
         known = self._known(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known)
+        if obeyed and before is not None:
+            self._learn_drag(before, position, slope)
         self._north = self._east = 0.0
         self._samples = 0
 
@@ -73,12 +82,35 @@ class MotionEstimate:
         later = self._observer.at(time + ahead, known) or still
         north, east = self._slope
         thrust = self.vertical * north, self.vertical * east
-        return Situation(motion, later, thrust, self._observer.disturbance, thrust_limits)
+        disturbance, drag = self._observer.disturbance, self._drag.drag
+        return Situation(motion, later, thrust, disturbance, drag, thrust_limits)
+
+    def surprise(self) -> str | None:
+        """In words, where the drag is another than the configuration says."""
+        configured, learned = self._drag.configured, self._drag.drag
+        if not self._drag.certain or abs(learned - configured) <= _WORTH_TELLING:
+            return None
+        return (
+            f"the vehicle's drag is {learned:.2f} 1/s, and guidance.drag_per_s says "
+            f"{configured:.2f}; set it to {learned:.2f}"
+        )
+
+    def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: Horizontal) -> None:
+        dt = now.vehicle_time - before.vehicle_time
+        if not 0.0 < dt < _LONGEST:
+            return
+        old, new = before.velocity_ned, now.velocity_ned
+        self._drag.observe(
+            dt,
+            (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1])),
+            (
+                (new[0] - old[0]) / dt - self.vertical * slope[0],
+                (new[1] - old[1]) / dt - self.vertical * slope[1],
+            ),
+        )
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration by thrust and drag, m/s²."""
         north, east, _ = motion.velocity_ned
-        return (
-            self.vertical * slope[0] - self._drag * north,
-            self.vertical * slope[1] - self._drag * east,
-        )
+        drag = self._drag.drag
+        return self.vertical * slope[0] - drag * north, self.vertical * slope[1] - drag * east

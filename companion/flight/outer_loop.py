@@ -8,6 +8,7 @@ from companion.flight.motion_estimate import MotionEstimate
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
+    DragEstimate,
     HeightGains,
     InnerResponse,
     LinearGuidance,
@@ -75,7 +76,6 @@ def linear_guidance(config: Config) -> LinearGuidance:
             ),
             tilt=tilt,
             heading=heading,
-            drag=guidance.drag_per_s,
             max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
             thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
         )
@@ -87,7 +87,7 @@ def motion_estimate(config: Config) -> MotionEstimate:
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
     settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), guidance.drag_per_s)
+    return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s))
 
 
 def _identifies(config: Config) -> bool:

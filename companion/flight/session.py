@@ -112,9 +112,10 @@ class Session:
         }
         flight = assembled.flight
         dead_times = assembled.dead_time_watch.over_the_flight()
-        surprise = assembled.rig.guide.learning.surprise()
-        if surprise is not None:
-            flight.note(surprise)
+        guide = assembled.rig.guide
+        for surprise in (guide.learning.surprise(), guide.estimate.surprise()):
+            if surprise is not None:
+                flight.note(surprise)
         summary = Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,

@@ -1,6 +1,7 @@
 """Pure maths of the outer loop: what to fly, which acceleration that takes, and how much thrust."""
 
 from companion.guidance.doublets import Doublets
+from companion.guidance.drag_estimate import DragEstimate
 from companion.guidance.height import HeightGains
 from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
@@ -17,6 +18,7 @@ __all__ = [
     "Circle",
     "Corners",
     "Doublets",
+    "DragEstimate",
     "HeightGains",
     "Hover",
     "HoverThrust",

@@ -26,7 +26,6 @@ class LinearSettings:
         height: of the height hold.
         tilt: response of the coefficients to their targets.
         heading: response of the heading to its target.
-        drag: linear drag per mass, 1/s.
         max_horizontal: largest horizontal acceleration asked for, m/s².
         thrust_lag: of the rotors, s.
     """
@@ -35,7 +34,6 @@ class LinearSettings:
     height: HeightGains
     tilt: InnerResponse
     heading: InnerResponse
-    drag: float
     max_horizontal: float
     thrust_lag: float
 
@@ -48,6 +46,7 @@ class Situation(NamedTuple):
         acts: motion as it will be when what is commanded now acts.
         thrust: horizontal acceleration by the thrust there is, m/s².
         disturbance: horizontal acceleration that nobody asked for, m/s².
+        drag: linear drag per mass, 1/s.
         thrust_limits: smallest and largest specific thrust there is, m/s².
     """
 
@@ -55,6 +54,7 @@ class Situation(NamedTuple):
     acts: VehicleMotion
     thrust: Horizontal
     disturbance: Horizontal
+    drag: float
     thrust_limits: tuple[float, float]
 
 
@@ -98,7 +98,7 @@ class LinearGuidance:
         feedback = self._feedback(reference, reference_at(time + self.acts_after), situation)
 
         def path(at: float) -> Coefficients:
-            return self._coefficients(reference_at(at), feedback, down, situation.thrust_limits)
+            return self._coefficients(reference_at(at), feedback, down, situation)
 
         north, east = self._settings.tilt.target(path, time)
         return Target(north, east, heading, heading_rate), down
@@ -112,7 +112,7 @@ class LinearGuidance:
             speed = situation.acts.velocity_ned[axis] - acts.velocity_ned[axis]
             acceleration = (
                 situation.thrust[axis]
-                - settings.drag * situation.now.velocity_ned[axis]
+                - situation.drag * situation.now.velocity_ned[axis]
                 + situation.disturbance[axis]
                 - now.acceleration_ned[axis]
             )
@@ -125,20 +125,15 @@ class LinearGuidance:
         return _limited(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
-        self,
-        reference: Reference,
-        more: Horizontal,
-        down: float,
-        thrust_limits: tuple[float, float],
+        self, reference: Reference, more: Horizontal, down: float, situation: Situation
     ) -> Coefficients:
         """Of the thrust that gives the reference's acceleration and `more` against drag."""
-        settings = self._settings
         north, east = _limited(
-            reference.acceleration_ned[0] + settings.drag * reference.velocity_ned[0] + more[0],
-            reference.acceleration_ned[1] + settings.drag * reference.velocity_ned[1] + more[1],
-            settings.max_horizontal,
+            reference.acceleration_ned[0] + situation.drag * reference.velocity_ned[0] + more[0],
+            reference.acceleration_ned[1] + situation.drag * reference.velocity_ned[1] + more[1],
+            self._settings.max_horizontal,
         )
-        north, east, down = height_first((north, east, down), *thrust_limits)
+        north, east, down = height_first((north, east, down), *situation.thrust_limits)
         # Its vertical part carries g − a_D, the rest is horizontal.
         vertical = GRAVITY - down
         thrust = sqrt(north * north + east * east + vertical * vertical)

@@ -26,13 +26,13 @@ from companion.guidance import (
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²
+DRAG = 0.5  # 1/s
 TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
 SETTINGS = LinearSettings(
-    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, 0.5),
+    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, DRAG),
     height=HeightGains(1.5, 3.5, 2.0, 1.0),
     tilt=TILT,
     heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
-    drag=0.5,
     max_horizontal=9.0,
     thrust_lag=0.05,
 )
@@ -67,11 +67,11 @@ def flown(settings, reference_at, seconds, wind=REST, start=None):
         thrust = GRAVITY * c / math.sqrt(1.0 - c @ c)
         motion = VehicleMotion(tuple(p), tuple(v))
         ahead = guidance.acts_after
-        known = np.array([*thrust, 0.0]) + settings.drag * (wind - v)
+        known = np.array([*thrust, 0.0]) + DRAG * (wind - v)
         acts = VehicleMotion(
             tuple(p + ahead * v + 0.5 * ahead**2 * known), tuple(v + ahead * known)
         )
-        situation = Situation(motion, acts, tuple(thrust), tuple(settings.drag * wind[:2]), THRUST)
+        situation = Situation(motion, acts, tuple(thrust), tuple(DRAG * wind[:2]), DRAG, THRUST)
         target, down = guidance.command(reference_at, t, situation)
         asked.append((target.north, target.east))
         wanted = np.array(asked[max(0, len(asked) - 1 - late)])
@@ -103,7 +103,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
     guidance = LinearGuidance(SETTINGS)
     motion = VehicleMotion((4.0, -3.0, -5.0), REST)
     for _ in range(3000):
-        situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), THRUST)
+        situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
         target, down = guidance.command(lambda _: goal, 0.0, situation)
         speed = motion.velocity_ned[2] + 0.01 * down
         motion = VehicleMotion(
@@ -122,7 +122,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
 )
 def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
     motion = VehicleMotion(position, velocity)
-    situation = Situation(motion, motion, thrust, disturbance, THRUST)
+    situation = Situation(motion, motion, thrust, disturbance, DRAG, THRUST)
     target, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
     a = acceleration(target, down)
     assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
@@ -134,7 +134,7 @@ def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
 def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
     reference = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
     motion = VehicleMotion((7.0, 7.0, -4.0), (3.0, 3.0, 0.0))
-    situation = Situation(motion, motion, (0.0, 0.0), (1.0, 1.0), THRUST)
+    situation = Situation(motion, motion, (0.0, 0.0), (1.0, 1.0), DRAG, THRUST)
     target, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
     assert (target.north, target.east) == (0.2, -0.1)
     assert down < 0.0
@@ -142,6 +142,6 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
 
 def test_the_heading_is_asked_for_ahead_of_its_response():
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
-    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), THRUST)
+    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     target, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))

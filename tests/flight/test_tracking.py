@@ -1,0 +1,91 @@
+"""Trajectories flown whole by linear guidance, with a delayed and noisy position at 30 Hz."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from companion.attitude.representation import wrap_angle
+from companion.config import Config
+from companion.flight import programmes
+from companion.flight.follow import Follow
+from companion.guidance import Pose
+from companion.trajectory import Laps, gerono_eight
+from companion.yaml_file import ConfigError, parse
+from tests.flight.fly import fly, merged, mock_vehicle
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+GUSTY = {"speed_m_s": 3.0, "gust_m_s": 1.0}
+SHIPPED = yaml.safe_load((CONFIGS / "mock-px4.yaml").read_text())
+FAST = {
+    "planner": {"name": "auto"},
+    "vehicle": yaml.safe_load((CONFIGS / "vehicle-px4.yaml").read_text())["vehicle"],
+    "limits": {"max_tilt_deg": 58, "max_tilt_rate_deg_s": 250},
+    "link": {"position_rate_hz": 30},
+    "guidance": SHIPPED["guidance"],
+    "thrust": SHIPPED["thrust"],
+    "flight": {"takeoff_height_m": 5.0},
+}
+
+
+def following(name, **changes):
+    path = CONFIGS / "trajectories" / name
+    flight = {"programme": ["trajectory"], "trajectory": str(path)}
+    return merged(merged(FAST, {"flight": flight}), changes)
+
+
+def flown(folder, name, wind=None, **changes):
+    folder.mkdir(exist_ok=True)
+    with mock_vehicle(folder, seed=3, wind=wind or {}) as mock:
+        summary = fly(mock, folder / "log", **following(name, **changes))
+    assert summary.result == "ok", summary.events
+    return summary
+
+
+@pytest.mark.parametrize(
+    ("name", "wind", "most"),
+    [("figure8.yaml", None, 0.06), ("figure8.yaml", GUSTY, 0.12), ("circle5.yaml", None, 0.08)],
+)
+def test_it_is_followed_within_centimetres(name, wind, most, tmp_path):
+    tracking = flown(tmp_path, name, wind).tracking()
+    assert tracking["position_rms_m"] <= most
+    assert tracking["height_rms_m"] <= 0.05
+
+
+def test_without_the_lead_it_is_more_than_three_times_worse(tmp_path):
+    led = flown(tmp_path / "led", "figure8.yaml").tracking()["position_rms_m"]
+    late = flown(tmp_path / "late", "figure8.yaml", guidance={"lead": False}).tracking()
+    assert late["position_rms_m"] >= 3.0 * led
+
+
+def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
+    summary = flown(tmp_path, "circle5.yaml", guidance={"drag_per_s": 0.0})
+    assert summary.tracking()["position_rms_m"] <= 0.12
+    (told,) = [text for _, text in summary.events if "drag" in text]
+    assert "guidance.drag_per_s says 0.00; set it to 0.9" in told
+
+
+def test_what_the_limits_do_not_allow_is_refused_or_slowed_down(tmp_path):
+    slow = following("figure8.yaml", limits={"max_tilt_deg": 30})
+    with pytest.raises(ConfigError) as refused:
+        programmes.programme(parse(yaml.safe_dump(slow), "test", Config))
+    assert "° of tilt, limits.max_tilt_deg allows 30" in str(refused.value)
+    assert "--slow-down" in str(refused.value)
+    with mock_vehicle(tmp_path, seed=3) as mock:
+        summary = fly(mock, tmp_path / "log", **merged(slow, {"flight": {"slow_down": True}}))
+    assert summary.result == "ok", summary.events
+    assert summary.tracking()["position_rms_m"] <= 0.06
+    assert any("slowed down 1." in text for _, text in summary.events)
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0, -3.0])
+def test_a_trajectory_along_its_path_begins_with_a_turn_from_the_vehicles_heading(heading):
+    eight = gerono_eight(3.0, Laps(2.0, along=True))
+    part, start = Follow(eight, yaw_rate=1.0), Pose((1.0, 2.0, -5.0), heading)
+    longest = part.duration
+    first = part.at(0.0, start)
+    assert first.position_ned == start.position_ned
+    assert wrap_angle(first.heading - heading) == pytest.approx(0.0, abs=1e-9)
+    assert part.duration <= longest
+    end = part.at(part.duration, start)
+    assert end.position_ned == pytest.approx(start.position_ned, abs=1e-6)
