@@ -165,10 +165,12 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
         trace,
         rate_limits(config),
     )
+    # In lockstep there is one clock, and a round trip takes a step however quick the link is.
+    offset = (lambda: 0.0) if config.link.lockstep else lambda: link.timesync.offset_s
     guide = Guide(
         loop,
         linear_guidance(config),
-        motion_estimate(config),
+        motion_estimate(config, offset),
         thrust,
         link.state,
         trace,
@@ -191,7 +193,5 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
     for part in rig.programme.parts:
         if isinstance(part, Follow) and part.slowed > 1.0:
             flight.note(f"{part.name} is slowed down {part.slowed:.2f} times to keep the limits")
-    # In lockstep there is one clock, and a round trip takes a step however quick the link is.
-    offset = (lambda: 0.0) if config.link.lockstep else lambda: link.timesync.offset_s
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), offset, flight.note)
     return Assembled(flight, rig, trace, dead_time_watch)

@@ -1,5 +1,7 @@
 """What guidance knows of the motion: measured positions, carried on by the measured attitude."""
 
+from collections.abc import Callable
+
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
 from companion.guidance.motion_observer import Horizontal
@@ -10,6 +12,8 @@ _LEAST_COSINE = 0.2
 """Of the tilt; beyond 78° the thrust is not what height hold asked for."""
 _LONGEST = 0.2
 """Between two positions, s: further apart they say nothing of what happened between."""
+_OLDEST = 0.1
+"""On its way no position is longer, s; clocks that say so do not belong together."""
 _WORTH_TELLING = 0.15
 """By so much the drag must be off to be told, 1/s."""
 
@@ -23,12 +27,20 @@ class MotionEstimate:
     Args:
         observer: of position, velocity and disturbance.
         drag: of the vehicle.
+        offset: the vehicle's clock minus ours, s, if it is known: it tells how old a position was
+            when it came.
     """
 
-    def __init__(self, observer: MotionObserver, drag: DragEstimate) -> None:
+    def __init__(
+        self,
+        observer: MotionObserver,
+        drag: DragEstimate,
+        offset: Callable[[], float | None] = lambda: None,
+    ) -> None:
         self.vertical = GRAVITY
         self._observer = observer
         self._drag = drag
+        self._offset = offset
         self._slope: Horizontal = (0.0, 0.0)
         self._north = self._east = 0.0
         self._samples = 0
@@ -75,7 +87,7 @@ class MotionEstimate:
         """
         if self._position is None:
             raise RuntimeError("guidance was asked to hold before any position came")
-        time = self._position.vehicle_time + now - self._position.received
+        time = self._vehicle_time(now, self._position)
         still = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         motion = self._observer.at(time, self._known(self._slope, still)) or still
         known = self._known(self._slope, motion)
@@ -84,6 +96,14 @@ class MotionEstimate:
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self._drag.drag
         return Situation(motion, later, thrust, disturbance, drag, thrust_limits)
+
+    def _vehicle_time(self, now: float, position: LocalPosition) -> float:
+        """Our time as the vehicle's, s."""
+        at_least = position.vehicle_time + now - position.received
+        offset = self._offset()
+        if offset is None or not at_least <= now + offset <= at_least + _OLDEST:
+            return at_least
+        return now + offset
 
     def surprise(self) -> str | None:
         """In words, where the drag is another than the configuration says."""

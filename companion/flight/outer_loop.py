@@ -1,5 +1,6 @@
 """The outer loop put together from the configuration."""
 
+from collections.abc import Callable
 from math import radians, tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
@@ -82,12 +83,19 @@ def linear_guidance(config: Config) -> LinearGuidance:
     )
 
 
-def motion_estimate(config: Config) -> MotionEstimate:
-    """The observer of the motion, with the drag that is fed forward."""
+def motion_estimate(
+    config: Config, offset: Callable[[], float | None] = lambda: None
+) -> MotionEstimate:
+    """The observer of the motion, with the drag that is fed forward.
+
+    Args:
+        config: as it is flown.
+        offset: the vehicle's clock minus ours, s, if it is known.
+    """
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
     settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s))
+    return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s), offset)
 
 
 def _identifies(config: Config) -> bool:
