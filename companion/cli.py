@@ -19,7 +19,7 @@ from companion.config_sections import FlightConfig
 from companion.extras import MissingExtraError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.recording.figure import FigureError
-from companion.study.names import STUDY_NAMES
+from companion.study.names import STUDY_NAMES, TRACK
 from companion.yaml_file import ConfigError
 
 _PACKAGE = "mavlink-companion"
@@ -180,6 +180,9 @@ def _add_study(commands: Commands) -> None:
     )
     study.add_argument(
         "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
+    )
+    study.add_argument(
+        "--json", action="store_true", help=f"of {TRACK}: print its rows as one JSON list"
     )
     study.set_defaults(run=tools.study)
 

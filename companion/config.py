@@ -9,20 +9,22 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
-from companion.config_sections import (
-    AUTO,
+from companion.config_programmes import (
     CircleConfig,
     CornersConfig,
+    HoverConfig,
+    IdentifyConfig,
+    StepsConfig,
+)
+from companion.config_sections import (
+    AUTO,
     DeadmanConfig,
     FlightConfig,
     GuidanceConfig,
-    HoverConfig,
-    IdentifyConfig,
     LimitsConfig,
     LinkConfig,
     PlannerConfig,
     RecordingConfig,
-    StepsConfig,
     ThrustConfig,
     VehicleConfig,
 )
@@ -120,6 +122,10 @@ def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
     """As `_contradictions`, of the programme `identify`."""
     limits, identify = config.limits, config.identify
     return [
+        (
+            len(config.flight.programme) > 1,
+            "flight.programme: identify is flown alone, with a calm hold between its doublets",
+        ),
         (
             identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed "

@@ -125,7 +125,8 @@ class LimitsConfig(Section):
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
-    """Beyond this tilt first-order and exact first bring the thrust axis up, the shortest way."""
+    """Beyond this tilt the thrust axis is first brought up, the shortest way (not by quaternion,
+    so3 and euler)."""
     min_thrust: Share = 0.1
     """Smallest normalised thrust sent in flight."""
     max_thrust: Share = 0.9
@@ -177,6 +178,9 @@ class DeadmanConfig(Section):
 class GuidanceConfig(Section):
     """Linear guidance above the attitude law: a reference followed without lag."""
 
+    kind: Literal["linear", "nmpc"] = "linear"
+    """linear, or nmpc: nonlinear model predictive control follows trajectories, in a process of
+    its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """How often guidance makes a new target."""
     position_weight_per_s4: Positive = 40.0
@@ -251,67 +255,6 @@ class FlightConfig(Section):
     """Wait this long to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
     """Wait this long for the autopilot to report that it has landed."""
-
-
-class HoverConfig(Section):
-    """Programme `hover`: stay where control began."""
-
-    duration_s: Seconds = 3.0
-    """How long."""
-
-
-class StepsConfig(Section):
-    """Programme `steps`: acceleration doublets along north, east and a diagonal."""
-
-    coefficient: Annotated[float, Field(gt=0.0, le=0.7)] = 0.25
-    """Size of a step: horizontal acceleration per specific thrust, the sine of the tilt."""
-    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.0
-    """How long the first part of a doublet lasts; the middle part takes twice as long."""
-    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
-    """Position hold between doublets."""
-
-
-class CornersConfig(Section):
-    """Programme `corners`: acceleration steps past level, where the planners differ."""
-
-    north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
-    """North at each corner, but for the sign; the tilt has the sine √(north² + east²)."""
-    east_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
-    """East at each corner. North 0.4, east 0.5 are the steps of the paper's figure 2."""
-    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
-    """How long each corner is held."""
-    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
-    """Position hold at the end."""
-
-
-class CircleConfig(Section):
-    """Programme `circle`: laps at a steady speed, heading held."""
-
-    radius_m: Positive = 3.0
-    """Radius; the circle begins where the vehicle is and lies north of it."""
-    speed_m_s: Positive = 2.0
-    """Speed along the circle, reached and left smoothly."""
-    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
-    """How often round, gathering speed and braking included."""
-
-
-class IdentifyConfig(Section):
-    """Programme `identify`, flown by `companion identify`: doublets of body rates and of climb."""
-
-    tilt_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 60.0
-    """Roll and pitch rate of the larger doublets; the smaller ones have half of it."""
-    tilt_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
-    """How long their first part lasts; with the rate it gives how far the vehicle tilts."""
-    yaw_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 50.0
-    """Yaw rate of the larger doublet; the smaller one has half of it."""
-    yaw_duration_s: Annotated[float, Field(ge=0.2, le=3.0)] = 1.2
-    """The same for yaw, which answers more slowly."""
-    climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
-    """Vertical acceleration of the doublets that tell the thrust."""
-    climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
-    """How long their first part lasts; the vehicle rises by climb_m_s2 times its square."""
-    settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
-    """Position hold before each doublet and at the end."""
 
 
 class RecordingConfig(Section):

@@ -38,6 +38,7 @@ def test_imports_point_one_way():
         ("companion/attitude/history.py", "import numpy"),
         ("companion/mavlink/link.py", "import companion.recording.tlog"),
         ("companion/recording/tlog.py", "import companion.config"),
+        ("companion/nmpc/messages.py", "import casadi"),
         ("companion/flight/watch.py", "import companion.study.step"),
         ("companion/batch/__init__.py", "import companion.study.step"),
         ("companion/study/inner_loop.py", "import sitl_mock.vehicle"),

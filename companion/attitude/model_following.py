@@ -27,6 +27,7 @@ SHARE_OF_LARGEST_GAIN = 0.25
 """Of the largest stable gain, at most this is fed back: a gain margin of 4, and no overshoot."""
 
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
+_FASTEST = 100.0  # rad/s
 _QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample rate
 
 
@@ -74,7 +75,7 @@ class ModelFollowingPlanner:
 
         Args:
             q: attitude.
-            body_rates: rad/s; the plan goes on with them. None: at rest.
+            body_rates: rad/s; the plan goes on with them. None, or what no vehicle does: at rest.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -82,6 +83,7 @@ class ModelFollowingPlanner:
         w, x, y, z = normalised(q)
         square, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
+        body_rates = _believable(body_rates)
         if body_rates is not None:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
@@ -117,6 +119,7 @@ class ModelFollowingPlanner:
         if cosine < constants.cos_recovery:
             self._started = False
             return BodyRates(*first_order(q, target, dt, constants))
+        body_rates = _believable(body_rates)
         if not self._started:
             self.reset(q, body_rates)
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
@@ -219,6 +222,13 @@ class ModelFollowingPlanner:
                 body.rate,
             ),
         )
+
+
+def _believable(body_rates: BodyRates | None) -> BodyRates | None:
+    """None for rates that no vehicle has or that are no numbers: the plan must not take them in."""
+    if body_rates is None or not all(abs(rate) < _FASTEST for rate in body_rates):
+        return None
+    return body_rates
 
 
 def _no_quicker(axis: AxisResponse) -> AxisResponse:

@@ -13,6 +13,7 @@ from typing import Any
 from companion import demo
 from companion.config import Config
 from companion.config_file import changed, load
+from companion.extras import require
 from companion.flight.programmes import programme
 from companion.flight.session import Session
 from companion.mavlink import lockstep
@@ -28,7 +29,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     """The configuration with what the command line says otherwise.
 
     Raises:
-        ConfigError: the two do not go together.
+        ConfigError: the two do not go together, or what is to be followed cannot be.
+        MissingExtraError: it needs an extra that is not installed.
     """
     link: dict[str, Any] = {}
     flight: dict[str, Any] = {}
@@ -46,7 +48,10 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
         flight["arm"] = True
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
     told = changed(config, changes, "the command line")
-    programme(told)  # what cannot be flown is to be found out before anything is begun
+    # What cannot be flown is to be found out before anything is begun.
+    programme(told)
+    if told.guidance.kind == "nmpc":
+        require("casadi", "nmpc", "guidance.kind: nmpc")
     return told
 
 

@@ -13,6 +13,8 @@ from companion.flight.assembly import link_settings
 from companion.mavlink.endpoint import parse_endpoint
 from companion.recording.figure import draw_flight
 from companion.study import needs
+from companion.study.names import TRACK
+from companion.yaml_file import ConfigError
 
 
 def bench_link(options: argparse.Namespace) -> int:
@@ -36,17 +38,23 @@ def bench_planner(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
-    """Fly the paper's experiments."""
-    needs.check()
+    """Fly the paper's experiments and ours."""
+    if options.json and options.name != TRACK:
+        raise ConfigError(
+            f"--json goes with study {TRACK}; study {options.name} writes its tables as CSV"
+        )
+    needs.check(options.name)
     from companion.study import runner  # noqa: PLC0415  needs the extra
 
-    console = Console()
+    console = Console(stderr=options.json)
     try:
-        page = runner.run(options.name, options.case, options.out, console)
+        page, rows = runner.run(options.name, options.case, options.out, console)
     except KeyboardInterrupt:
         console.print(f"Interrupted; what stands in {options.out} is whole.", highlight=False)
         return EXIT_FLIGHT
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
+    if options.json:
+        print(json.dumps(rows, ensure_ascii=False, allow_nan=False))
     return EXIT_OK
 
 

@@ -15,7 +15,7 @@ from companion.flight.flight import AskLanding, Flight
 from companion.flight.follow import Follow
 from companion.flight.guide import Guide
 from companion.flight.observer import Observer
-from companion.flight.outer_loop import linear_guidance, motion_estimate
+from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.programmes import programme
 from companion.flight.rig import Rig
 from companion.flight.safety import Fence, SafetyMonitors
@@ -24,7 +24,7 @@ from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
-from companion.recording.summary import LoopCounts
+from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 
 _MS = 1e-3
@@ -134,6 +134,20 @@ class Assembled:
     trace: FlightTrace
     dead_time_watch: DeadTimeWatch
 
+    def close(self) -> None:
+        """End what runs beside the flight."""
+        if self.rig.guide.predictive is not None:
+            self.rig.guide.predictive.close()
+
+    def predictive_figures(self) -> PredictiveFigures | None:
+        """What came of predictive control; None where it did not fly."""
+        predictive = self.rig.guide.predictive
+        if predictive is None:
+            return None
+        record = predictive.record
+        troubles = {trouble.value: count for trouble, count in record.troubles.items()}
+        return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
+
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
         loop = self.rig.loop
@@ -191,7 +205,10 @@ def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLan
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
     for part in rig.programme.parts:
-        if isinstance(part, Follow) and part.slowed > 1.0:
-            flight.note(f"{part.name} is slowed down {part.slowed:.2f} times to keep the limits")
+        if isinstance(part, Follow):
+            if part.slowed > 1.0:
+                flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
+            if config.guidance.kind == "nmpc":
+                guide.predictive = predictive(config, part, flight.note)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), offset, flight.note)
     return Assembled(flight, rig, trace, dead_time_watch)

@@ -100,6 +100,10 @@ class ControlLoop:
         self.held_back = False
         self._gap_from = inf
 
+    def plan_anew(self) -> None:
+        """Let the planner begin anew at the next sample: what it planned from does not hold."""
+        self._planned_at = -inf
+
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. Called by the link as the datagram arrives."""
         age = self._clock.age(sample.vehicle_time, sample.received)

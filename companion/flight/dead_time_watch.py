@@ -18,6 +18,8 @@ _LOOKS = 4
 """A look is at what was flown within so many periods; the first one is a period early."""
 _UNSURE = 1.5
 """So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
+_LONGEST = 75_000
+"""The measurement at the end is over so many rows at most, the newest: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED = 2, 6
 """Columns of `FlightTrace.rates` at which roll, pitch and yaw begin."""
@@ -68,12 +70,21 @@ class DeadTimeWatch:
         self._ages: list[NDArray[np.float64]] = []
         self._suspected: set[str] = set()
         self._warned = False
+        time = np.arange(0.0, 3.0, 0.01)
+        dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
         """Look, if it is time to; `now` is our clock, s."""
         if now < self._due:
             return
         self._due = now + _PERIOD
+        try:
+            self._look()
+        except Exception as error:  # what only watches must not end a flight
+            self._due = inf
+            self._note(f"the dead time is watched no more: internal error: {error!r}")
+
+    def _look(self) -> None:
         self._note_ages()
         if len(self._row_counts) > _LOOKS:
             name = _AXES[self._looks % len(_AXES)]
@@ -82,7 +93,7 @@ class DeadTimeWatch:
 
     def over_the_flight(self) -> DeadTimes:
         """Measure over all that was flown, and warn if that is still to be done."""
-        rows = self._trace.rates_rows()
+        rows = self._trace.rates_rows(max(0, self._trace.rates_count - _LONGEST))
         ages = np.concatenate(self._ages) if self._ages else np.empty(0)
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
@@ -95,7 +106,7 @@ class DeadTimeWatch:
     def _note_ages(self) -> None:
         """How old the samples since the last look were when they arrived."""
         rows = self._trace.rates_rows(self._row_counts[-1])
-        self._row_counts.append(self._row_counts[-1] + len(rows))
+        self._row_counts.append(self._trace.rates_count)
         offset = self._clock_offset()
         if offset is not None:
             self._ages.append(rows[:, 1] + offset - rows[:, 0])

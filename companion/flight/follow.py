@@ -36,6 +36,11 @@ class Follow:
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
         return longest + self.trajectory.duration
 
+    @property
+    def turns_for(self) -> float:
+        """How long it turns before the trajectory begins, as far as that is known, s."""
+        return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
+
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the beginning at `start`."""
         if self._turned is None or start is not self._pose:

@@ -7,15 +7,17 @@ from math import acos, degrees, nan
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import cos_tilt
 from companion.flight.control_loop import Command, ControlLoop
+from companion.flight.follow import Follow
 from companion.flight.hover_learning import HoverLearning
 from companion.flight.motion_estimate import MotionEstimate
+from companion.flight.predictive import Following, Predictive
 from companion.guidance import (
     GRAVITY,
     HoverThrust,
     LinearGuidance,
     Pose,
-    Programme,
     Reference,
+    Sequence,
     Situation,
     VehicleMotion,
 )
@@ -38,6 +40,8 @@ class Guide:
         begun_at: when the programme began, s on our clock, or None.
         pose: the pose that is held, or None.
         given_up: why the programme was given up, or None.
+        predictive: flies trajectories instead of linear guidance, or None.
+        estimate: of the motion.
         learning: of the hover thrust.
     """
 
@@ -58,6 +62,7 @@ class Guide:
         self.begun_at: float | None = None
         self.pose: Pose | None = None
         self.given_up: str | None = None
+        self.predictive: Predictive | None = None
         self._loop = loop
         self._guidance = guidance
         self.estimate = estimate
@@ -68,7 +73,7 @@ class Guide:
         self._period = period
         self._position_stale = position_stale
         self._clock = clock
-        self._programme: Programme | None = None
+        self._programme: Sequence | None = None
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
@@ -86,7 +91,7 @@ class Guide:
         self.stand_by()
         self.pose = Pose(self._situation(self._clock()).now.position_ned, self._heading())
 
-    def follow(self, programme: Programme) -> None:
+    def follow(self, programme: Sequence) -> None:
         """Fly `programme` from the pose that is held."""
         if self.pose is None:
             self.hold_here()
@@ -126,8 +131,12 @@ class Guide:
         self._give_up_if_tilted()
         reference_at = self._reference(situation.now)
         reference = reference_at(now)
-        target, down = self._guidance.command(reference_at, now, situation)
-        self.estimate.vertical = GRAVITY - down
+        command = self._guidance.command(reference_at, now, situation)
+        if self.predictive is not None:
+            vehicle = self.estimate.vehicle(now, situation)
+            command = self.predictive.command(command, vehicle, self._following(now))
+        target, down = command
+        self.estimate.vertical = GRAVITY - down if self._loop.guarded else GRAVITY
         self._loop.command = Command(
             target,
             down,
@@ -158,6 +167,13 @@ class Guide:
             held = Reference(pose.position_ned, heading=pose.heading)
             return lambda _: held
         return lambda time: programme.at(time - begun_at, pose)
+
+    def _following(self, now: float) -> Following | None:
+        """The trajectory that is followed, if that is what is flown just now."""
+        if self._programme is None or self.begun_at is None or self.pose is None:
+            return None
+        part, within = self._programme.part_at(now - self.begun_at)
+        return Following(part, within, self.pose) if isinstance(part, Follow) else None
 
     def _give_up_if_tilted(self) -> None:
         """Hold where we are if open-loop rates have tilted the vehicle too far."""

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
+from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
 from companion.guidance.motion_observer import Horizontal
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
+from companion.nmpc import Vehicle
 
 _LEAST_COSINE = 0.2
 """Of the tilt; beyond 78° the thrust is not what height hold asked for."""
@@ -44,10 +46,13 @@ class MotionEstimate:
         self._slope: Horizontal = (0.0, 0.0)
         self._north = self._east = 0.0
         self._samples = 0
+        self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude; it tells where the thrust points."""
+        self._q, self._body_rates = sample.q, sample.body_rates
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slope = north, east = -2.0 * ay / cosine, 2.0 * ax / cosine
@@ -96,6 +101,17 @@ class MotionEstimate:
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self._drag.drag
         return Situation(motion, later, thrust, disturbance, drag, thrust_limits)
+
+    def vehicle(self, now: float, situation: Situation) -> Vehicle:
+        """The same, as predictive control takes it; its time is `now`, s on our clock."""
+        return Vehicle(
+            now,
+            situation.now.position_ned,
+            situation.now.velocity_ned,
+            self._q,
+            self._body_rates,
+            (*situation.disturbance, 0.0),
+        )
 
     def _vehicle_time(self, now: float, position: LocalPosition) -> float:
         """Our time as the vehicle's, s."""

@@ -5,7 +5,9 @@ from math import radians, tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
+from companion.flight.follow import Follow
 from companion.flight.motion_estimate import MotionEstimate
+from companion.flight.predictive import Predictive
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
@@ -19,9 +21,13 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.nmpc import Settings, Solver
+from companion.yaml_file import ConfigError
 
 _MS = 1e-3
 _CALM = Weights(position=1.0, velocity=1.5)
+_LOCKSTEP_DEADLINE = 1.0
+"""The vehicle waits for the answer, s of wall time."""
 _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _POSITION_TIME = 0.1
@@ -96,6 +102,42 @@ def motion_estimate(
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
     settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
     return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s), offset)
+
+
+def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
+    """Predictive control of one trajectory; starts its process.
+
+    Raises:
+        ConfigError: the planner's response is too quick for the horizon's steps.
+        MissingExtraError: casadi is not installed.
+    """
+    limits, per_thrust = config.limits, GRAVITY / config.thrust.hover_thrust
+    period = 1.0 / config.guidance.rate_hz
+    try:
+        settings = Settings(
+            gain=config.planner.gain_per_s,
+            yaw_gain=config.planner.yaw_gain_per_s,
+            lag=tilt_response(config).lag or 0.25 / config.planner.gain_per_s,
+            dead_time=_MS * (config.vehicle.dead_time_ms or 0.0),
+            drag=config.guidance.drag_per_s,
+            max_tilt=radians(limits.max_tilt_deg),
+            max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
+            max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+            min_thrust=limits.min_thrust * per_thrust,
+            max_thrust=limits.max_thrust * per_thrust,
+            lead=period,
+            deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
+        )
+    except ValueError as error:
+        raise ConfigError(
+            f"guidance.kind: nmpc cannot be had with this vehicle: {error}"
+        ) from error
+    return Predictive(
+        lambda report: Solver(settings, part.trajectory, report),
+        period=period,
+        lockstep=config.link.lockstep,
+        note=note,
+    )
 
 
 def _identifies(config: Config) -> bool:

@@ -116,6 +116,7 @@ async def disarm(rig: Rig) -> None:
 
 def _stop_moving(rig: Rig) -> None:
     if rig.loop.guarded:
+        rig.loop.plan_anew()  # the estimator may have jumped
         rig.guide.hold_here()
 
 

@@ -4,7 +4,7 @@ from math import radians
 
 from companion import trajectory_file
 from companion.config import Config
-from companion.config_sections import IdentifyConfig
+from companion.config_programmes import IdentifyConfig
 from companion.flight.follow import Follow
 from companion.guidance import (
     GRAVITY,

@@ -68,7 +68,10 @@ class Session:
         with TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog:
             async with Link(settings, tap=tlog) as link:
                 self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
-                result = await self._run(link, self._assembled)
+                try:
+                    result = await self._run(link, self._assembled)
+                finally:
+                    self._assembled.close()
         await asyncio.sleep(0)  # a last word of the writing thread
         return self._finish(link, self._assembled, result, tlog.dropped)
 
@@ -127,6 +130,7 @@ class Session:
             events=flight.events,
             log=self._folder,
             dead_times=dead_times,
+            predictive=assembled.predictive_figures(),
         )
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")

@@ -46,22 +46,34 @@ def held(time: Floats, commanded: Floats, alike: float = 0.0) -> Knots:
 
 def slewed(commands: Knots, slew: float) -> Knots:
     """Held commands approached no faster than `slew` (per second), from rest at the first."""
-    rows: list[tuple[float, float, float]] = []
+    start = _before_each(commands, slew)
+    way = commands.value - start
+    arrival = commands.time + np.abs(way) / slew
+    ramps = np.column_stack((commands.time, start, np.copysign(slew, way)))
+    rests = np.column_stack((arrival, commands.value, np.zeros(way.size)))
+    moves, arrives = arrival > commands.time, arrival < np.append(commands.time[1:], np.inf)
+    # A ramp and the rest behind it take turns, each only where there is one.
+    rows = np.stack((ramps, rests), axis=1).reshape(-1, 3)
+    return Knots(*rows[np.column_stack((moves, arrives)).ravel()].T)
+
+
+def _before_each(commands: Knots, slew: float) -> Floats:
+    """(n,), where the slewed value stands as each command comes.
+
+    The one loop that must go through the commands in turn, since each start is the end before it.
+    """
     value = float(commands.value[0])
-    ends = np.append(commands.time[1:], np.inf)
-    for start, end, target in zip(
-        commands.time.tolist(), ends.tolist(), commands.value.tolist(), strict=True
-    ):
-        slope = slew if target > value else -slew
-        arrival = start + (target - value) / slope
-        if arrival > start:
-            rows.append((start, value, slope))
-        if arrival < end:
-            rows.append((arrival, target, 0.0))
-            value = target
+    starts, reaches = [value], slew * np.diff(commands.time)
+    for target, reach in zip(commands.value[:-1].tolist(), reaches.tolist(), strict=True):
+        way = target - value
+        if way > reach:
+            value += reach
+        elif way < -reach:
+            value -= reach
         else:
-            value += slope * (end - start)
-    return Knots(*np.array(rows).T)
+            value = target
+        starts.append(value)
+    return np.array(starts)
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:

@@ -6,7 +6,7 @@ y(t) = gain·x(t − dead time) + offset + what is left of the start, with x the
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import exp, log
+from math import exp, log, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from companion.fitting import Solution, minimise, project
 from companion.identification.first_order_lag import Knots, held, lagged, slewed, value_at
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch
+from companion.identification.record import LONGEST_DEAD_TIME, Stretch, most_excited
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +85,7 @@ def fit_lag(
         gain: what lag and dead time are to be found for; None finds it with them.
         may_slew: whether a slew limit is looked for.
     """
+    record = most_excited(record)
     samples = sum(part.measured.size for part in record)
     if samples < _FEWEST or all(np.ptp(part.commanded) == 0.0 for part in record):
         return None
@@ -120,6 +121,7 @@ class _Data:
         self.measured = np.concatenate([part.measured[::thinning] for part in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
         self.largest_change = float(max(changes))
+        self._slewed: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
         """Weights (gain, offset, starts), and what they leave of the measurements (m,)."""
@@ -178,11 +180,15 @@ class _Data:
 
     def _each(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
         """(m,), of each stretch's commands (slewed, if that is in the unknowns), delayed."""
-        parts = []
-        for knots, times in zip(self.commands, self.times, strict=True):
-            limited = slewed(knots, exp(unknown[2])) if unknown.size > 2 else knots
-            parts.append(of(limited, times - unknown[1]))
-        return np.concatenate(parts)
+        commands = self._limited(unknown[2]) if unknown.size > 2 else self.commands
+        each = zip(commands, self.times, strict=True)
+        return np.concatenate([of(knots, times - unknown[1]) for knots, times in each])
+
+    def _limited(self, log_slew: float) -> list[Knots]:
+        """The slewed commands, kept until another slew is asked for: steps of the rest need it."""
+        if log_slew != self._slewed[0]:
+            self._slewed = log_slew, [slewed(knots, exp(log_slew)) for knots in self.commands]
+        return self._slewed[1]
 
 
 def _settled(data: _Data, start: Floats) -> Solution:

@@ -12,6 +12,13 @@ LONGEST_DEAD_TIME = 0.5
 _LONGEST_HOLD = 0.5
 """A command is taken as held this long, s; autopilots leave our control after about 1 s."""
 
+_MOST_ROWS = 30_000
+"""Commands and samples that a fit takes on: a minute at 250 Hz."""
+_WINDOW = 4.0
+"""Length of the parts of which the most excited are kept, s: a doublet and its answer."""
+_LEAD = 1.5
+"""Commands so long before a part come along with it: the longest dead time and ramp, s."""
+
 
 class Stretch(NamedTuple):
     """Control without a pause: n commands, each held until the next, and m samples.
@@ -55,6 +62,39 @@ def stretches(
         if inside.any():
             found.append(Stretch(t[part], u[part], sampled[inside], y[inside]))
     return found
+
+
+def most_excited(record: list[Stretch]) -> list[Stretch]:
+    """A record, or of a long one the parts in which the commands moved most.
+
+    A flight of half an hour tells no more of the response than its liveliest minute, and each step
+    of a fit goes through all that is left of it. Each part brings the commands before it along.
+    """
+    if sum(part.time.size + part.measured_time.size for part in record) <= _MOST_ROWS:
+        return record
+    windows = [window for part in record for window in _windows(part)]
+    windows.sort(key=lambda window: float(np.std(window.commanded)), reverse=True)
+    kept, rows = [], 0
+    for window in windows:
+        rows += window.time.size + window.measured_time.size
+        if kept and rows > _MOST_ROWS:
+            break
+        kept.append(window)
+    return sorted(kept, key=lambda window: float(window.time[0]))
+
+
+def _windows(part: Stretch) -> list[Stretch]:
+    """A stretch cut into windows; those without a sample are left out."""
+    windows = []
+    for start in np.arange(part.measured_time[0], part.measured_time[-1], _WINDOW):
+        first, last = np.searchsorted(part.measured_time, (start, start + _WINDOW))
+        begin, end = np.searchsorted(part.time, (start - _LEAD, start + _WINDOW))
+        begin = max(int(begin) - 1, 0)
+        if last > first:
+            commands = part.time[begin:end], part.commanded[begin:end]
+            measured = part.measured_time[first:last], part.measured[first:last]
+            windows.append(Stretch(*commands, *measured))
+    return windows
 
 
 def _series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]:

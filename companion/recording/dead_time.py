@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 _TOLERATED = 0.3
 """Share of the configured dead time by which the measured one may differ."""
-_DOUBT = 0.01
+_DOUBT = 0.008
 """And it may always differ by this, s: no rate loop is just a lag behind a dead time, so what is
-measured depends on what is flown, slow circles or steps, by up to 9 ms."""
+measured depends on what is flown, slow circles or steps, by up to 7 ms."""
 
 
 class AxisDeadTime(NamedTuple):

@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.recording.dead_time import AxisDeadTime
-from companion.recording.summary import Summary
+from companion.recording.summary import PredictiveFigures, Summary
 
 
 def flight_table(summary: Summary) -> RenderableType:
@@ -19,6 +19,8 @@ def flight_table(summary: Summary) -> RenderableType:
         parts.append(_tracking(summary))
     if len(summary.trace.rates):
         parts += _dead_times(summary)
+    if summary.predictive is not None:
+        parts.append(_predictive_words(summary.predictive))
     if summary.counts.setpoints:
         parts += [_loop(summary), _loop_words(summary)]
     return Group(*parts)
@@ -100,6 +102,16 @@ def _tracking(summary: Summary) -> RenderableType:
     )
     table.add_row("height", _number(tracking["height_rms_m"], "m", 2), "")
     return table
+
+
+def _predictive_words(figures: PredictiveFigures) -> Text:
+    """How predictive control fared."""
+    told = figures.as_dict()
+    words = f"predictive control: {figures.flown} answers flown"
+    if figures.flown:
+        words += f", {told['solve_ms']['p50']:.1f} ms (p99 {told['solve_ms']['p99']:.1f} ms)"
+    missed = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
+    return Text(f"{words}; linear guidance flew {missed or 'none'} instead")
 
 
 def _loop(summary: Summary) -> RenderableType:

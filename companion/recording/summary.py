@@ -35,6 +35,27 @@ class LoopCounts:
     rate_hz: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class PredictiveFigures:
+    """What came of predictive control.
+
+    Attributes:
+        flown: answers that were flown.
+        troubles: answers that were not, by why not.
+        seconds: that each flown answer took in the solver's process.
+    """
+
+    flown: int
+    troubles: dict[str, int]
+    seconds: tuple[float, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; milliseconds."""
+        p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (math.nan, math.nan)
+        times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
+        return {"flown": self.flown, "troubles": self.troubles, "solve_ms": _without_nan(times)}
+
+
 @dataclass(frozen=True)
 class Summary:
     """A finished flight.
@@ -50,6 +71,7 @@ class Summary:
         events: what happened, each with its time in s.
         log: the flight's folder.
         dead_times: how long the vehicle took to answer.
+        predictive: what came of predictive control; None where it did not fly.
     """
 
     result: str
@@ -62,6 +84,7 @@ class Summary:
     events: list[tuple[float, str]] = field(default_factory=list)
     log: Path | None = None
     dead_times: DeadTimes = field(default_factory=DeadTimes)
+    predictive: PredictiveFigures | None = None
 
     def response(self) -> StepResponse | None:
         """The measured step response, or None where no step was flown."""
@@ -109,6 +132,7 @@ class Summary:
             "response": _response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),
             "tracking": _without_nan(self.tracking()),
+            "nmpc": None if self.predictive is None else self.predictive.as_dict(),
             "link": self.link,
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
             "log": None if self.log is None else str(self.log),

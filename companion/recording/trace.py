@@ -36,13 +36,15 @@ class FlightTrace:
         tracking: rows (vehicle time s, reference north, east, down, measured north, east, down).
         rates: rows (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
             rad/s, thrust 0..1, measured roll, pitch, yaw rad/s), while the autopilot obeys us,
-            for all that its heartbeats tell.
+            for all that its heartbeats tell. Once full, a new row takes the oldest one's place.
+        rates_count: rows of `rates` that were ever noted.
         latencies_ns: sample in → setpoint out inside this process, ns.
     """
 
     response: "array[float]" = field(default_factory=lambda: array("d"))
     tracking: "array[float]" = field(default_factory=lambda: array("d"))
     rates: "array[float]" = field(default_factory=lambda: array("d"))
+    rates_count: int = 0
     latencies_ns: "array[int]" = field(default_factory=lambda: array("q"))
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
@@ -69,8 +71,13 @@ class FlightTrace:
         measured: BodyRates,
     ) -> None:
         """Note what was answered to a sample, and the rates that the sample told."""
-        if len(self.rates) < len(_RATES) * _MAX_SAMPLES:
-            self.rates.fromlist([vehicle_time, received, *commanded, thrust, *measured])
+        row = [vehicle_time, received, *commanded, thrust, *measured]
+        if self.rates_count < _MAX_SAMPLES:
+            self.rates.fromlist(row)
+        else:
+            start = self.rates_count % _MAX_SAMPLES * len(_RATES)
+            self.rates[start : start + len(_RATES)] = array("d", row)
+        self.rates_count += 1
 
     def add_latency(self, nanoseconds: int) -> None:
         """Note how long one answer took."""
@@ -101,5 +108,12 @@ class FlightTrace:
         return np.array(self.tracking).reshape(-1, len(_TRACKING))
 
     def rates_rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, 9), as `rates`, from row `since` on."""
-        return np.array(self.rates[since * len(_RATES) :]).reshape(-1, len(_RATES))
+        """(N, 9), as `rates`, from row `since` of all that were noted on; older ones are gone."""
+        width, count = len(_RATES), self.rates_count
+        first = max(since, count - _MAX_SAMPLES)
+        begin, end = first % _MAX_SAMPLES * width, count % _MAX_SAMPLES * width
+        if first < count and begin >= end:  # the newest stand before the oldest
+            rows = self.rates[begin:] + self.rates[:end]
+        else:
+            rows = self.rates[begin:end]
+        return np.array(rows).reshape(-1, width)

@@ -5,11 +5,16 @@ from companion.extras import require
 _MODULES = ("jinja2", "matplotlib", "scipy", "tabulate")
 
 
-def check() -> None:
-    """Make sure that the extra `study` is installed; numba is not asked for, it only saves time.
+def check(name: str) -> None:
+    """Make sure that the extras of a study are installed; numba is not asked for, it saves time.
+
+    Args:
+        name: of the study.
 
     Raises:
         MissingExtraError: a package is missing; the message says how to get it.
     """
     for module in _MODULES:
         require(module, "study", "`companion study`")
+    if name == "nmpc":
+        require("casadi", "nmpc", "`companion study nmpc`")

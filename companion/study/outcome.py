@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from matplotlib.figure import Figure
 
@@ -42,6 +42,7 @@ class Outcome:
         tables: the numbers.
         findings: each made from the numbers, none from memory.
         series: further tables, written as CSV only.
+        rows: what `--json` prints, where the study has it.
     """
 
     name: str
@@ -52,3 +53,4 @@ class Outcome:
     tables: tuple[Table, ...]
     findings: tuple[Finding, ...] = ()
     series: tuple[Table, ...] = ()
+    rows: tuple[dict[str, Any], ...] = ()

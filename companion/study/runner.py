@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 from rich.console import Console
@@ -18,9 +18,10 @@ from rich.progress import (
 )
 
 from companion import yaml_file
-from companion.study import custom, fig2, fig3, fig4, fig5, kmax, lag, rates
+from companion.study import custom, fig2, fig3, fig4, fig5, kmax, lag, rates, track
 from companion.study.case import Case
 from companion.study.drawing import STYLE
+from companion.study.names import TRACK
 from companion.study.outcome import Outcome, Tick
 from companion.study.report import write_outcome, write_page
 from companion.yaml_file import ConfigError
@@ -42,12 +43,25 @@ _STUDIES = {
 }
 
 
-def run(name: str, case_file: Path | None, out: Path, console: Console) -> Path:
-    """Run one study, `all` of them, or `custom` from a case file; returns the page.
+class Studied(NamedTuple):
+    """What was written, and what came of it.
+
+    Attributes:
+        page: everything, in one file.
+        rows: those of all studies, for `--json`.
+    """
+
+    page: Path
+    rows: list[dict[str, Any]]
+
+
+def run(name: str, case_file: Path | None, out: Path, console: Console) -> Studied:
+    """Run one study, `all` of them, or `custom` from a case file.
 
     Raises:
         ConfigError: `out` or the case cannot be used, or a case is missing or not asked for.
         OSError: a result cannot be written.
+        VehicleStoppedError: the bundled vehicle ended before its flight did.
     """
     chosen = _chosen(name, case_file)
     page = _prepared(out, "study" if name == "all" else name)
@@ -65,7 +79,7 @@ def run(name: str, case_file: Path | None, out: Path, console: Console) -> Path:
         progress.update(task, description=page.name, study="")
         write_page(outcomes, page)
         progress.update(task, advance=1, description="done")
-    return page
+    return Studied(page, [row for outcome in outcomes for row in outcome.rows])
 
 
 def _chosen(name: str, case_file: Path | None) -> dict[str, _Study]:
@@ -76,6 +90,12 @@ def _chosen(name: str, case_file: Path | None) -> dict[str, _Study]:
         return {name: _Study(partial(custom.run, case), custom.parts(case))}
     if case_file is not None:
         raise ConfigError(f"--case goes with study custom; study {name} has its own case")
+    if name == "nmpc":
+        from companion.study import nmpc  # noqa: PLC0415  needs an extra of its own
+
+        return {name: _Study(nmpc.run, nmpc.PARTS)}
+    if name == TRACK:
+        return {name: _Study(track.run, track.PARTS)}
     return _STUDIES if name == "all" else {name: _STUDIES[name]}
 
 

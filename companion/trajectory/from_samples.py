@@ -25,13 +25,15 @@ _LARGEST_RAMP = 0.5
 
 
 class _Quantity(NamedTuple):
-    """A derivative that a file may give, and how far it may be off as root of the mean square.
+    """A derivative that a file may give, and how far it may be off: floor + share × its size.
+
+    Both as root of the mean square. Published accelerations may jump where ours does not.
 
     Attributes:
         name: of it.
-        unit: of it.
-        share: of the quantity itself, and
-        floor: in its unit, are allowed together. Published accelerations may jump, ours does not.
+        unit: of it and of the floor.
+        share: allowed, of its size.
+        floor: allowed, however small it is.
     """
 
     name: str

@@ -294,3 +294,32 @@ def test_what_is_not_a_number_is_refused_and_not_remembered():
 def test_a_response_out_of_range_is_refused(name, value):
     with pytest.raises(ValueError, match=f"^{name} must be"):
         following(**{name: value})
+
+
+@pytest.mark.parametrize("rate", [math.nan, math.inf, -1e308])
+@pytest.mark.parametrize("later", [False, True])
+def test_rates_that_no_vehicle_has_are_not_taken_into_the_plan(rate, later):
+    q, target, bad = quaternion(attitudes(START, 0.2)[0]), Target(*GOAL, 0.2), BodyRates(0, 0, rate)
+    planner, other = following(), following()
+    if later:
+        planner.rates(q, target, 0.01)
+        other.rates(q, target, 0.01)
+    assert planner.rates(q, target, 0.01, bad) == other.rates(q, target, 0.01)
+    planner.reset(q, bad)
+    other.reset(q)
+    assert planner.rates(q, target, 0.01) == other.rates(q, target, 0.01)
+
+
+def test_a_turn_that_was_not_foreseen_bends_the_line_less_where_its_rate_is_measured():
+    """A gust turns the vehicle at 2 rad/s in the middle of the step."""
+    bent = []
+    for measured in (True, False):
+        plant = LagPlant(attitudes(START, [0.7]), per_axis(LAG, 0.3), per_axis(DEAD_TIME, 0.17))
+        planner, off = following(yaw_lag=0.3, yaw_dead_time=0.17), []
+        for n in range(100):
+            rates = BodyRates(*plant.true_rates[0]) if measured else None
+            asked = planner.rates(quaternion(plant.r[0]), Target(*GOAL, 0.7), 0.01, rates)
+            plant.hold([asked], 0.01, np.array([0.0, 0.0, 2.0]) * (10 <= n < 30))
+            off.append(coefficients_of(plant.r)[0, 1] + 0.5)
+        bent.append(np.abs(off).max())
+    assert bent[0] <= 0.5 * bent[1]

@@ -65,7 +65,8 @@ class Bench:
         self.now = 10.0 + after
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
-        self.guide.note_attitude(SimpleNamespace(q=(cos(half), sin(half), 0.0, 0.0)))
+        q, still = (cos(half), sin(half), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+        self.guide.note_attitude(SimpleNamespace(q=q, body_rates=still))
         self.guide.step()
         return self.loop.command
 

@@ -13,7 +13,7 @@ from companion.recording.dead_time import AxisDeadTime, DeadTimes
         (0.053, 0.040, True),
         (0.029, 0.040, False),
         (0.027, 0.040, True),
-        (0.024, 0.015, False),  # 60 % off, but that much depends on what is flown
+        (0.0225, 0.015, False),  # 60 % off, but that much depends on what is flown
         (0.026, 0.015, True),
         (0.012, 0.0, True),
         (None, 0.040, False),

@@ -35,4 +35,11 @@ def test_rows_can_be_had_from_one_on():
 
 def test_a_flight_without_end_does_not_fill_the_memory(monkeypatch):
     monkeypatch.setattr(room, "_MAX_SAMPLES", 3)
-    assert noted(ROWS * 4).rates_rows().shape == (3, 9)
+    numbered = [(float(n), *ROWS[0][1:]) for n in range(8)]
+    trace = noted(numbered)
+    assert trace.rates_rows()[:, 0].tolist() == [5.0, 6.0, 7.0]
+    assert trace.rates_rows(6)[:, 0].tolist() == [6.0, 7.0]
+    assert trace.rates_rows(8).shape == (0, 9)
+    assert len(trace.rates) == 27
+    full = noted(numbered[:6])
+    assert full.rates_rows()[:, 0].tolist() == [3.0, 4.0, 5.0]

@@ -34,7 +34,7 @@ def results(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "_tick", counting)
-        page = runner.run("all", None, out, Console(quiet=True))
+        page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
 
 

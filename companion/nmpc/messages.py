@@ -1,0 +1,155 @@
+"""What goes between a flight and its solver, and how it looks on the way: struct-packed floats."""
+
+import struct
+from enum import IntEnum
+from typing import NamedTuple
+
+from companion.attitude import BodyRates, Quaternion
+from companion.nmpc.reference import Start
+from companion.trajectory.sample import Vector
+
+READY = b"ready"
+"""The solver's first word, once it is warm."""
+
+_HEAD = struct.Struct("<q22d")
+_INPUT = struct.Struct("<5d")
+_ANSWER = struct.Struct("<2q9d")
+
+
+class Vehicle(NamedTuple):
+    """What is known of the vehicle.
+
+    Attributes:
+        time: for which it is known, s.
+        position: m, NED.
+        velocity: m/s, NED.
+        q: attitude, body → world; must be a unit quaternion.
+        body_rates: rad/s, FRD.
+        disturbance: acceleration by wind and what else is not modelled, m/s², NED.
+    """
+
+    time: float
+    position: Vector
+    velocity: Vector
+    q: Quaternion
+    body_rates: BodyRates
+    disturbance: Vector = (0.0, 0.0, 0.0)
+
+
+class Input(NamedTuple):
+    """What was asked of the vehicle from a time on, whoever computed it.
+
+    Attributes:
+        time: when it was given out, on the clock of `Vehicle.time`, s.
+        north, east: coefficients of the target.
+        heading: rad.
+        thrust: specific, m/s².
+    """
+
+    time: float
+    north: float
+    east: float
+    heading: float
+    thrust: float
+
+
+class Request(NamedTuple):
+    """A problem to solve.
+
+    Attributes:
+        number: of the request; the answer bears it.
+        vehicle: what is known of it.
+        at: where on the trajectory it ought to be at `vehicle.time`, s after its beginning.
+        start: of the trajectory.
+        inputs: the latest, in order of time. They have to reach back a dead time and a lead: what
+            was asked before the first of them is taken to be the same.
+    """
+
+    number: int
+    vehicle: Vehicle
+    at: float
+    start: Start
+    inputs: tuple[Input, ...]
+
+
+class Status(IntEnum):
+    """How a solve ended."""
+
+    SOLVED = 0
+    FAILED = 1
+    """The solver gave no plan."""
+    TOPPLED = 2
+    """The vehicle is tilted further than the models reach."""
+
+
+class Answer(NamedTuple):
+    """What came of a request.
+
+    Attributes:
+        number: of the request.
+        status: the rest means something only where it is `SOLVED`.
+        given_at: when, on the machine's monotonic clock, s.
+        time: from when on it is to be used, on the clock of `Vehicle.time`, s.
+        north, east: coefficients of the target.
+        heading: rad, in (−π, π].
+        thrust: specific, m/s².
+        seconds: that it took, prediction and reference included.
+        solving: processor time of the solver itself, s: what others take does not count.
+        iterations: of the SQP.
+    """
+
+    number: int
+    status: Status
+    given_at: float
+    time: float
+    north: float
+    east: float
+    heading: float
+    thrust: float
+    seconds: float
+    solving: float
+    iterations: float
+
+
+def pack_request(request: Request) -> bytes:
+    """As it is sent."""
+    vehicle, start = request.vehicle, request.start
+    head = _HEAD.pack(
+        request.number,
+        request.at,
+        *start.position,
+        start.turned,
+        vehicle.time,
+        *vehicle.position,
+        *vehicle.velocity,
+        *vehicle.q,
+        *vehicle.body_rates,
+        *vehicle.disturbance,
+    )
+    return head + b"".join(_INPUT.pack(*one) for one in request.inputs)
+
+
+def unpack_request(message: bytes) -> Request:
+    """As it was asked."""
+    number, at, *v = _HEAD.unpack_from(message)
+    vehicle = Vehicle(
+        v[4],
+        (v[5], v[6], v[7]),
+        (v[8], v[9], v[10]),
+        (v[11], v[12], v[13], v[14]),
+        BodyRates(v[15], v[16], v[17]),
+        (v[18], v[19], v[20]),
+    )
+    inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_HEAD.size :]))
+    return Request(number, vehicle, at, Start((v[0], v[1], v[2]), v[3]), inputs)
+
+
+def pack_answer(answer: Answer) -> bytes:
+    """As it is sent."""
+    return _ANSWER.pack(*answer)
+
+
+def unpack_answer(message: bytes) -> Answer:
+    """As it was given."""
+    number, status, *rest = _ANSWER.unpack(message)
+    return Answer(number, Status(status), *rest)

@@ -1,0 +1,83 @@
+"""What the vehicle has to do to be on its trajectory: the reference of a prediction."""
+
+from math import sqrt
+from typing import NamedTuple
+
+from companion.attitude import wrap_angle
+from companion.trajectory.sample import Sample, Vector
+
+_LEAST_LIFT = 0.2
+"""The reference thrust points up with this share of gravity at least, however quick the descent."""
+
+
+class Node(NamedTuple):
+    """The reference at one node of the horizon.
+
+    Attributes:
+        position: m, NED.
+        velocity: m/s, NED.
+        north, east: acceleration coefficients.
+        speed_north, speed_east: their speed, 1/s.
+        thrust: specific, m/s².
+        heading: tilt-yaw heading, rad; not wrapped, so that neighbours are near each other.
+        heading_rate: rad/s.
+    """
+
+    position: Vector
+    velocity: Vector
+    north: float
+    east: float
+    speed_north: float
+    speed_east: float
+    thrust: float
+    heading: float
+    heading_rate: float
+
+
+class Start(NamedTuple):
+    """Where and how a trajectory is laid out.
+
+    Attributes:
+        position: where it begins, m, NED.
+        turned: added to its headings, rad: the heading at the start, where it holds that.
+    """
+
+    position: Vector
+    turned: float = 0.0
+
+
+def node_of(
+    sample: Sample, start: Start, near: float, drag: float, gravity: float, disturbance: Vector
+) -> Node:
+    """The attitude and thrust that a sample takes: differential flatness of a point mass with drag.
+
+    The rotors have to give f = a + d·v − w − g; its length is the specific thrust, its horizontal
+    part over that the coefficients, and with ḟ = jerk + d·a follows their speed.
+
+    Args:
+        sample: of the trajectory.
+        start: of the trajectory.
+        near: the heading is given within π of this, rad.
+        drag: linear, per mass, 1/s.
+        gravity: m/s².
+        disturbance: w, acceleration by wind and what else is not modelled, m/s².
+    """
+    velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
+    f_n, f_e, f_d = (acceleration[i] + drag * velocity[i] - disturbance[i] for i in range(3))
+    f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
+    d_n, d_e, d_d = (jerk[i] + drag * acceleration[i] for i in range(3))
+    thrust = sqrt(f_n * f_n + f_e * f_e + f_d * f_d)
+    growth = (f_n * d_n + f_e * d_e + f_d * d_d) / thrust
+    north, east = f_n / thrust, f_e / thrust
+    p_n, p_e, p_d = (start.position[i] + sample.position[i] for i in range(3))
+    return Node(
+        (p_n, p_e, p_d),
+        velocity,
+        north,
+        east,
+        (d_n - north * growth) / thrust,
+        (d_e - east * growth) / thrust,
+        thrust,
+        near + wrap_angle(start.turned + sample.heading - near),
+        sample.heading_rate,
+    )

@@ -1,0 +1,111 @@
+"""What the predictive controller knows of the vehicle, and what it is asked to weigh."""
+
+from dataclasses import dataclass, fields
+from math import isfinite, pi
+from typing import Literal
+
+ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion"]
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not (isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} must be positive and finite, not {value}")
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Weights of the squared errors, each integrated over the horizon.
+
+    Attributes:
+        position: 1/m².
+        velocity: s²/m².
+        heading: 1/rad².
+        turning: of how fast the attitude is told to turn, against how fast the reference does,
+            s²/rad².
+        thrust: of the specific thrust against that of the reference, s⁴/m².
+        final: factor on position and velocity at the end of the horizon, s.
+    """
+
+    position: float = 20.0
+    velocity: float = 2.0
+    heading: float = 2.0
+    turning: float = 0.1
+    thrust: float = 0.02
+    final: float = 0.5
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            _check_positive(f"weight {field.name}", getattr(self, field.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Vehicle, horizon and solver.
+
+    Attributes:
+        model: which prediction model; see `companion.nmpc.models`.
+        gain: p of the planner that flies the targets, 1/s.
+        yaw_gain: of its heading, 1/s.
+        lag: τ of its response τ·c̈ + ċ = p·(c_d − c), s.
+        dead_time: from an answer's use to the beginning of its effect, s.
+        drag: linear drag per mass against the air, the same in all directions, 1/s.
+        gravity: m/s².
+        max_tilt: rad; of the planner.
+        max_tilt_rate: W_M of the planner, rad/s.
+        max_yaw_rate: of the planner, rad/s.
+        min_thrust, max_thrust: specific thrust, m/s².
+        weights: of the cost.
+        horizon: s.
+        steps: of the horizon; each is one control.
+        iterations: most SQP iterations of a solve; 1 is the real-time iteration.
+        lead: an answer is for so long after the time of its request, s.
+        deadline: an answer that takes longer is late, s.
+        niceness: of the solver's process, 0 (as ours) to 19.
+
+    Raises:
+        ValueError: a value is out of range, or `lag` is too short to be integrated in these steps.
+    """
+
+    model: ModelName = "limited"
+    gain: float = 5.0
+    yaw_gain: float = 2.0
+    lag: float = 0.05
+    dead_time: float = 0.0
+    drag: float = 0.0
+    gravity: float = 9.80665
+    max_tilt: float = 0.7
+    max_tilt_rate: float = 2.0
+    max_yaw_rate: float = 1.0
+    min_thrust: float = 2.0
+    max_thrust: float = 18.0
+    weights: Weights = Weights()
+    horizon: float = 1.0
+    steps: int = 20
+    iterations: int = 1
+    lead: float = 0.02
+    deadline: float = 0.02
+    niceness: int = 5
+
+    def __post_init__(self) -> None:
+        for name in ("gain", "yaw_gain", "lag", "gravity", "max_tilt_rate", "max_yaw_rate"):
+            _check_positive(name, getattr(self, name))
+        for name in ("min_thrust", "horizon", "deadline", "steps", "iterations"):
+            _check_positive(name, getattr(self, name))
+        for name in ("dead_time", "drag", "lead", "niceness"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} must be finite and not negative, not {value}")
+        if not 0.0 < self.max_tilt < pi / 2.0:
+            raise ValueError(f"max_tilt must lie between 0 and 90°, not {self.max_tilt} rad")
+        if not self.min_thrust < self.gravity < self.max_thrust < float("inf"):
+            raise ValueError("gravity must lie between min_thrust and max_thrust")
+        if self.lag < 0.5 * self.step:
+            raise ValueError(
+                f"lag must be at least half a step of the horizon ({0.5 * self.step:g} s),"
+                f" not {self.lag}"
+            )
+
+    @property
+    def step(self) -> float:
+        """Length of one step of the horizon, s."""
+        return self.horizon / self.steps

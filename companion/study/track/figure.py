@@ -1,0 +1,98 @@
+"""The figure of the study: paths, error over speed, lead and wind."""
+
+from collections.abc import Sequence
+from itertools import product
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from companion.attitude.planner import MODEL_FOLLOWING
+from companion.study.drawing import draw, new_figure
+from companion.study.methods import EXACT, FOLLOWING, PAPERS, PROPOSED, REFERENCE, Line
+from companion.study.track.fleet import Flown
+from companion.study.track.task import (
+    CALM,
+    CIRCLES,
+    EIGHTS,
+    GUIDANCES,
+    LINEAR,
+    WINDY,
+    Course,
+    Task,
+)
+
+CAPTION = (
+    "Circles on the left, figure-eights on the right. First row: where the vehicle really was at"
+    " the highest speed, in still air, by model-following. Second row: error of every planner in"
+    " still air by telemetry. Third row: of the same flights, by where the vehicle really was."
+    " Last row: led and not led, in still air (solid) and in wind (dotted)."
+)
+
+_METHODS = (*PAPERS, EXACT, FOLLOWING)
+_NOT_LED_COLOUR = "#D55E00"
+_STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewidth": 1.6}
+_IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
+_ROUND_MM = (10, 20, 50, 100, 200, 500, 1000)
+_MARKERS = ("o", "s")
+"""Of the guidances, in their order."""
+
+
+def draw_figure(flown: Flown) -> Figure:
+    """All panels, as `CAPTION` tells them."""
+    told = {task: 1e3 * tracked.told.rms for task, tracked in flown.items()}
+    true = {task: 1e3 * tracked.true.rms for task, tracked in flown.items()}
+    figure, panels = new_figure(4, 2)
+    for column, courses in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
+        _draw_paths(column[0], flown, courses[-1])
+        _draw_planners(column[1], told, courses)
+        column[1].set_title("All planners in still air, by telemetry")
+        _draw_planners(column[2], true, courses)
+        column[2].set_title("All planners in still air, by the truth")
+        _draw_lead_and_wind(column[3], told, courses)
+    for row in (0, 1, 3):
+        panels[row, 0].legend()
+    return figure
+
+
+def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
+    """The way that was asked for, flown, and flown without lead; the fastest of its kind."""
+    led = flown[Task(course, MODEL_FOLLOWING)]
+    not_led = flown[Task(course, MODEL_FOLLOWING, lead=False)]
+    draw(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
+    not_led_line = {"color": _NOT_LED_COLOUR, "linewidth": 1.0}
+    draw(axes, not_led.path[:, 3], not_led.path[:, 2], not_led_line, "not led")
+    draw(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "asked for")
+    axes.set(title=f"Path: {course}", xlabel="east, m", ylabel="north, m", aspect="equal")
+
+
+def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
+    """Error (mm) of every planner with every guidance over speed, in still air."""
+    for (guidance, marker), method in product(zip(GUIDANCES, _MARKERS, strict=False), _METHODS):
+        tasks = [Task(course, method.planner, guidance) for course in courses]
+        label = method.label if guidance == LINEAR else f"{method.label}, {guidance}"
+        _draw_over_speed(axes, tasks, errors, {**method.line, "marker": marker}, label)
+    axes.set_ylim(0.0, None)
+
+
+def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
+    """Error (mm) over speed, led and not led, in still air and in wind."""
+    for wind, look in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
+        where = f", wind of {wind:g} m/s" if wind else ""
+        for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):
+            tasks = [Task(course, MODEL_FOLLOWING, LINEAR, wind, lead) for course in courses]
+            label = f"model-following{'' if lead else ', not led'}{where}"
+            _draw_over_speed(axes, tasks, errors, {**look, "color": colour}, label)
+    tasks = [Task(course, PROPOSED.planner, LINEAR, WINDY) for course in courses]
+    line = {**_IN_WIND, "color": PROPOSED.colour}
+    _draw_over_speed(axes, tasks, errors, line, f"first-order, wind of {WINDY:g} m/s")
+    axes.set(title="Led and not led, still air and wind", yscale="log", yticks=_ROUND_MM)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.minorticks_off()
+
+
+def _draw_over_speed(
+    axes: Axes, tasks: Sequence[Task], errors: dict[Task, float], line: Line, label: str
+) -> None:
+    speeds = [task.course.speed for task in tasks]
+    axes.plot(speeds, [errors[task] for task in tasks], **line, label=label)
+    axes.set(xlabel="speed, m/s", ylabel="position error, rms, mm", xticks=speeds)

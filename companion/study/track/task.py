@@ -1,0 +1,90 @@
+"""What the study flies: which trajectories, how fast, with whom, in which wind."""
+
+from typing import Any, NamedTuple
+
+from companion.attitude import PLANNER_NAMES
+from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
+
+CIRCLE, EIGHT = "circle", "figure-eight"
+RADIUS_M, HALF_WIDTH_M = 5.0, 3.0
+CALM, WINDY = 0.0, 3.0
+"""Mean wind, m/s."""
+LINEAR = "linear"
+GUIDANCES = (LINEAR,)
+"""Of the configuration's `guidance.kind`, those that are flown."""
+_IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
+
+
+class Course(NamedTuple):
+    """A trajectory at one speed, from rest to rest.
+
+    Attributes:
+        trajectory: which.
+        speed: m/s; of the figure-eight, at its fastest place.
+        laps: so many that the speed is held for a while.
+    """
+
+    trajectory: str
+    speed: float
+    laps: float
+
+    def __str__(self) -> str:
+        return f"{self.trajectory}, {self.speed:g} m/s"
+
+    @property
+    def file(self) -> dict[str, Any]:
+        """What a trajectory file says of it."""
+        if self.trajectory == CIRCLE:
+            return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
+        eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
+        return {"figure_eight": eight}
+
+
+class Task(NamedTuple):
+    """One flight.
+
+    Attributes:
+        course: what is followed.
+        planner: by whom.
+        guidance: by which outer loop.
+        wind: mean, m/s, with gusts; 0 is still air.
+        lead: whether linear guidance leads its targets through the inner response.
+    """
+
+    course: Course
+    planner: str
+    guidance: str = LINEAR
+    wind: float = CALM
+    lead: bool = True
+
+    def __str__(self) -> str:
+        wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
+        return f"{self.course}, {self.planner}{'' if self.lead else ', not led'}{wind}"
+
+
+CIRCLE_AT_5, EIGHT_AT_5 = Course(CIRCLE, 5.0, 2.0), Course(EIGHT, 5.0, 2.0)
+CIRCLES = (
+    Course(CIRCLE, 1.0, 0.5),
+    Course(CIRCLE, 3.0, 1.0),
+    CIRCLE_AT_5,
+    Course(CIRCLE, 7.0, 3.0),
+)
+EIGHTS = (Course(EIGHT, 1.0, 1.0), Course(EIGHT, 3.0, 1.0), EIGHT_AT_5)
+COURSES = (*CIRCLES, *EIGHTS)
+
+
+def tasks() -> tuple[Task, ...]:
+    """Every planner with every guidance in still air, some in wind, and one not led."""
+    led = [
+        Task(course, planner, guidance, wind)
+        for course in COURSES
+        for guidance in GUIDANCES
+        for wind in (CALM, WINDY)
+        for planner in (_IN_WIND if wind else PLANNER_NAMES)
+    ]
+    not_led = [
+        Task(course, MODEL_FOLLOWING, LINEAR, wind, lead=False)
+        for course in COURSES
+        for wind in (CALM, WINDY)
+    ]
+    return (*led, *not_led)

@@ -1,0 +1,239 @@
+"""`companion study track`: some of its flights, and its page made of flights that were made up."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from math import inf
+
+import numpy as np
+import psutil
+import pytest
+import yaml
+
+from companion import demo
+from companion.attitude import PLANNER_NAMES
+from companion.cli import main
+from companion.study.track import fleet, flight, study
+from companion.study.track.findings import find
+from companion.study.track.flight import Off, Tracked
+from companion.study.track.task import WINDY, Course, Task, tasks
+from companion.yaml_file import ConfigError
+
+OURS = "model-following"
+BRIEF = Course("figure-eight", 4.0, 1.0)
+TASKS = (Task(BRIEF, OURS), Task(BRIEF, OURS, lead=False), Task(BRIEF, OURS, wind=WINDY))
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Three flights, side by side; and what was ticked."""
+    ticked = []
+    return fleet.fly_all(TASKS, ticked.append), ticked
+
+
+@pytest.fixture
+def vehicle(tmp_path, monkeypatch):
+    """Makes the vehicle that ships another one."""
+
+    def changed(**mock):
+        shipped = yaml.safe_load(demo.default_config().read_text())
+        shipped["include"] = str(demo.default_config().with_name(shipped["include"]))
+        shipped["mock"] |= mock
+        path = tmp_path / "other.yaml"
+        path.write_text(yaml.safe_dump(shipped))
+        monkeypatch.setattr(demo, "default_config", lambda: path)
+
+    return changed
+
+
+def test_a_trajectory_is_followed_closely_only_if_led(flown):
+    led, not_led, windy = (flown[0][task] for task in TASKS)
+    assert led.ok
+    assert led.told.rms < 0.04
+    assert led.told.rms < led.told.largest < 0.1
+    assert not_led.told.rms > 3.0 * led.told.rms
+    assert 2.0 * led.told.rms < windy.told.rms < 0.15
+
+
+def test_the_course_is_measured_and_nothing_else(flown):
+    path = flown[0][TASKS[0]].path
+    assert np.ptp(path[:, :2], axis=0) == pytest.approx([6.0, 3.0], abs=0.01)
+    assert np.linalg.norm(path[-1, :2] - path[0, :2]) < 0.02
+    steps = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)
+    assert steps.max() == pytest.approx(4.0 * 0.02, rel=0.03)
+    assert (steps == 0.0).sum() < 5  # it neither holds before nor after
+
+
+def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
+    """Told without noise and without delay, the two are one."""
+    names = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
+    vehicle(sensors={**dict.fromkeys(names, 0.0), "position_delay_ms": 0.0})
+    tracked = flight.fly(TASKS[0])
+    assert tracked.told.rms == pytest.approx(tracked.true.rms, abs=2e-3)
+    assert tracked.true.rms < 0.03
+
+
+def test_each_flight_is_told_as_it_begins(flown):
+    assert flown[1] == [
+        "figure-eight, 4 m/s, model-following",
+        "figure-eight, 4 m/s, model-following, not led",
+        "figure-eight, 4 m/s, model-following in 3 m/s of wind",
+    ]
+
+
+def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
+    alone, company = flight.fly(TASKS[0]), flown[0][TASKS[0]]
+    assert (alone.told, alone.true) == (company.told, company.true)
+    assert np.array_equal(alone.path, company.path)
+
+
+def test_a_flight_that_fails_has_no_error_to_show(vehicle):
+    vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 4.0}])
+    tracked = flight.fly(TASKS[0])
+    assert not tracked.ok
+    assert tracked.result
+    assert (tracked.told, tracked.true) == (Off(inf, inf), Off(inf, inf))
+
+
+def test_what_cannot_be_flown_ends_the_study_before_more_is_begun():
+    ticked = []
+    too_fast = [Task(Course("circle", 50.0, 1.0), planner) for planner in PLANNER_NAMES]
+    many = [task._replace(wind=wind) for task in too_fast for wind in range(9)]
+    with pytest.raises(ConfigError, match=r"limits\.max_tilt_rate_deg_s allows 250"):
+        fleet.fly_all(many, ticked.append)
+    assert len(ticked) <= len(os.sched_getaffinity(0))
+
+
+def made_up(**others):
+    """Flights of the whole study that were not flown; `others` are errors of ours, by text."""
+    rank = {planner: n for n, planner in enumerate(PLANNER_NAMES)}
+    flights = {}
+    for task in tasks():
+        rms = 1e-3 * (20.0 + rank[task.planner] + task.course.speed) + 0.01 * task.wind
+        if task.planner == OURS:
+            rms *= 0.5 if task.lead else 5.0
+        rms = others.get(str(task), rms)
+        path = np.linspace((0.0, 0.0, 0.0, 0.1), (1.0, 2.0, 1.1, 2.1), 50)
+        off = Off(rms, 2.0 * rms)
+        flights[task] = Tracked("ok" if rms < inf else "lost", off, Off(0.9 * rms, 1.8 * rms), path)
+    return flights
+
+
+def studied(monkeypatch, capsys, out, *options, **others):
+    monkeypatch.setattr(study, "fly_all", lambda _, tick: made_up(**others))
+    assert main(["study", "track", "--out", str(out), *options]) == 0
+    return capsys.readouterr()
+
+
+def table(out, name):
+    with (out / f"{name}.csv").open(newline="") as file:
+        header, *body = csv.reader(file)
+    return {row[0]: dict(zip(header[1:], row[1:], strict=True)) for row in body}
+
+
+def test_json_prints_one_list_with_a_row_for_each_case(tmp_path, monkeypatch, capsys):
+    said = studied(monkeypatch, capsys, tmp_path, "--json")
+    rows = json.loads(said.out)
+    assert "Open" in said.err
+    case = ("trajectory", "speed_mps", "planner", "guidance", "wind_mps")
+    cases = [tuple(row[key] for key in case) for row in rows]
+    assert len(cases) == len(set(cases))
+    assert {row[2] for row in cases} == set(PLANNER_NAMES)
+    for planner in PLANNER_NAMES:
+        calm = [row[:2] for row in cases if row[2:] == (planner, "linear", 0.0)]
+        assert calm == [
+            *(("circle", speed) for speed in (1.0, 3.0, 5.0, 7.0)),
+            *(("figure-eight", speed) for speed in (1.0, 3.0, 5.0)),
+        ]
+    assert {row[2] for row in cases if row[4] == 3.0} == {OURS, "first-order"}
+    (row,) = [
+        row
+        for row, of in zip(rows, cases, strict=True)
+        if of == ("circle", 5.0, OURS, "linear", 0.0)
+    ]
+    assert row["position_rms_m"] == pytest.approx(0.5 * 0.030)
+    assert row["position_max_m"] == pytest.approx(0.030)
+    assert row["true_rms_m"] == pytest.approx(0.9 * 0.015)
+    assert row["not_led_rms_m"] == pytest.approx(0.15)
+    assert row["not_led_max_m"] == pytest.approx(0.30)
+    assert row["result"] == "ok"
+
+
+def test_the_tables_hold_what_was_flown(tmp_path, monkeypatch, capsys):
+    studied(monkeypatch, capsys, tmp_path)
+    row = table(tmp_path, "track")["circle, 7 m/s, linear"]
+    assert float(row["first-order"]) == pytest.approx(27.0)
+    assert float(row[OURS]) == pytest.approx(0.5 * 32.0)
+    assert float(table(tmp_path, "track-largest")["circle, 7 m/s, linear"]["exact"]) == 56.0
+    true = table(tmp_path, "track-true")["figure-eight, 1 m/s, linear"]
+    assert float(true["first-order"]) == pytest.approx(0.9 * 21.0)
+    wind = table(tmp_path, "track-lead-and-wind")["figure-eight, 5 m/s"]
+    assert [float(wind[key]) for key in wind] == pytest.approx([15.0, 150.0, 30.0, 300.0, 55.0])
+
+
+def test_the_findings_follow_from_the_numbers():
+    def verdicts(**others):
+        return [finding.holds for finding in find(made_up(**others))]
+
+    assert verdicts() == [True] * 6
+    assert verdicts(**{"circle, 3 m/s, model-following": 0.0231})[:2] == [True, True]  # even
+    assert verdicts(**{"circle, 3 m/s, model-following": 0.0233})[:2] == [False, False]
+    windy = "figure-eight, 1 m/s, model-following in 3 m/s of wind"
+    assert verdicts(**{windy: 0.2}) == [True, True, False, True, True, True]
+    calm = "circle, 5 m/s, model-following, not led"
+    assert verdicts(**{calm: 0.04}) == [True, True, True, False, True, True]
+    assert verdicts(**{f"{calm} in 3 m/s of wind": 0.07}) == [True, True, True, True, False, True]
+    windy = "figure-eight, 5 m/s, model-following in 3 m/s of wind"
+    assert not verdicts(**{windy: 0.13})[-1]
+    beaten = find(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
+    assert "circle, 3 m/s: 23.3 mm, first-order 23.0 mm" in beaten
+    assert "on 6 of 7 courses, farther off than the best on 1" in beaten
+
+
+def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, capsys):
+    lost = {"circle, 7 m/s, model-following": inf, "circle, 7 m/s, euler": inf}
+    said = studied(monkeypatch, capsys, tmp_path, "--json", **lost)
+    failed = [row for row in json.loads(said.out) if row["result"] != "ok"]
+    assert [row["planner"] for row in failed] == ["euler", OURS]
+    for row in failed:
+        assert row["position_rms_m"] is row["true_max_m"] is None
+    assert table(tmp_path, "track")["circle, 7 m/s, linear"][OURS] == "failed"
+    text = (tmp_path / "track.html").read_text()
+    assert "circle, 7 m/s: failed, first-order 27.0 mm" in text
+    assert not {"nan", "None", "inf"} & set(re.findall(r"<td[^>]*>([^<]*)</td>", text))
+
+
+def test_json_goes_with_this_study_alone(tmp_path, capsys):
+    assert main(["study", "kmax", "--json", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr()
+    assert "--json goes with study track" in said.err
+    assert not said.out
+    assert not list(tmp_path.iterdir())
+
+
+def test_interrupted_it_leaves_no_vehicle_behind(tmp_path):
+    command = [sys.executable, "-m", "companion", "study", "track", "--out", str(tmp_path)]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+    def vehicles():
+        family = psutil.Process(process.pid).children(recursive=True)
+        return [one for one in family if "sitl_mock" in one.cmdline()]
+
+    deadline = time.monotonic() + 30.0
+    while not (left := vehicles()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    out, errors = process.communicate(timeout=60.0)
+    assert process.returncode == 1
+    assert "Interrupted" in out
+    assert "Traceback" not in out + errors
+    assert not [one for one in left if one.is_running()]
+    assert not list(tmp_path.iterdir())
