@@ -118,9 +118,10 @@ def _add_identify(commands: Commands) -> None:
     command = commands.add_parser(
         "identify",
         help="find dead time, lag and slew of the body rates and the thrust map",
-        description="Fly short doublets of body rates and climb, at most 15° of tilt unless the "
-        "configuration's `identify` says otherwise, fit how the vehicle answered them, and write "
-        "that as a YAML file for the configuration to include. A bad fit is not written.",
+        description="Fly short doublets of body rates and climb, at most 15° of tilt in calm "
+        "air unless the configuration's `identify` says otherwise, fit how the vehicle answered "
+        "them, and write that as a YAML file for the configuration to include. A bad fit is not "
+        "written.",
     )
     which = command.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", type=Path, metavar="FILE", help="fly the vehicle it names")

@@ -38,7 +38,9 @@ def load(path: Path) -> Config:
 def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     names = own.get(_INCLUDE, [])
     names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+    if not isinstance(names, list) or not all(
+        isinstance(name, str) and yaml_file.is_path(name) for name in names
+    ):
         raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {names!r}")
     return [path.parent / name for name in names]
 

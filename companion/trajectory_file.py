@@ -176,12 +176,20 @@ class CsvShape(Section):
     """With which speed is gathered or lost where the file begins or ends in motion."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """What it describes.
+
+        Raises:
+            TrajectoryError: as always, but the file named in it.
+        """
         path = folder / self.file
         options = SampleOptions(
             Frame(self.frame), HeadingFrom(self.heading), self.cutoff_hz, self.acceleration_m_s2
         )
-        return from_samples(read_csv(path), options, self.file.stem)
+        table = read_csv(path)
+        try:
+            return from_samples(table, options, self.file.stem)
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{path}: {error}") from error
 
 
 class TrajectoryFile(Section):
@@ -220,9 +228,11 @@ def load(path: Path) -> Trajectory:
         ConfigError: it cannot be read, holds an unknown key or a bad value, or describes what
             cannot be made.
     """
+    is_table = path.suffix.lower() == ".csv"
     try:
-        if path.suffix.lower() == ".csv":
+        if is_table:
             return CsvShape(file=Path(path.name)).trajectory(path.parent)
         return yaml_file.load(path, TrajectoryFile).trajectory(path.parent)
     except TrajectoryError as error:
-        raise ConfigError(f"{path}: {error}") from error
+        # The table's own errors name it already.
+        raise ConfigError(str(error) if is_table else f"{path}: {error}") from error

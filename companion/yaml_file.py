@@ -6,9 +6,14 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+def is_path(text: str) -> bool:
+    """Whether a text can name a file or a folder."""
+    return text.strip() != "" and "\0" not in text
 
 
 class Section(BaseModel):
@@ -17,6 +22,24 @@ class Section(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_boolean_number(cls, value: Any, field: ValidationInfo) -> Any:
+        """`true` counts as 1 to pydantic; to whoever wrote it, it does not."""
+        kind = cls.model_fields[str(field.field_name)].annotation
+        if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
+            raise ValueError("must not be true or false")
+        return value
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
+        """An empty path would be the folder itself, and no path holds a null character."""
+        kind = cls.model_fields[str(field.field_name)].annotation
+        if isinstance(value, str) and Path in (kind, *get_args(kind)) and not is_path(value):
+            raise ValueError("must name a file or a folder")
+        return value
 
 
 class ConfigError(Exception):

@@ -13,6 +13,7 @@ from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config_file import load
 from companion.guidance.reference import GRAVITY
 from companion.identification import (
+    KEEP_FRAME_LEAD,
     BadFitError,
     IdentifiedVehicle,
     identify_vehicle,
@@ -37,7 +38,9 @@ def identify(options: argparse.Namespace) -> int:
     console = FlightConsole(stderr=options.json, highlight=False)
     if options.log is not None:
         log = options.log / _LOG if options.log.is_dir() else options.log
-        out = _writable(options.out or log.with_name(_FRAGMENT), options.force)
+        out = options.out or log.with_name(_FRAGMENT)
+        if log.exists():  # else it is the log that is to be mended
+            _writable(out, options.force)
         return _fitted(log, out, options, console)
     if options.out is not None:
         _writable(options.out, options.force)  # not to be found out after the flight
@@ -46,15 +49,34 @@ def identify(options: argparse.Namespace) -> int:
         _tell(options, {"result": summary.result, "log": str(summary.log)})
         return EXIT_FLIGHT
     log = summary.log / _LOG
-    return _fitted(log, options.out or log.with_name(_FRAGMENT), options, console)
+    out = options.out or log.with_name(_FRAGMENT)
+    try:
+        return _fitted(log, out, options, console)
+    except KeyboardInterrupt:
+        reason = (
+            f"interrupted while fitting; the flight is kept in {summary.log}; "
+            f"fit it with identify --log {summary.log}"
+        )
+        with suppress(OSError):
+            console.print(reason, soft_wrap=True)
+        _tell(options, {"result": reason, "log": str(log)})
+        return EXIT_FLIGHT
 
 
-def _writable(out: Path, force: bool) -> Path:
+def _writable(out: Path, force: bool) -> None:
+    """Refuse what no file can be put to.
+
+    Raises:
+        ConfigError: it cannot, and why.
+    """
+    if out.is_dir():
+        raise ConfigError(f"{out} is a folder; name a file in it, such as {out / _FRAGMENT}")
     if out.exists() and not force:
         raise ConfigError(f"{out} exists; name another file with --out, or replace it with --force")
     if not out.parent.is_dir():
         raise ConfigError(f"{out}: there is no folder {out.parent}")
-    return out
+    if not os.access(out.parent, os.W_OK | os.X_OK):
+        raise ConfigError(f"{out}: the folder {out.parent} cannot be written; name another one")
 
 
 def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
@@ -68,6 +90,8 @@ def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
 
 def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
     """Fit what a log holds, show it, and write it to `out` if it is good."""
+    with suppress(OSError):
+        console.print("fitting…")
     rows = read_flight_log(log)
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
     try:
@@ -80,20 +104,46 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
                 console.print(f"  {axis}: {reason}", soft_wrap=True)
         _tell(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
-    out.write_text(text, encoding="utf-8")
+    _replace(out, text)
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
-        console.print(_how_to_include(out, options.config), soft_wrap=True)
+        console.print(_how_to_include(out, options.config, vehicle), soft_wrap=True)
     _tell(options, {"result": "ok", "log": str(log), "file": str(out), **_figures(vehicle)})
     return EXIT_OK
 
 
-def _how_to_include(out: Path, config: Path | None) -> str:
-    place = out if config is None else Path(os.path.relpath(out, config.parent))
-    return (
-        f"Written to {out}. Let your configuration say\n  include: {place}\n"
-        "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win."
-    )
+def _replace(out: Path, text: str) -> None:
+    """Write a file whole or not at all: what flies by it must not read half of it.
+
+    Raises:
+        OSError: it cannot be written; its text is a whole sentence.
+    """
+    part = out.with_name(f".{out.name}.{os.getpid()}")
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(out)
+    except OSError as error:
+        raise OSError(f"{out}: cannot write what was identified: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _how_to_include(out: Path, config: Path | None, vehicle: IdentifiedVehicle) -> str:
+    place = out.resolve()
+    if config is not None:
+        place = Path(os.path.relpath(place, config.resolve().parent))
+    lines = [
+        f"Written to {out}. Let your configuration say",
+        f"  include: {place}",
+        "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win.",
+    ]
+    if vehicle.slews:
+        lines.append(KEEP_FRAME_LEAD)
+    return "\n".join(lines)
 
 
 def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:

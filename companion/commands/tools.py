@@ -10,6 +10,7 @@ from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config_file import json_schema, load
 from companion.demo import check_mock
 from companion.flight.assembly import link_settings
+from companion.flight.programmes import programme
 from companion.mavlink.endpoint import parse_endpoint
 from companion.recording.figure import draw_flight
 from companion.study import needs
@@ -73,6 +74,7 @@ def check_config(options: argparse.Namespace) -> int:
         return EXIT_OK
     config = load(options.file)
     parse_endpoint(link_settings(config).endpoint)
+    programme(config)  # the trajectory too
     if config.mock is not None:
         check_mock(options.file)
     print(f"{options.file}: ok")

@@ -5,7 +5,7 @@ from a sample to the first effect of its answer: what `vehicle.dead_time_ms` mea
 """
 
 from companion.identification.correlation import dead_time_by_correlation
-from companion.identification.fragment import vehicle_fragment
+from companion.identification.fragment import KEEP_FRAME_LEAD, vehicle_fragment
 from companion.identification.response import (
     BadFitError,
     FitNeeds,
@@ -18,6 +18,7 @@ from companion.identification.thrust_map import ThrustMap, fit_thrust_map
 from companion.identification.vehicle import IdentifiedVehicle, identify_vehicle
 
 __all__ = [
+    "KEEP_FRAME_LEAD",
     "BadFitError",
     "FitNeeds",
     "FitQuality",

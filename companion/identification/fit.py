@@ -23,7 +23,10 @@ _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _RAMPS = (0.01, 0.5)
 """Shortest and longest time the largest change of command may take at the slew limit, s."""
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Of `_RAMPS`, those from which the search begins, s."""
+"""Of `_RAMPS`, those from which the search may begin, s."""
+_LEFT_OF_LAG = (0.15, 0.4, 1.0)
+_LEFT_OF_DEAD_TIME = (0.6, 1.0)
+"""Of what was found without a slew limit, the shares from which the search with one may begin."""
 _CLEARLY = 0.6
 """A slew limit is believed if it leaves less than this share of the squared residuals."""
 _ON_ITS_WAY = 0.02
@@ -32,6 +35,8 @@ _ALIKE = 0.005
 """Commands that differ by less than this share of their range count as one."""
 _COARSE = 500
 """About so many samples find where to begin."""
+_FINE = 4000
+"""At most so many samples find the rest: what more of them would add to the fit is time."""
 _FEWEST = 10
 _NEIGHBOUR = 0.005  # s
 
@@ -89,32 +94,45 @@ def fit_lag(
     samples = sum(part.measured.size for part in record)
     if samples < _FEWEST or all(np.ptp(part.commanded) == 0.0 for part in record):
         return None
-    data, coarse = _Data(record, gain), _Data(record, gain, thinning=1 + samples // _COARSE)
+    data = _Data(record, gain, thinning=1 + samples // _FINE)
+    coarse = _Data(record, gain, thinning=1 + samples // _COARSE)
     best = _settled(data, _start(coarse))
     if may_slew:
         best = _slewed_if_clearly(best, data, coarse)
     found = data.described(best)
     if gain is not None:
-        freely = _Data(record, None).search(best.unknown)
+        freely = _Data(record, None, thinning=data.thinning).search(best.unknown)
         found = replace(found, gain=float(freely.weights[0]))
     return found
 
 
 def _slewed_if_clearly(best: Solution, data: "_Data", coarse: "_Data") -> Solution:
     """The best fit behind a slew limit, if it is clearly better than the one without."""
-    limited = [
-        coarse.search(np.append(best.unknown, log(data.largest_change / ramp)))
-        for ramp in _TRIED_RAMPS
-    ]
-    best_limited = data.search(min(limited, key=lambda found: found.squares).unknown)
+    promising = coarse.search(_slewed_start(best, coarse))
+    if promising.squares > _CLEARLY * coarse.search(best.unknown).squares:
+        return best
+    best_limited = data.search(promising.unknown)
     return best_limited if best_limited.squares < _CLEARLY * best.squares else best
+
+
+def _slewed_start(best: Solution, coarse: "_Data") -> Floats:
+    """(3,), the best of a coarse grid: what a ramp delays is taken from lag and dead time."""
+    lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
+    return coarse.best_of(
+        [
+            np.array([log(share * lag), left * dead_time, log(coarse.largest_change / ramp)])
+            for ramp in _TRIED_RAMPS
+            for share in _LEFT_OF_LAG
+            for left in _LEFT_OF_DEAD_TIME
+        ]
+    )
 
 
 class _Data:
     """A record, every `thinning`-th sample of it, and what a lag makes of its commands."""
 
     def __init__(self, record: list[Stretch], gain: float | None, thinning: int = 1) -> None:
-        self.gain = gain
+        self.gain, self.thinning = gain, thinning
         span = max(float(np.ptp(part.commanded)) for part in record)
         self.commands = [held(part.time, part.commanded, _ALIKE * span) for part in record]
         self.times = [part.measured_time[::thinning] for part in record]
@@ -157,6 +175,11 @@ class _Data:
         ]
         lowest, highest = np.array(limits[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
+
+    def best_of(self, points: list[Floats]) -> Floats:
+        """The point of a grid that leaves the smallest squares."""
+        residuals = [self.projection(point)[1] for point in points]
+        return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
 
     def described(self, found: Solution) -> LagFit:
         """The fit in its own units."""
@@ -209,9 +232,6 @@ def _settled(data: _Data, start: Floats) -> Solution:
 
 def _start(data: _Data) -> Floats:
     """(2,), the best of a coarse grid: (log lag, dead time)."""
-    grid = [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]
-    squares = []
-    for point in grid:
-        rest = data.projection(point)[1]
-        squares.append(float(rest @ rest))
-    return grid[int(np.argmin(squares))]
+    return data.best_of(
+        [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]
+    )

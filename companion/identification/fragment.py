@@ -5,6 +5,12 @@ from math import degrees
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
+KEEP_FRAME_LEAD = (
+    "Acceleration is limited, as by ArduPilot: keep `vehicle.yaw_frame_lead_ms` of "
+    "vehicle-ardupilot.yaml, which is not identified."
+)
+"""For whoever includes a vehicle with a slew limit."""
+
 
 def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float) -> str:
     """YAML that the configuration includes, a comment on how good each fit is above it.
@@ -27,6 +33,8 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float) -> str:
     if thrust is not None and thrust.is_good(gravity):
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
+    if vehicle.slews:
+        lines.append(f"# {KEEP_FRAME_LEAD}")
     lines.append("vehicle:")
     lines += _response_keys("", (vehicle.roll, vehicle.pitch))
     lines += _response_keys("yaw_", (vehicle.yaw,))

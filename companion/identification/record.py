@@ -12,10 +12,10 @@ LONGEST_DEAD_TIME = 0.5
 _LONGEST_HOLD = 0.5
 """A command is taken as held this long, s; autopilots leave our control after about 1 s."""
 
-_MOST_ROWS = 30_000
-"""Commands and samples that a fit takes on: a minute at 250 Hz."""
-_WINDOW = 4.0
-"""Length of the parts of which the most excited are kept, s: a doublet and its answer."""
+_MOST_ROWS = 16_000
+"""Commands and samples that a fit takes on: of each about half a minute at 250 Hz."""
+_WINDOW = 10.0
+"""Length of the parts of which the most excited are kept, s: some doublets and their answers."""
 _LEAD = 1.5
 """Commands so long before a part come along with it: the longest dead time and ramp, s."""
 
@@ -74,7 +74,8 @@ def most_excited(record: list[Stretch]) -> list[Stretch]:
         return record
     windows = [window for part in record for window in _windows(part)]
     windows.sort(key=lambda window: float(np.std(window.commanded)), reverse=True)
-    kept, rows = [], 0
+    kept: list[Stretch] = []
+    rows = 0
     for window in windows:
         rows += window.time.size + window.measured_time.size
         if kept and rows > _MOST_ROWS:

@@ -16,5 +16,5 @@ def check(name: str) -> None:
     """
     for module in _MODULES:
         require(module, "study", "`companion study`")
-    if name == "nmpc":
-        require("casadi", "nmpc", "`companion study nmpc`")
+    if name in ("nmpc", "track"):
+        require("casadi", "nmpc", f"`companion study {name}`")

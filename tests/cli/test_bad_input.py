@@ -66,6 +66,9 @@ def config(tmp_path, text):
         ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
         ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
         ("link: 3", "`link`"),
+        ("vehicle: {dead_time_ms: true}", "`vehicle.dead_time_ms`: must not be true or false"),
+        ("flight: {slow_down: 1.5}", "`flight.slow_down`"),
+        ("flight: {trajectory: ''}", "`flight.trajectory`: must name a file or a folder (got '')"),
         ("link: {endpoint: nonsense}", "nonsense"),
         ("link: {endpoint: 'udpin://0.0.0.0:port'}", "port"),
         ("link: {endpoint: 'serial:///dev/not-there:57600'}", "/dev/not-there"),
@@ -121,10 +124,18 @@ def test_an_unknown_programme_names_the_known(capsys, tmp_path):
     assert "known: hover, steps, circle" in err
 
 
-def test_check_config_reads_the_endpoint_and_the_key_too(capsys, tmp_path):
+def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):
+    far = tmp_path / "far.yaml"
+    far.write_text("line: {to_m: [400, 0, 0], speed_m_s: 2}")
     for text, words in (
         ("link: {endpoint: nonsense}", "nonsense"),
         ("link: {signing_key_file: /not/there}", "/not/there"),
+        ("flight: {programme: [trajectory]}", "flight.trajectory: name a file"),
+        ("flight: {programme: [trajectory], trajectory: /not/there.yaml}", "/not/there.yaml"),
+        (
+            f"flight: {{programme: [trajectory], trajectory: {far}}}",
+            "limits.fence_radius_m allows 50",
+        ),
     ):
         code, _, err = run(capsys, "check-config", config(tmp_path, text))
         assert (code, words in err) == (2, True)

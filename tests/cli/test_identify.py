@@ -1,5 +1,6 @@
 """`companion identify`, as a user calls it: what is written, what is not, and what is told."""
 
+import errno
 import json
 import os
 import shutil
@@ -7,12 +8,15 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
 from companion.cli import main
+from companion.commands import identify
 from companion.config_file import load
+from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
 from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
@@ -152,15 +156,99 @@ def test_a_file_that_is_no_log_is_refused_as_usage(capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("out", "words"),
-    [("there.yaml", "exists; name another file with --out"), ("no/v.yaml", "there is no folder")],
+    [
+        ("there.yaml", "exists; name another file with --out"),
+        ("no/v.yaml", "there is no folder"),
+        ("folder", "folder is a folder; name a file in it, such as"),
+        ("locked/v.yaml", "locked cannot be written"),
+    ],
 )
-def test_a_place_that_cannot_be_written_is_told_before_flying(capsys, tmp_path, out, words):
+def test_a_place_that_cannot_be_written_is_told_before_flying(
+    capsys, tmp_path, monkeypatch, out, words
+):
     (tmp_path / "there.yaml").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "locked").mkdir()
+    # Whoever tests as root may write to a locked folder.
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "locked")
     config = config_for(tmp_path, f"udpin://127.0.0.1:{free_port()}")
     code, _, err = run(capsys, "--config", config, "--out", tmp_path / out)
     assert code == 2
     assert words in err
     assert not (tmp_path / "flights").exists()
+
+
+def test_a_log_in_a_folder_that_is_not_there_is_what_is_blamed(capsys, tmp_path):
+    code, _, err = run(capsys, "--log", tmp_path / "no" / "x.tlog")
+    assert code == 2
+    assert f"{tmp_path}/no/x.tlog: cannot read the log: No such file" in err
+
+
+GOOD = FitQuality(0.99, 0.001, 0.002, 2.0, 200)
+TILT = RateResponse(0.018, 0.020, 1.0, None, GOOD)
+YAW = RateResponse(0.06, 0.158, 1.0, 4.7, GOOD)
+
+
+@pytest.fixture
+def fitted(monkeypatch, tmp_path):
+    """The folder of a log that gives a good fit, with a slew limit in yaw."""
+    shutil.copy(RECORDINGS / "px4-rate-steps.tlog", tmp_path / "flight.tlog")
+    vehicle = IdentifiedVehicle(TILT, TILT, YAW, None)
+    monkeypatch.setattr(identify, "identify_vehicle", lambda *_: vehicle)
+    return tmp_path
+
+
+def test_fitting_is_announced_and_the_include_is_found_from_anywhere(capsys, fitted, monkeypatch):
+    monkeypatch.chdir(fitted)
+    code, out, _ = run(capsys, "--log", "flight.tlog")
+    assert code == 0
+    assert out.startswith("fitting…")
+    assert f"include: {fitted}/vehicle.yaml and" in out
+    code, out, err = run(capsys, "--log", "flight.tlog", "--force", "--json")
+    assert json.loads(out)["result"] == "ok"
+    assert err.startswith("fitting…")
+
+
+def test_what_is_not_identified_of_a_limited_acceleration_is_to_be_kept(capsys, fitted):
+    _, out, _ = run(capsys, "--log", fitted)
+    words = "keep `vehicle.yaw_frame_lead_ms` of vehicle-ardupilot.yaml"
+    assert words in out
+    assert words in (fitted / "vehicle.yaml").read_text()
+
+
+def test_a_disk_that_is_full_leaves_the_old_file_whole(capsys, fitted, monkeypatch):
+    written = fitted / "vehicle.yaml"
+    written.write_text("old")
+    before = set(fitted.iterdir())
+
+    def full(_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    code, _, err = run(capsys, "--log", fitted, "--force")
+    assert code == 1
+    assert err == (
+        f"companion: {written}: cannot write what was identified: No space left on device"
+    )
+    assert written.read_text() == "old"
+    assert set(fitted.iterdir()) == before
+
+
+def test_an_interrupted_fit_says_where_the_flight_is(capsys, fitted, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    flown = SimpleNamespace(result="ok", log=fitted)
+    monkeypatch.setattr(identify, "_flown", lambda *_: flown)
+    monkeypatch.setattr(identify, "identify_vehicle", interrupted)
+    code, out, err = run(capsys, "--config", fitted / "my.yaml", "--json")
+    assert code == 1
+    assert json.loads(out)["result"] == (
+        f"interrupted while fitting; the flight is kept in {fitted}; "
+        f"fit it with identify --log {fitted}"
+    )
+    assert f"the flight is kept in {fitted}" in err
+    assert not (fitted / "vehicle.yaml").exists()
 
 
 def test_a_flight_that_failed_is_not_fitted(capsys, tmp_path):

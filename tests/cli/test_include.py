@@ -100,7 +100,7 @@ def test_a_missing_included_file_is_named(files):
         load(main_file)
 
 
-@pytest.mark.parametrize("value", ["3", "[3]", "{a: b}", ""])
+@pytest.mark.parametrize("value", ["3", "[3]", "{a: b}", "", '""', "[' ']", '"a\\0b"'])
 def test_what_is_not_a_file_name_cannot_be_included(files, value):
     main_file = files(main=f"include: {value}\n")
     with pytest.raises(ConfigError, match="`include` must be a file or a list of files, not"):

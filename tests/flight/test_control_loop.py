@@ -201,12 +201,14 @@ class CountingPlanner:
 
     def __init__(self):
         self.resets = self.asked = 0
+        self.periods = []
 
     def reset(self, q, body_rates=None):
         self.resets += 1
 
     def rates(self, q, target, dt, body_rates=None):
         self.asked += 1
+        self.periods.append(dt)
         return BodyRates(0.0, 0.0, 0.0)
 
 
@@ -258,3 +260,13 @@ def test_after_them_the_planner_begins_anew():
     assert (planner.asked, planner.resets) == (10, 1)
     bench.run(1)
     assert (planner.asked, planner.resets) == (11, 2)
+
+
+def test_the_step_after_a_gap_is_as_long_as_the_one_before_it():
+    planner = CountingPlanner()
+    bench = Bench(planner=planner)
+    bench.run(10)
+    bench.time += 0.3
+    bench.run(2)
+    assert planner.resets == 2
+    assert planner.periods[1:] == pytest.approx(11 * [0.004])

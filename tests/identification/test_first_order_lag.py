@@ -40,3 +40,19 @@ def test_commands_that_hardly_differ_make_no_piece_of_their_own():
     assert commands.time.tolist() == [0.0, 3.0, 5.0]
     assert value_at(commands, np.array([2.5, 4.5])).tolist() == [0.0, 0.02]
     assert held(time, np.array([0.0, 0.0, 1e-9, 1e-9, 0.0, 0.0])).time.tolist() == [0.0, 2.0, 4.0]
+
+
+@pytest.mark.parametrize("slew", [0.5, 5.0, 500.0])
+def test_slewed_commands_are_those_approached_in_small_steps(slew):
+    rng = np.random.default_rng(6)
+    commands = held(np.cumsum(rng.integers(4, 60, size=200)) * 1e-3, rng.normal(size=200))
+    step = 1e-4
+    at = np.arange(commands.time[0], commands.time[-1] + 0.5, step)
+    asked = value_at(commands, at + 0.5 * step)
+    value, approached = float(asked[0]), []
+    for target in asked.tolist():
+        approached.append(value)
+        value += min(max(target - value, -slew * step), slew * step)
+    limited = slewed(commands, slew)
+    assert np.all(np.diff(limited.time) >= 0.0)
+    assert np.abs(value_at(limited, at) - approached).max() < 1.01 * slew * step + 1e-9

@@ -64,6 +64,8 @@ def test_each_axis_says_how_good_it_is():
     text = vehicle_fragment(replace(VEHICLE, pitch=replace(PITCH, slew=19.2)), GRAVITY)
     assert "# roll: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, explains 99.0%" in text
     assert "slew 19.2 rad/s²" in text
+    assert "# Acceleration is limited, as by ArduPilot: keep `vehicle.yaw_frame_lead_ms`" in text
+    assert "yaw_frame_lead_ms" not in vehicle_fragment(VEHICLE, GRAVITY)
     assert "# thrust: T/m = 19.55·u +0.22 m/s²" in text
 
 

@@ -136,6 +136,7 @@ def test_the_accelerometer_tells_the_specific_thrust_in_the_vehicles_clock(tmp_p
     imu = dialect.MAVLink_highres_imu_message
     log.add(imu(1_050_000, 0.1, 0.2, -9.7, *zeros, 0.0, 0))
     log.add(imu(1_700_000_000_000_000, 0.1, 0.2, -9.7, *zeros, 0.0, 0))  # the time of day
+    log.add(imu(2_200_000, 0.1, 0.2, -9.6, *zeros, 0.0, 0))  # booted a second before the other
     log.add(dialect.MAVLink_scaled_imu_message(1060, 0, 0, -1000, 0, 0, 0, 0, 0, 0))
     assert log.read(tmp_path).specific_thrust == [
         pytest.approx((1.05, 9.7)),

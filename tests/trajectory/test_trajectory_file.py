@@ -185,6 +185,27 @@ def test_a_fault_is_told_in_a_sentence_that_names_the_file(tmp_path, text, sente
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("rows", "sentence"),
+    [
+        (["x,y"], "needs a header and at least 4 samples"),
+        (
+            ["t,x,y,z,vx,vy,vz", *(f"{k / 10},{k / 10},0,0,9,9,9" for k in range(40))],
+            "the velocity is not the derivative of the positions",
+        ),
+    ],
+)
+def test_a_fault_in_a_csv_names_it_once(tmp_path, rows, sentence):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(rows))
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}: {sentence}")
+    with pytest.raises(ConfigError) as caught:
+        _load(tmp_path, "csv: {file: a.csv}")
+    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}: {path}: {sentence}")
+
+
 def test_a_missing_csv_is_told_too(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.csv: cannot read it"):
         load(tmp_path / "none.csv")

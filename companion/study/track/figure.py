@@ -19,6 +19,7 @@ from companion.study.track.task import (
     WINDY,
     Course,
     Task,
+    planners,
 )
 
 CAPTION = (
@@ -68,6 +69,8 @@ def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
 def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
     """Error (mm) of every planner with every guidance over speed, in still air."""
     for (guidance, marker), method in product(zip(GUIDANCES, _MARKERS, strict=False), _METHODS):
+        if method.planner not in planners(guidance):
+            continue
         tasks = [Task(course, method.planner, guidance) for course in courses]
         label = method.label if guidance == LINEAR else f"{method.label}, {guidance}"
         _draw_over_speed(axes, tasks, errors, {**method.line, "marker": marker}, label)

@@ -8,7 +8,16 @@ from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.table import Cell, Table
 from companion.study.track.fleet import Flown
 from companion.study.track.flight import Off
-from companion.study.track.task import CALM, COURSES, GUIDANCES, LINEAR, WINDY, Course, Task
+from companion.study.track.task import (
+    CALM,
+    COURSES,
+    GUIDANCES,
+    LINEAR,
+    WINDY,
+    Course,
+    Task,
+    planners,
+)
 
 _FAILED = "failed"
 
@@ -108,7 +117,12 @@ def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table
         tuple(
             (
                 f"{course}, {guidance}",
-                *(_in_mm(errors[Task(course, planner, guidance)]) for planner in PLANNER_NAMES),
+                *(
+                    _in_mm(errors[Task(course, planner, guidance)])
+                    if planner in planners(guidance)
+                    else ""
+                    for planner in PLANNER_NAMES
+                ),
             )
             for guidance in GUIDANCES
             for course in COURSES

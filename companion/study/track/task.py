@@ -9,9 +9,9 @@ CIRCLE, EIGHT = "circle", "figure-eight"
 RADIUS_M, HALF_WIDTH_M = 5.0, 3.0
 CALM, WINDY = 0.0, 3.0
 """Mean wind, m/s."""
-LINEAR = "linear"
-GUIDANCES = (LINEAR,)
-"""Of the configuration's `guidance.kind`, those that are flown."""
+LINEAR, PREDICTIVE = "linear", "nmpc"
+GUIDANCES = (LINEAR, PREDICTIVE)
+"""Of the configuration's `guidance.kind`."""
 _IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
 
 
@@ -59,7 +59,8 @@ class Task(NamedTuple):
 
     def __str__(self) -> str:
         wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
-        return f"{self.course}, {self.planner}{'' if self.lead else ', not led'}{wind}"
+        how = "" if self.guidance == LINEAR else f", {self.guidance}"
+        return f"{self.course}, {self.planner}{how}{'' if self.lead else ', not led'}{wind}"
 
 
 CIRCLE_AT_5, EIGHT_AT_5 = Course(CIRCLE, 5.0, 2.0), Course(EIGHT, 5.0, 2.0)
@@ -73,18 +74,23 @@ EIGHTS = (Course(EIGHT, 1.0, 1.0), Course(EIGHT, 3.0, 1.0), EIGHT_AT_5)
 COURSES = (*CIRCLES, *EIGHTS)
 
 
+def planners(guidance: str) -> tuple[str, ...]:
+    """Who flies with this guidance in still air: predictive control is made for one."""
+    return PLANNER_NAMES if guidance == LINEAR else (MODEL_FOLLOWING,)
+
+
 def tasks() -> tuple[Task, ...]:
-    """Every planner with every guidance in still air, some in wind, and one not led."""
-    led = [
-        Task(course, planner, guidance, wind)
+    """Every planner in still air, some in wind, one not led, and one with predictive control."""
+    calm = [
+        Task(course, planner, guidance)
         for course in COURSES
         for guidance in GUIDANCES
-        for wind in (CALM, WINDY)
-        for planner in (_IN_WIND if wind else PLANNER_NAMES)
+        for planner in planners(guidance)
     ]
+    windy = [Task(course, planner, LINEAR, WINDY) for course in COURSES for planner in _IN_WIND]
     not_led = [
         Task(course, MODEL_FOLLOWING, LINEAR, wind, lead=False)
         for course in COURSES
         for wind in (CALM, WINDY)
     ]
-    return (*led, *not_led)
+    return (*calm, *windy, *not_led)
