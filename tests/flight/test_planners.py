@@ -33,7 +33,11 @@ def flown(request, tmp_path_factory):
     """Its name, and the summary of steps north, east and along a diagonal."""
     folder = tmp_path_factory.mktemp("flight")
     with mock_vehicle(folder, seed=3) as mock:
-        changes = {"planner": {"name": request.param}, "flight": {"programme": ["steps"]}}
+        changes = {
+            "planner": {"name": request.param},
+            "flight": {"programme": ["steps"]},
+            "steps": {"settle_s": 2.0},
+        }
         summary = fly(mock, folder / "log", **changes)
         assert not mock.state()["crashed"]
     return request.param, summary

@@ -40,7 +40,15 @@ def flown(folder, name, disturb=None, **changes):
 
 
 def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
-    summary = flown(tmp_path, "circle5.yaml")
+    pids = []
+
+    async def note_pid(session):
+        while session._assembled is None:  # noqa: ASYNC110
+            await asyncio.sleep(0.1)
+        pids.append(session._assembled.rig.guide.predictive._solver.pid)
+
+    summary = flown(tmp_path, "circle5.yaml", note_pid)
+    assert not Path(f"/proc/{pids[0]}").exists()  # the process ends with the flight
     tracking, told = summary.tracking(), summary.as_dict()["nmpc"]
     assert tracking["position_rms_m"] <= 0.06
     assert tracking["position_max_m"] <= 0.2
@@ -145,15 +153,3 @@ def test_each_kind_of_trouble_is_told_once_and_all_are_counted():
     assert len(notes) == 2
     assert "took 31.0 ms; linear guidance flies on" in notes[0]
     assert predictive.record.troubles == {Trouble.LATE: 3, Trouble.ABSURD: 1}
-
-
-def test_the_process_ends_with_the_flight(tmp_path):
-    pids = []
-
-    async def note_pid(session):
-        while session._assembled is None:  # noqa: ASYNC110
-            await asyncio.sleep(0.1)
-        pids.append(session._assembled.rig.guide.predictive._solver.pid)
-
-    flown(tmp_path, "hover.yaml", note_pid)
-    assert not Path(f"/proc/{pids[0]}").exists()
