@@ -1,8 +1,7 @@
 """How `model-following` plans the heading: second order, the short way, within the limits."""
 
-from math import exp
-
 from companion.attitude.constants import Constants
+from companion.attitude.lag import behind
 from companion.attitude.rate_response import AxisResponse
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import within
@@ -43,6 +42,5 @@ class HeadingModel:
         wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
         change = within(wanted, self._fastest) - self._v
         v = self._v = self._v + within(change, self._acceleration * dt)
-        kept = exp(-dt / self._lag)
-        self.heading += v * dt + (self.turn_rate - v) * self._lag * (1.0 - kept)
-        self.turn_rate = v + (self.turn_rate - v) * kept
+        moved, self.turn_rate = behind(self.turn_rate, v, self._lag, dt)
+        self.heading += moved

@@ -16,7 +16,7 @@ from companion.attitude.kinematics import (
 )
 from companion.attitude.margin import largest_gain
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.reference_model import ReferenceModel
+from companion.attitude.reference_model import ReferenceModel, model_lag
 from companion.attitude.representation import normalised, wrap_angle
 from companion.attitude.rotation import within, within_limits
 from companion.attitude.target import admissible
@@ -61,8 +61,9 @@ class ModelFollowingPlanner:
         self._frame_lead = response.frame_lead
         self._gain = _fed_back(constants.gain, tilt)
         self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
-        critical = 0.25 / constants.gain  # no overshoot, and no quicker than the rate loop
-        self._model = ReferenceModel(constants, max(critical, tilt.lag), tilt.acceleration)
+        self._model = ReferenceModel(
+            constants, model_lag(constants.gain, tilt.lag), tilt.acceleration
+        )
         self._heading = HeadingModel(constants, yaw)
         self._body = YawModel(yaw)
         self._past = History(max(tilt.dead_time, yaw.dead_time) + LONGEST_SAMPLE)

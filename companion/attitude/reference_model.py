@@ -1,9 +1,10 @@
 """How `model-following` plans the tilt: second order, on straight lines, within the limits."""
 
-from math import exp, hypot, inf, sin, sqrt
+from math import hypot, inf, sin, sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.kinematics import speed_to_rates
+from companion.attitude.lag import behind
 from companion.attitude.reference import SecondOrderReference
 from companion.attitude.types import Coefficients, Target
 
@@ -30,6 +31,11 @@ def rates_along(
         speed_east,
         -speed_north,
     )
+
+
+def model_lag(gain: float, lag: float) -> float:
+    """τ of the model for a gain p (1/s), s: no overshoot, and no quicker than the rate loop."""
+    return max(0.25 / gain, lag)
 
 
 class ReferenceModel:
@@ -126,13 +132,10 @@ class ReferenceModel:
 
     def _follow(self, dt: float) -> None:
         """Exact over the sample with v held."""
-        v_north, v_east = self._v_north, self._v_east
-        kept = exp(-dt / self._lag)
-        drift = self._lag * (1.0 - kept)
-        self.north += v_north * dt + (self.speed_north - v_north) * drift
-        self.east += v_east * dt + (self.speed_east - v_east) * drift
-        self.speed_north = v_north + (self.speed_north - v_north) * kept
-        self.speed_east = v_east + (self.speed_east - v_east) * kept
+        moved, self.speed_north = behind(self.speed_north, self._v_north, self._lag, dt)
+        self.north += moved
+        moved, self.speed_east = behind(self.speed_east, self._v_east, self._lag, dt)
+        self.east += moved
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
         """Not beyond the largest tilt, or no further beyond it than (north, east) was."""

@@ -1,7 +1,8 @@
 """How the body will turn about its z axis under the yaw rates it was sent."""
 
-from math import exp, inf
+from math import inf
 
+from companion.attitude.lag import behind
 from companion.attitude.rate_response import AxisResponse
 from companion.attitude.rotation import within
 
@@ -34,6 +35,5 @@ class YawModel:
         before, most = self._aimed, self._acceleration * dt
         aimed = self._aimed = before + within(command - before, most) if most < inf else command
         # The aim as it stands at the end of a short sample: within half a sample of the truth.
-        kept = exp(-dt / self._lag)
-        self.turned += aimed * dt + (self.rate - aimed) * self._lag * (1.0 - kept)
-        self.rate = aimed + (self.rate - aimed) * kept
+        moved, self.rate = behind(self.rate, aimed, self._lag, dt)
+        self.turned += moved

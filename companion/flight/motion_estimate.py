@@ -5,7 +5,7 @@ from collections.abc import Callable
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
-from companion.guidance.motion_observer import Horizontal
+from companion.guidance.horizontal import Horizontal
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
 from companion.nmpc import Vehicle

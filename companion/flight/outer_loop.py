@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import radians, tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.reference_model import model_lag
 from companion.config import Config
 from companion.flight.follow import Follow
 from companion.flight.motion_estimate import MotionEstimate
@@ -39,7 +40,7 @@ def tilt_response(config: Config) -> InnerResponse:
     gain, vehicle = config.planner.gain_per_s, config.vehicle
     lag, follows = _MS * (vehicle.lag_ms or 0.0), config.planner_name == MODEL_FOLLOWING
     if follows:
-        lag = max(0.25 / gain, lag)  # as the planner's own model has it
+        lag = model_lag(gain, lag)
     return InnerResponse(gain, lag, _acts_after(config, vehicle.dead_time_ms), follows)
 
 
@@ -104,6 +105,12 @@ def motion_estimate(
     return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s), offset)
 
 
+def thrust_limits(config: Config) -> tuple[float, float]:
+    """Smallest and largest specific thrust, as far as the configuration tells, m/s²."""
+    per_thrust = GRAVITY / config.thrust.hover_thrust
+    return config.limits.min_thrust * per_thrust, config.limits.max_thrust * per_thrust
+
+
 def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
     """Predictive control of one trajectory; starts its process.
 
@@ -111,20 +118,20 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
         ConfigError: the planner's response is too quick for the horizon's steps.
         MissingExtraError: casadi is not installed.
     """
-    limits, per_thrust = config.limits, GRAVITY / config.thrust.hover_thrust
+    limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     period = 1.0 / config.guidance.rate_hz
     try:
         settings = Settings(
             gain=config.planner.gain_per_s,
             yaw_gain=config.planner.yaw_gain_per_s,
-            lag=tilt_response(config).lag or 0.25 / config.planner.gain_per_s,
+            lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=_MS * (config.vehicle.dead_time_ms or 0.0),
             drag=config.guidance.drag_per_s,
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
             max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
-            min_thrust=limits.min_thrust * per_thrust,
-            max_thrust=limits.max_thrust * per_thrust,
+            min_thrust=min_thrust,
+            max_thrust=max_thrust,
             lead=period,
             deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
         )

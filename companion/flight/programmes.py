@@ -6,6 +6,7 @@ from companion import trajectory_file
 from companion.config import Config
 from companion.config_programmes import IdentifyConfig
 from companion.flight.follow import Follow
+from companion.flight.outer_loop import thrust_limits
 from companion.guidance import (
     GRAVITY,
     Circle,
@@ -85,13 +86,13 @@ def _follow(config: Config) -> Follow:
 
 def _envelope(config: Config) -> Envelope:
     """What the vehicle may be asked for, from where the programme begins."""
-    limits, per_thrust = config.limits, GRAVITY / config.thrust.hover_thrust
+    limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     return Envelope(
         max_tilt=radians(limits.max_tilt_deg),
         max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
         max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
-        min_thrust=limits.min_thrust * per_thrust,
-        max_thrust=limits.max_thrust * per_thrust,
+        min_thrust=min_thrust,
+        max_thrust=max_thrust,
         max_climb=limits.max_climb_m_s,
         max_descent=limits.max_descent_m_s,
         fence_radius=limits.fence_radius_m,

@@ -2,8 +2,7 @@
 
 from math import exp
 
-Horizontal = tuple[float, float]
-"""(north, east)."""
+from companion.guidance.horizontal import Horizontal
 
 _MEMORY = 20.0
 """What is older counts ever less, s."""

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 from companion.attitude import Coefficients, Target
 from companion.guidance.height import HeightGains, acceleration_down
+from companion.guidance.horizontal import Horizontal, limited
 from companion.guidance.inner_response import InnerResponse
 from companion.guidance.lqr import ChainGains
-from companion.guidance.motion_observer import Horizontal
 from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
 from companion.guidance.thrust import height_first
 
@@ -122,13 +122,13 @@ class LinearGuidance:
                 - gains.acceleration * acceleration
                 - situation.disturbance[axis]
             )
-        return _limited(wanted[0], wanted[1], settings.max_horizontal)
+        return limited(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
         self, reference: Reference, more: Horizontal, down: float, situation: Situation
     ) -> Coefficients:
         """Of the thrust that gives the reference's acceleration and `more` against drag."""
-        north, east = _limited(
+        north, east = limited(
             reference.acceleration_ned[0] + situation.drag * reference.velocity_ned[0] + more[0],
             reference.acceleration_ned[1] + situation.drag * reference.velocity_ned[1] + more[1],
             self._settings.max_horizontal,
@@ -142,10 +142,3 @@ class LinearGuidance:
     def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
         """Heading and its rate to ask for, so that the heading follows the reference's."""
         return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)
-
-
-def _limited(north: float, east: float, most: float) -> Horizontal:
-    length = hypot(north, east)
-    if length <= most:
-        return north, east
-    return north * most / length, east * most / length

@@ -1,12 +1,10 @@
 """Where the vehicle is now, how fast, and which acceleration nobody asked for: wind and bias."""
 
 from dataclasses import dataclass
-from math import exp, hypot
+from math import exp
 
+from companion.guidance.horizontal import Horizontal, limited
 from companion.guidance.reference import Vector, VehicleMotion
-
-Horizontal = tuple[float, float]
-"""(north, east)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +74,7 @@ class MotionObserver:
             velocity[axis] = v + believed * off
             found[axis] = disturbance[axis] + learned * off
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
-        self.disturbance = self._bounded(found[0], found[1])
+        self.disturbance = limited(found[0], found[1], settings.largest)
 
     def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
         """The motion at a vehicle time (s), moved on from the newest measurement.
@@ -98,12 +96,6 @@ class MotionObserver:
             ),
             (v_north + dt * a_north, v_east + dt * a_east, v_down),
         )
-
-    def _bounded(self, north: float, east: float) -> Horizontal:
-        length = hypot(north, east)
-        if length <= self._settings.largest:
-            return north, east
-        return north * self._settings.largest / length, east * self._settings.largest / length
 
 
 def _vector(values: list[float]) -> Vector:
