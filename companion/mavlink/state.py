@@ -6,7 +6,8 @@ from math import isfinite
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.family import AutopilotFamily, family_for
+from companion.mavlink.families import family_for
+from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
     Battery,
@@ -81,6 +82,7 @@ class VehicleState(_Values):
             "GPS_RAW_INT": self._on_gps,
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
+            "EKF_STATUS_REPORT": self._on_estimator,
             "ODOMETRY": self._on_odometry,
             "STATUSTEXT": self._on_text,
         }.items():
@@ -145,12 +147,12 @@ class VehicleState(_Values):
             return  # an autopilot does not change its kind; this is some other part of the vehicle
         if self.family is None:
             try:
-                self.family, self.unsupported = family_for(message.autopilot), None
+                self.family, self.unsupported = family_for(message.autopilot, message.type), None
             except UnsupportedAutopilot as error:
                 self.family, self.unsupported = None, error
         mode = str(message.custom_mode)
         if self.family is not None:
-            mode = self.family.mode_name(message.custom_mode)
+            mode = self.family.mode_name(message.base_mode, message.custom_mode)
         self.heartbeat = Heartbeat(
             self._clock(),
             message.autopilot,

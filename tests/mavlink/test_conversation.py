@@ -36,7 +36,7 @@ def test_an_accepted_command_carries_its_parameters(run):
         async with linked() as (link, vehicle):
             vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
             await link.command(ARM, 1.0, 2.0)
-            await link.command(*Px4().take_off(40.0))
+            await link.command(*Px4().take_off(10.0, 30.0))
             arm, take_off = vehicle.of("COMMAND_LONG")
             assert (arm.command, arm.param1, arm.param2, arm.param7) == (ARM, 1.0, 2.0, 0.0)
             assert (arm.target_system, arm.target_component, arm.confirmation) == (1, 1, 0)
