@@ -11,7 +11,7 @@ def autopilot_setup(config: Config) -> Setup:
     tilt_limit = config.vehicle.acceleration_limit_deg_s2
     yaw_limit = config.vehicle.yaw_acceleration_limit_deg_s2 or tilt_limit
     return Setup(
-        system=config.link.target_system,
+        source_system=config.link.source_system,
         attitude_rate_hz=config.link.attitude_rate_hz,
         silence_limit=1e-3 * config.deadman.silence_limit_ms,
         hover_thrust=config.thrust.hover_thrust,
@@ -20,5 +20,4 @@ def autopilot_setup(config: Config) -> Setup:
         tilt_acceleration_limit=None if tilt_limit is None else radians(tilt_limit),
         yaw_acceleration_limit=None if yaw_limit is None else radians(yaw_limit),
         max_tilt=radians(config.limits.max_tilt_deg),
-        rate_limit=radians(config.limits.max_tilt_rate_deg_s),
     )

@@ -17,7 +17,7 @@ class Setup(NamedTuple):
     """What our configuration says, as far as the autopilot's parameters have to agree with it.
 
     Attributes:
-        system: The autopilot's own system id as we address it.
+        source_system: Our own system id.
         attitude_rate_hz: Asked of it for attitude.
         silence_limit: After this long without control we hand back, s.
         hover_thrust: Normalised thrust at hover that the flight begins with.
@@ -26,10 +26,9 @@ class Setup(NamedTuple):
         tilt_acceleration_limit: Of roll and pitch, as the planner has it, rad/s²; `None`: no limit.
         yaw_acceleration_limit: Of yaw.
         max_tilt: Largest tilt of a target, rad.
-        rate_limit: Largest roll-pitch rate that we ask for, rad/s.
     """
 
-    system: int
+    source_system: int
     attitude_rate_hz: float
     silence_limit: float
     hover_thrust: float
@@ -38,7 +37,6 @@ class Setup(NamedTuple):
     tilt_acceleration_limit: float | None
     yaw_acceleration_limit: float | None
     max_tilt: float
-    rate_limit: float
 
 
 class Verdict(Enum):
@@ -66,7 +64,8 @@ class Complaint(NamedTuple):
     set_to: float | None = None
 
 
-Check = Callable[[Values, Setup], Complaint | None]
+Check = Callable[[float, Values, Setup], Complaint | None]
+"""Judges a parameter's own value; others, which may be absent, and our setup may count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,7 @@ class ParameterRule:
     Attributes:
         names: Its name, the newest first; older versions know it by the others.
         meaning: What it decides, one clause.
-        check: Judges it; is called only with its own value present, others may be absent.
+        check: Judges it; `None` is a value that is as it should be.
         source: Where this is known from.
         vital: A flight reads it before it arms, and refuses what is not safe.
     """
@@ -123,7 +122,7 @@ def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[
         if rule.name not in values:
             continue
         value = values[rule.name]
-        complaint = rule.check(values, setup)
+        complaint = rule.check(value, values, setup)
         if complaint is None:
             findings.append(Finding(rule, value, Verdict.SAFE))
         else:

@@ -12,7 +12,8 @@ async def survey(
 ) -> dict[str, float]:
     """The values of the rules' parameters, under their newest names.
 
-    An autopilot may say nothing of a parameter that it has not (PX4 does not), so an old name is asked for only where the new one got no answer, and each such question takes
+    An autopilot may say nothing of a parameter that it has not (PX4 does not), so an old name is
+    asked for only where the new one got no answer, and each such question takes
     `timeout_s` · (`retries` + 1) in s. What it has under none of its names is left out.
 
     Raises:
