@@ -19,7 +19,6 @@ from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused, CommandTimeout, UnknownParameter
-from companion.mavlink.families import FAMILIES
 from companion.mavlink.inbox import Inbox
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
@@ -172,7 +171,8 @@ class _Player:
         if number(frame) == dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION:
             out.attitudes.append(message)
         self._inbox.receive(frame, 0)
-        self._parameters.bytewise = out.state.family in (None, FAMILIES[0])
+        if out.state.family is not None:
+            self._parameters.bytewise = out.state.family.bytewise_parameters
         now = (out.state.mode, out.state.armed)
         if out.state.mode is not None and (not out.story or out.story[-1][1:] != now):
             out.story.append((self._loop.now, *now))

@@ -158,4 +158,3 @@ def test_texts_and_home_are_as_recorded():
     assert state.home.down == pytest.approx(0.01)
     idle = [entry.text for entry in played("ardupilot-idle").state.texts]
     assert "Requested rate for message ID 31 too fast. Increase SCHED_LOOP_RATE" in idle
-
