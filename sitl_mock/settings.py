@@ -19,7 +19,7 @@ from sitl_mock.config import (
 )
 from sitl_mock.config_errors import ConfigError, explain, suggestion
 from sitl_mock.fault_config import Fault
-from sitl_mock.parameters import ParameterRefusedError, ParameterTable
+from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
 from sitl_mock.px4_parameters import PX4_PARAMETERS
 
 PORT_OFFSET = 40
@@ -92,6 +92,11 @@ class MockSettings(Section):
         except ParameterRefusedError as error:
             raise ValueError(str(error)) from error
         return parameters
+
+    @property
+    def known_parameters(self) -> tuple[Parameter, ...]:
+        """The autopilot's parameters with their defaults."""
+        return PX4_PARAMETERS
 
     def for_vehicle(self, index: int) -> "MockSettings":
         """Return the settings of the vehicle with this index: its own ports and its own luck."""

@@ -1,4 +1,4 @@
-"""Whether the vehicle may be armed, and if not, why: the first problem found, in words."""
+"""Whether PX4 may be armed, and if not, why: the first problem found, in words."""
 
 from sitl_mock.modes import PILOTED, Mode
 from sitl_mock.parameters import ParameterTable

@@ -1,4 +1,4 @@
-"""What the autopilot does when a link, the position or the battery is lost."""
+"""What PX4 does when a link, the position or the battery is lost."""
 
 from enum import Enum, auto
 from typing import Protocol
