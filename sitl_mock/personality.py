@@ -48,6 +48,7 @@ class Occasion(Enum):
     OFFBOARD_LOST = auto()
     OFFBOARD_REGAINED = auto()
     GCS_LOST = auto()
+    GCS_REGAINED = auto()
     COMPANION_LOST = auto()
     COMPANION_REGAINED = auto()
     POSITION_LOST = auto()

@@ -1,15 +1,17 @@
 """PX4's rules of arming and modes, by its measured behaviour."""
 
 from sitl_mock.commander import ACCEPTED, TEMPORARILY_REJECTED, Announce
-from sitl_mock.modes import NEEDS_POSITION, PILOTED, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
 from sitl_mock.px4_checks import arming_problem
 from sitl_mock.px4_failsafe import Failsafe
 from sitl_mock.px4_mode_control import Px4ModeControl
-from sitl_mock.px4_setpoints import attitude_setpoint, position_setpoint
+from sitl_mock.px4_modes import NEEDS_POSITION, PILOTED
+from sitl_mock.px4_setpoints import attitude_setpoint
 from sitl_mock.quaternion import Vector
+from sitl_mock.setpoints import position_setpoint
 from sitl_mock.state import State
 from sitl_mock.wire import Message
 

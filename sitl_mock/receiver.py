@@ -60,6 +60,7 @@ class Receiver:
 
     def handle(self, message: Message, link: Link) -> None:
         """Handle one message; what is not for this autopilot, or unknown, is ignored in silence."""
+        link.heard = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._for_us(message):
             handler(message, link)
