@@ -1,14 +1,15 @@
-"""What the autopilot does when a link, the position or the battery is lost."""
+"""What PX4 does when a link, the position or the battery is lost."""
 
 from enum import Enum, auto
 from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.modes import NEEDS_POSITION, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
+from sitl_mock.px4_modes import NEEDS_POSITION
 from sitl_mock.state import BatteryWarning, State
 
 _OFFBOARD_ACTIONS = {4: Mode.LAND, 5: Mode.LOITER}
