@@ -41,7 +41,8 @@ async def takeoff(rig: Rig) -> None:
         climbing = climbing or climbs
         if climbing and not climbs and _in(rig, Role.HOLD) and now < height - _STOPPED:
             raise FlightEnded(f"the climb was stopped at {now:.1f} m, not by us", Exit.LET_GO)
-        return now > height - _REACHED and abs(position.velocity_ned[2]) < 0.3
+        there = now > height - _REACHED and abs(position.velocity_ned[2]) < 0.3
+        return there and not state.taking_off
 
     await rig.until(reached)
 

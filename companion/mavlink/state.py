@@ -28,7 +28,7 @@ _UNKNOWN_U16 = 65535
 _AUTOPILOT_INVALID = 8
 _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
-LANDED_ON_GROUND = 1
+LANDED_ON_GROUND, LANDED_TAKEOFF = 1, 3
 
 
 @dataclass
@@ -107,6 +107,11 @@ class VehicleState(_Values):
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground; unknown is not landed."""
         return self.landed_state == LANDED_ON_GROUND
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether the autopilot says that its take-off is not over yet."""
+        return self.landed_state == LANDED_TAKEOFF
 
     @property
     def battery_remaining(self) -> float | None:

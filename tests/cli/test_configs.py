@@ -14,7 +14,7 @@ from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 VEHICLES = sorted(CONFIGS.glob("vehicle-*.yaml"))
-FILES = [CONFIGS / f"{name}.yaml" for name in ("mock-px4", "px4", "ardupilot")]
+FILES = [CONFIGS / f"{name}.yaml" for name in ("mock-px4", "px4", "mock-ardupilot", "ardupilot")]
 
 
 @pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
