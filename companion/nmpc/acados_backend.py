@@ -6,6 +6,7 @@ import numpy as np
 from acados.acados_template import AcadosOcp
 
 from companion.nmpc.acados_build import load
+from companion.nmpc.acados_stages import Stages
 from companion.nmpc.backend import Found
 from companion.nmpc.model import Given, Model, integrator
 from companion.nmpc.settings import Settings
@@ -13,7 +14,7 @@ from companion.nmpc.transcription import final_residual, node_symbols, running_r
 from companion.nmpc.warm_start import Floats
 
 _SUCCESS, _LIMITED = 0, 2
-"""Of acados' return codes (its `types.h`): converged or iterated once, and iterated often enough."""
+"""Of acados' return codes (its `types.h`): converged (or iterated once), iterated too often."""
 
 
 class AcadosBackend:
@@ -28,32 +29,30 @@ class AcadosBackend:
     """
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        self._states, self._steps = model.state.numel(), settings.steps
         self._single = settings.iterations == 1
-        self._solver = load(_described(model, settings))
+        ocp = _described(model, settings)
+        self._solver = load(ocp)
+        self._stages = Stages(
+            self._solver, model.state.numel(), model.control.numel(), ocp.model.p.numel()
+        )
 
     def solve(self, guess: Floats, parameters: Floats) -> Found:
         """See `Backend`."""
-        solver, n, steps = self._solver, self._states, self._steps
+        stages, everywhere = self._stages, len(Given._fields)
         # Otherwise multipliers, and what was not finite, would be left of the solve before.
-        solver.reset()
-        everywhere, nodes = np.split(parameters, [len(Given._fields)])
-        for k, node in enumerate(nodes.reshape(steps + 1, -1)):
-            solver.set(k, "p", np.concatenate([everywhere, node]))
-        stages = guess[:-n].reshape(steps, -1)
-        for k, stage in enumerate(stages):
-            solver.set(k, "x", stage[:n])
-            solver.set(k, "u", stage[n:])
-        solver.set(steps, "x", guess[-n:])
-        for bound in ("lbx", "ubx"):
-            solver.set(0, bound, guess[:n])
-        status = solver.solve()
-        parts = [solver.get(k, field) for k in range(steps) for field in ("x", "u")]
-        plan = np.concatenate([*parts, solver.get(steps, "x")])
-        iterations = 1 if self._single else int(solver.get_stats("sqp_iter")[0])
+        self._solver.reset()
+        stages.plan[:] = guess
+        stages.parameters[:, :everywhere] = parameters[:everywhere]
+        stages.parameters[:, everywhere:] = parameters[everywhere:].reshape(
+            len(stages.parameters), -1
+        )
+        stages.send()
+        status = self._solver.solve()
+        stages.fetch()
+        iterations = 1 if self._single else int(self._solver.get_stats("sqp_iter")[0])
         # A single iteration is not told how far it came.
         converged = status == _SUCCESS and not self._single
-        return Found(plan, status in (_SUCCESS, _LIMITED), converged, iterations)
+        return Found(stages.plan.copy(), status in (_SUCCESS, _LIMITED), converged, iterations)
 
 
 def _described(model: Model, settings: Settings) -> AcadosOcp:

@@ -70,8 +70,7 @@ def _key(ocp: AcadosOcp) -> str:
         "ocp", [model.x, model.u, model.p], [term for term in terms if term is not None]
     )
     numbers = {
-        name: vars(getattr(ocp, name))
-        for name in ("dims", "cost", "constraints", "solver_options")
+        name: vars(getattr(ocp, name)) for name in ("dims", "cost", "constraints", "solver_options")
     }
     told = json.dumps(
         [numbers, version(ACADOS), acados.DIR, os.uname().machine], default=_plain, sort_keys=True

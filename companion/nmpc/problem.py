@@ -96,9 +96,7 @@ class Problem:
         self._time = time
         control = plan[len(start) : len(start) + model.control.numel()]
         target = np.asarray(self._target(start, control, list(given)), dtype=np.float64).ravel()
-        return Plan(
-            True, found.converged, found.iterations, seconds, *(float(v) for v in target)
-        )
+        return Plan(True, found.converged, found.iterations, seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         if self._plan is None or not time >= self._time:

@@ -4,6 +4,7 @@ CasADi's and acados' packages both bring a module `casadi`, of which acados' lac
 needs. So they live in two environments, and the solver's process may be of either.
 """
 
+import pickle
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, distribution
@@ -12,7 +13,7 @@ from shutil import which
 from typing import get_args
 
 from companion.extras import MissingExtraError, require
-from companion.nmpc.settings import SolverName
+from companion.nmpc.settings import Settings, SolverName
 
 ACADOS = "comma-deps-acados"
 """The package; its modules are `acados` and a `casadi`."""
@@ -42,6 +43,28 @@ def check(solver: SolverName, python: Path | None = None) -> None:
                 f"nmpc.solver: hpipm cannot be had beside {ACADOS}, whose casadi is another one:"
                 " take the extra nmpc and the extra acados into an environment each"
             )
+
+
+def compile_ahead(settings: Settings, python: Path | None = None) -> None:
+    """Make sure that a solver can be had, and compile it if that has to be done first.
+
+    It may take seconds, which a vehicle in the air, or one in lockstep, ought not to wait.
+
+    Args:
+        settings: as they will be flown.
+        python: the interpreter of the solver's process; None is ours.
+
+    Raises:
+        MissingExtraError: it cannot be had; the message says how to mend that.
+    """
+    check(settings.solver, python)
+    if settings.solver != "acados":
+        return
+    asked = [str(python or sys.executable), "-m", "companion.nmpc.compiling"]
+    done = subprocess.run(asked, input=pickle.dumps(settings), capture_output=True, check=False)
+    if done.returncode != 0:
+        words = done.stderr.decode(errors="replace").strip().splitlines()
+        raise MissingExtraError(f"nmpc.solver: {words[-1] if words else 'the compiler vanished'}")
 
 
 def _check_acados() -> None:
