@@ -39,6 +39,10 @@ class Stages:
             for field, offset in (("x", 0), ("u", states))
         ][:-1]  # there is no control at the end
         self._sends = [_field(solver, "ocp_nlp_out_set", *one, self.plan) for one in fields]
+        # acados' own `reset` hands over more zeros than it has: what follows them in memory.
+        duals = [(k, name) for k in range(steps + 1) for name in ("lam", "t", "pi")][:-1]
+        self._zeros: Floats = np.zeros(max(len(solver.get(*one)) for one in duals))
+        self._sends += [_field(solver, "ocp_nlp_out_set", *one, 0, self._zeros) for one in duals]
         self._sends += [
             _field(solver, "ocp_nlp_constraints_model_set", 0, bound, 0, self.plan)
             for bound in ("lbx", "ubx")
@@ -47,7 +51,7 @@ class Stages:
         self._fetches = [_field(solver, "ocp_nlp_out_get", *one, self.plan) for one in fields]
 
     def send(self) -> None:
-        """Begin at the plan, hold its first state, and take the parameters."""
+        """Begin at the plan without multipliers, hold its first state, take the parameters."""
         for call in self._sends:
             call()
 
