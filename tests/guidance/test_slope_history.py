@@ -27,10 +27,10 @@ def test_the_mean_is_that_of_the_curve(one, other):
         return
     north, east = fed().mean(start, end)
     assert north == pytest.approx(
-        quad(lambda t: sin(3 * t), start, end)[0] / (end - start), abs=1e-4
+        quad(lambda t: sin(3 * t), start, end)[0] / (end - start), abs=1e-3
     )
     assert east == pytest.approx(
-        quad(lambda t: cos(2 * t), start, end)[0] / (end - start), abs=1e-4
+        quad(lambda t: cos(2 * t), start, end)[0] / (end - start), abs=1e-3
     )
 
 
