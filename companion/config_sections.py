@@ -257,6 +257,9 @@ class FlightConfig(Section):
     """Slow a trajectory down that the limits do not allow, instead of refusing it."""
     arm: StrictBool = False
     """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
+    accept: tuple[str, ...] = ()
+    """Unsafe findings of `companion doctor` with which it is flown all the same, by their names,
+    such as COM_OF_LOSS_T; each is told in the flight's events."""
     connect_timeout_s: Seconds = 30.0
     """Wait this long for a heartbeat."""
     ready_timeout_s: Seconds = 60.0

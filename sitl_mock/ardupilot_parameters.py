@@ -24,6 +24,7 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("ATC_ANG_RLL_P", 4.5, _REAL32),
     ("ATC_ANG_YAW_P", 4.5, _REAL32),
     ("ATC_INPUT_TC", 0.15, _REAL32),
+    ("ATC_RATE_FF_ENAB", 1, _INT8),
     ("BARO1_GND_PRESS", 94502.83, _REAL32),
     ("BATT_CAPACITY", 3300, _INT32),  # *
     ("BATT_CRT_MAH", 0.0, _REAL32),  # *

@@ -18,7 +18,8 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("CAL_GYRO0_ID", 1310988),
         ("CAL_MAG0_ID", 197388),
         ("CBRK_IO_SAFETY", 22027),
-        ("CBRK_SUPPLY_CHK", 894281),
+        ("CBRK_FLIGHTTERM", 121212),
+        ("CBRK_SUPPLY_CHK", 0),
         ("CBRK_USB_CHK", 197848),
         ("COM_ARM_WO_GPS", 1),
         ("COM_DISARM_LAND", 2.0),  # *
@@ -34,11 +35,13 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("COM_RC_LOSS_T", 0.5),
         ("COM_SPOOLUP_TIME", 1.0),  # *
         ("EKF2_NOAID_TOUT", 5000000),  # *
+        ("FD_FAIL_P", 60),
+        ("FD_FAIL_R", 60),
         ("GF_ACTION", 2),
         ("GF_MAX_HOR_DIST", 0.0),
         ("GF_MAX_VER_DIST", 0.0),
         ("IMU_GYRO_RATEMAX", 400),
-        ("IMU_INTEG_RATE", 200),
+        ("IMU_INTEG_RATE", 250),
         ("MAN_OVERRIDE_SPD", 30.0),
         ("MAV_0_MODE", 0),
         ("MAV_COMP_ID", 1),
@@ -47,6 +50,7 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("MAV_SIGN_CFG", 0),
         ("MAV_SYS_ID", 1),
         ("MAV_TYPE", 2),
+        ("MC_BAT_SCALE_EN", 0),
         ("MC_PITCHRATE_D", 0.003),
         ("MC_PITCHRATE_I", 0.2),
         ("MC_PITCHRATE_MAX", 220.0),  # *

@@ -1,13 +1,17 @@
 """What is done on the ground, one coroutine a phase, and how arming is undone."""
 
-from companion.flight.autopilot_setup import autopilot_setup
+from companion.doctor import vehicle_checks
+from companion.doctor.examination import examine, forbidding, unsafe
+from companion.doctor.finding import Finding
+from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.rig import Rig
-from companion.mavlink.parameter_rules import Verdict, judge
-from companion.mavlink.parameter_survey import survey
+from companion.mavlink.parameter_rules import Verdict
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
+_COUNTED_FOR = 1.0
+"""Arriving telemetry is counted for so long, s; the parameters are read meanwhile."""
 
 
 async def connect(rig: Rig) -> None:
@@ -17,35 +21,21 @@ async def connect(rig: Rig) -> None:
 
 
 async def checks(rig: Rig) -> None:
-    """Ask for the telemetry we fly on, wait for readiness, and measure what arrives."""
+    """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
     link, config = rig.link, rig.config
     rig.detail = "asking for telemetry"
-    wanted = {
-        **link.family.wanted_rates,
-        "ATTITUDE_QUATERNION": config.link.attitude_rate_hz,
-        "LOCAL_POSITION_NED": config.link.position_rate_hz,
-    }
-    for message, rate in (await link.set_rates(wanted, window_s=0.1)).items():
+    granted = await link.set_rates(wanted_rates(config, link), window_s=0.1)
+    for message, rate in granted.items():
         if rate.granted < rate.asked:
             rig.note(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
     await rig.until(lambda: _ready(rig))
-    await _check_vital_parameters(rig)
-    # Measured only now: a position is not sent before the estimator has one.
-    rig.detail = "measuring the telemetry that arrives"
-    achieved = await link.measure_rates(wanted, 1.0)
-    for message, least, key in (
-        ("ATTITUDE_QUATERNION", config.link.min_attitude_rate_hz, "min_attitude_rate_hz"),
-        ("LOCAL_POSITION_NED", config.link.min_position_rate_hz, "min_position_rate_hz"),
-    ):
-        if achieved[message] < least:
-            raise FlightEnded(
-                f"{message} arrives at {achieved[message]:.0f} Hz, less than "
-                f"link.{key} = {least:g}; raise the link's speed or lower the limit"
-            )
-    if achieved["HEARTBEAT"] > 0.0:
-        limit = _HEARTBEATS_MISSED / achieved["HEARTBEAT"]
-        rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, limit)
-    _check_delay(rig)
+    # Counted only now: a position is not sent before the estimator has one.
+    rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
+    evidence = await gather(link, granted, _COUNTED_FOR)
+    heartbeats = evidence.streams["HEARTBEAT"].achieved
+    if heartbeats > 0.0:
+        rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
+    _heed(rig, examine(config, evidence))
 
 
 async def stream(rig: Rig) -> None:
@@ -85,43 +75,25 @@ async def undo_arming(rig: Rig) -> None:
 
 def _ready(rig: Rig) -> bool:
     state = rig.link.state
-    if state.armed:
-        raise FlightEnded("the vehicle is already armed; land and disarm it first")
-    battery = state.battery_remaining
-    least = rig.config.limits.min_battery_percent / 100.0
-    if battery is not None and battery < least:
-        raise FlightEnded(
-            f"battery at {100 * battery:.0f} %, below limits.min_battery_percent; charge it"
-        )
+    for finding in (vehicle_checks.armed(state), vehicle_checks.battery(rig.config, state)):
+        if finding.verdict is Verdict.UNSAFE:
+            raise FlightEnded(finding.sentence())
     missing = rig.link.family.not_ready(state.readiness)
     rig.detail = missing or ""
     return missing is None
 
 
-async def _check_vital_parameters(rig: Rig) -> None:
-    """Refuse an autopilot that would take our setpoints for something else."""
-    rig.detail = "reading the autopilot's parameters"
-    vital = [rule for rule in rig.link.family.parameters if rule.vital]
-    values = await survey(rig.link, vital)
-    for rule in vital:
-        if rule.name not in values:
-            raise FlightEnded(
-                f"the autopilot has no parameter {rule.name}, so that it cannot be known "
-                f"{rule.meaning}; this needs a newer version of {rig.link.family.name}"
-            )
-    for finding in judge(vital, values, autopilot_setup(rig.config)):
-        if finding.verdict is not Verdict.SAFE:
-            raise FlightEnded(finding.sentence())
-
-
-def _check_delay(rig: Rig) -> None:
-    """A delay that is always there cannot be seen from the samples, but from TIMESYNC."""
-    round_trip, limit = rig.link.timesync.round_trip_s, rig.config.deadman.telemetry_stale_ms / 1e3
-    if round_trip is not None and round_trip > limit:
-        raise FlightEnded(
-            f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
-            "deadman.telemetry_stale_ms; use a faster link"
-        )
+def _heed(rig: Rig, findings: list[Finding]) -> None:
+    """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""
+    amiss = [finding.key for finding in findings if finding.verdict is Verdict.INEFFECTIVE]
+    if amiss:
+        rig.note(f"not as it should be: {', '.join(amiss)}; `companion doctor` tells why")
+    refused = forbidding(rig.config, findings)
+    for finding in unsafe(findings):
+        if finding not in refused:
+            rig.note(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+    if refused:
+        raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
 
 
 def _handed_over(rig: Rig) -> bool:

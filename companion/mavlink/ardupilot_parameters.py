@@ -9,6 +9,7 @@ from companion.mavlink.parameter_checks import (
     UNSAFE,
     acceleration_limit,
     at_most,
+    battery_scaling,
     bit_clear,
     bit_set,
     forbidden,
@@ -185,6 +186,12 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         ("MOT_THST_EXPO",),
         "whether ArduPilot makes up for the thrust curve",
         thrust_curve,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MOT_BAT_VOLT_MAX",),
+        "whether ArduPilot makes up for the battery's voltage (0: it does not)",
+        battery_scaling,
         _REFERENCE,
     ),
     ParameterRule(

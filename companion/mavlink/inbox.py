@@ -46,6 +46,7 @@ class Inbox:
 
     Attributes:
         on_attitude: Called with each attitude sample, synchronously.
+        on_foreign: Called with each frame of a system or component that we do not listen to.
         lockstep: Set when vehicle time drives the loop.
 
     Args:
@@ -77,6 +78,7 @@ class Inbox:
         self._held: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
+        self.on_foreign: Callable[[Frame], None] | None = None
         self.lockstep: LockstepClient | None = None
         self.connect(streaming=False)
 
@@ -160,6 +162,8 @@ class Inbox:
         if source != self._source:
             stats.ignored_foreign += 1
             stats.foreign_sources.add(source)
+            if self.on_foreign is not None:
+                self._router.guard(self.on_foreign, frame)
             return False
         if self._signing is None:
             if frame.signed:

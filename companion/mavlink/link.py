@@ -13,6 +13,7 @@ from companion.mavlink.connection import Connection
 from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
 from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.framing import Frame
 from companion.mavlink.inbox import Inbox, Notice
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.outbox import Outbox
@@ -148,6 +149,15 @@ class Link:
     @on_attitude.setter
     def on_attitude(self, callback: Callable[[AttitudeSample], None] | None) -> None:
         self._inbox.on_attitude = callback
+
+    @property
+    def on_foreign(self) -> Callable[[Frame], None] | None:
+        """Called with each frame of others than the autopilot; nothing else is done with them."""
+        return self._inbox.on_foreign
+
+    @on_foreign.setter
+    def on_foreign(self, callback: Callable[[Frame], None] | None) -> None:
+        self._inbox.on_foreign = callback
 
     @property
     def on_error(self) -> Callable[[Exception], None] | None:

@@ -117,6 +117,18 @@ def thrust_curve(value: float, _: Values, setup: Setup) -> Complaint | None:
     )
 
 
+def battery_scaling(value: float, _: Values, setup: Setup) -> Complaint | None:
+    """The autopilot makes up for the battery's voltage, or we do; not both."""
+    if value <= 0.0 or setup.battery_exponent == 0.0:
+        return None
+    return Complaint(
+        INEFFECTIVE,
+        f"the autopilot makes up for the battery's voltage, and so do we (thrust.battery_exponent "
+        f"{setup.battery_exponent:g}), so that thrust grows as the battery empties; set "
+        "thrust.battery_exponent to 0",
+    )
+
+
 def our_system(value: float, _: Values, setup: Setup) -> Complaint | None:
     """A companion shares its vehicle's system id."""
     if value == setup.source_system:

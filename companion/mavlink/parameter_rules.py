@@ -22,10 +22,12 @@ class Setup(NamedTuple):
         silence_limit: After this long without control we hand back, s.
         hover_thrust: Normalised thrust at hover that the flight begins with.
         curve_factor: Of the thrust curve that we make up for; 0: none.
+        battery_exponent: Of the battery's voltage that we make up for; 0: none.
         tilt_compensated: Whether it is to divide thrust by cos(tilt) itself.
         tilt_acceleration_limit: Of roll and pitch, as the planner has it, rad/s²; `None`: no limit.
         yaw_acceleration_limit: Of yaw.
         max_tilt: Largest tilt of a target, rad.
+        signs: Whether we sign what we send, and refuse what is not signed.
     """
 
     source_system: int
@@ -33,10 +35,12 @@ class Setup(NamedTuple):
     silence_limit: float
     hover_thrust: float
     curve_factor: float
+    battery_exponent: float
     tilt_compensated: bool
     tilt_acceleration_limit: float | None
     yaw_acceleration_limit: float | None
     max_tilt: float
+    signs: bool
 
 
 class Verdict(Enum):
@@ -77,7 +81,9 @@ class ParameterRule:
         meaning: What it decides, one clause.
         check: Judges it; `None` is a value that is as it should be.
         source: Where this is known from.
-        vital: A flight reads it before it arms, and refuses what is not safe.
+        vital: Without it nobody can know how a setpoint is obeyed, so a vehicle that has it not is
+            not flown.
+        reboot: A change counts only after the autopilot was started anew.
     """
 
     names: tuple[str, ...]
@@ -85,6 +91,7 @@ class ParameterRule:
     check: Check
     source: str
     vital: bool = False
+    reboot: bool = False
 
     @property
     def name(self) -> str:
@@ -92,7 +99,7 @@ class ParameterRule:
         return self.names[0]
 
 
-class Finding(NamedTuple):
+class ParameterFinding(NamedTuple):
     """What a rule says of a vehicle.
 
     Attributes:
@@ -109,13 +116,8 @@ class Finding(NamedTuple):
     because: str = ""
     set_to: float | None = None
 
-    def sentence(self) -> str:
-        """What is wrong and how to mend it, for people."""
-        mend = "" if self.set_to is None else f"; set {self.rule.name} to {self.set_to:g}"
-        return f"{self.rule.name} is {self.value:g}: {self.because}{mend}"
 
-
-def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[Finding]:
+def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[ParameterFinding]:
     """What the rules find, in their order; a parameter that the autopilot has not is left out."""
     findings = []
     for rule in rules:
@@ -124,7 +126,7 @@ def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[
         value = values[rule.name]
         complaint = rule.check(value, values, setup)
         if complaint is None:
-            findings.append(Finding(rule, value, Verdict.SAFE))
+            findings.append(ParameterFinding(rule, value, Verdict.SAFE))
         else:
-            findings.append(Finding(rule, value, *complaint))
+            findings.append(ParameterFinding(rule, value, *complaint))
     return findings

@@ -9,6 +9,7 @@ from companion.mavlink.parameter_checks import (
     INEFFECTIVE,
     UNSAFE,
     at_most,
+    battery_scaling,
     bit_clear,
     bit_set,
     forbidden,
@@ -68,6 +69,15 @@ def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | Non
         f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
         "allows",
         60.0,
+    )
+
+
+def _signing(value: float, _: Values, setup: Setup) -> Complaint | None:
+    """The reverse needs no rule: a vehicle that does not sign is not heard where we do."""
+    if not value or setup.signs:
+        return None
+    return Complaint(
+        INEFFECTIVE, "PX4 obeys only what is signed, and we sign nothing; set link.signing_key_file"
     )
 
 
@@ -148,6 +158,12 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         ("THR_MDL_FAC",), "whether PX4 makes up for the thrust curve", thrust_curve, _REFERENCE
     ),
     ParameterRule(
+        ("MC_BAT_SCALE_EN",),
+        "whether PX4 makes up for the battery's voltage",
+        battery_scaling,
+        _REFERENCE,
+    ),
+    ParameterRule(
         ("COM_DISARM_PRFLT",),
         "after how long on the ground PX4 disarms itself",
         positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
@@ -155,7 +171,18 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
     ParameterRule(
-        ("IMU_INTEG_RATE",), "how often attitude is estimated, Hz", _attitude_rate, _MEASURED
+        ("MAV_SIGN_CFG",),
+        "whether PX4 obeys only what is signed",
+        _signing,
+        _REFERENCE,
+        reboot=True,
+    ),
+    ParameterRule(
+        ("IMU_INTEG_RATE",),
+        "how often attitude is estimated, Hz",
+        _attitude_rate,
+        _MEASURED,
+        reboot=True,
     ),
     ParameterRule(
         ("GF_ACTION",),
@@ -178,9 +205,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "whether arming checks the power supply",
         forbidden(INEFFECTIVE, {894281.0: "the power supply is not checked before arming"}, 0.0),
         _REFERENCE,
+        reboot=True,
     ),
     ParameterRule(
-        ("CBRK_FLIGHTTERM",), "whether the failure detector stops motors", _termination, _REFERENCE
+        ("CBRK_FLIGHTTERM",),
+        "whether the failure detector stops motors",
+        _termination,
+        _REFERENCE,
+        reboot=True,
     ),
     ParameterRule(
         ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", _failure_tilt, _REFERENCE

@@ -42,6 +42,12 @@ class TimeSync:
         """The shortest round trip of late, s; it bounds the offset's error to half of it."""
         return min(self._exchanges).round_trip_s if self._exchanges else None
 
+    @property
+    def jitter_s(self) -> float | None:
+        """By how much the round trips of late differ, s; `None` before the first answer."""
+        trips = [exchange.round_trip_s for exchange in self._exchanges]
+        return max(trips) - min(trips) if trips else None
+
     def sample_age(self, time_boot_ms: int) -> float | None:
         """How long ago the vehicle stamped `time_boot_ms`, s; `None` before the first answer."""
         offset = self.offset_s

@@ -41,6 +41,7 @@ QUICK_PARAMETERS = {
     "ardupilot": {
         "GUID_OPTIONS": 8,
         "ATC_ANGLE_BOOST": 0,
+        "GUID_TIMEOUT": 1.0,
         "LAND_SPEED": 150.0,
         "WPNAV_SPEED_DN": 300.0,
         "WPNAV_ACCEL_Z": 300.0,

@@ -16,8 +16,10 @@ def autopilot_setup(config: Config) -> Setup:
         silence_limit=1e-3 * config.deadman.silence_limit_ms,
         hover_thrust=config.thrust.hover_thrust,
         curve_factor=config.thrust.curve_factor,
+        battery_exponent=config.thrust.battery_exponent,
         tilt_compensated=config.thrust.autopilot_compensates_tilt,
         tilt_acceleration_limit=None if tilt_limit is None else radians(tilt_limit),
         yaw_acceleration_limit=None if yaw_limit is None else radians(yaw_limit),
         max_tilt=radians(config.limits.max_tilt_deg),
+        signs=config.link.signing_key_file is not None,
     )

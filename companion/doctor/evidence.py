@@ -1,0 +1,113 @@
+"""What was heard of a vehicle and its link, for the checks to judge."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.parameter_survey import Survey
+from companion.mavlink.state import VehicleState
+from companion.mavlink.streams import StreamRate
+
+
+class Identity(NamedTuple):
+    """AUTOPILOT_VERSION; `None` where it was not told.
+
+    Attributes:
+        version: Of the flight software, as in 4.7.0-dev.
+        capabilities: MAV_PROTOCOL_CAPABILITY.
+        uid: Of the hardware.
+    """
+
+    version: str | None = None
+    capabilities: int | None = None
+    uid: str | None = None
+
+
+class LinkQuality(NamedTuple):
+    """The link while we listened.
+
+    Attributes:
+        frames: Accepted.
+        lost: Missing in the vehicle's running numbers.
+        damaged: With a wrong checksum.
+        not_finite: Messages refused for a NaN or infinity.
+        reconnects: How often the connection was opened again.
+        round_trip: Shortest of late by TIMESYNC, s; `None` if it was never answered.
+        jitter: By how much the round trips differed, s.
+        notices: What keeps the two sides from understanding each other.
+    """
+
+    frames: int
+    lost: int
+    damaged: int
+    not_finite: int
+    reconnects: int
+    round_trip: float | None
+    jitter: float | None
+    notices: tuple[str, ...] = ()
+
+
+class SampleTimes(NamedTuple):
+    """The attitude samples that came, by both clocks.
+
+    Attributes:
+        heard: How many.
+        longest_pause: Between two of them by our clock, s.
+        not_newer: Stamped no later than the one before.
+        clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
+    """
+
+    heard: int = 0
+    longest_pause: float = 0.0
+    not_newer: int = 0
+    clock_rate: float | None = None
+
+
+class Company(NamedTuple):
+    """Others on the link.
+
+    Attributes:
+        sources: (system, component) of all that were heard.
+        companions: Of them those whose heartbeat says onboard controller.
+        steering: Of them those who sent setpoints.
+        echo: Whether the autopilot tells of rates or thrust though nobody may fly it.
+    """
+
+    sources: frozenset[tuple[int, int]] = frozenset()
+    companions: frozenset[tuple[int, int]] = frozenset()
+    steering: frozenset[tuple[int, int]] = frozenset()
+    echo: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """All that was gathered.
+
+    Attributes:
+        family: The autopilot's.
+        state: What the vehicle told, the newest of each.
+        survey: The parameters that matter.
+        streams: What was asked, granted and counted, by message.
+        received: How often each of these came since the link was opened.
+        window: How long was counted, s.
+        link: How good the link is.
+        samples: The attitude samples' times.
+        company: Who else is there.
+        resets: How often the estimator jumped meanwhile.
+        identity: `None` where it was not asked for.
+        words: What the autopilot said meanwhile that is a warning or worse.
+    """
+
+    family: AutopilotFamily
+    state: VehicleState
+    survey: Survey
+    streams: Mapping[str, StreamRate]
+    received: Mapping[str, int]
+    window: float
+    link: LinkQuality
+    samples: SampleTimes
+    company: Company
+    resets: int
+    identity: Identity | None = None
+    words: tuple[str, ...] = ()

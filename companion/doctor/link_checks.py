@@ -1,0 +1,224 @@
+"""Checks of the link: whether enough arrives, soon enough, whole, and from whom it should."""
+
+from collections.abc import Iterator
+
+from companion.config import Config
+from companion.doctor.evidence import Evidence
+from companion.doctor.finding import Finding, Key
+from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.streams import StreamRate
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+
+_REACHED = 0.7
+"""PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
+_COUNTABLE = 5.0
+"""So many must be due while we listen for a rate to be told from a count."""
+_SOME_LOST, _MANY_LOST = 0.02, 0.2
+_SOME_DAMAGED = 0.01
+_CLOCKS_APART = 0.02
+"""By this share the two clocks may differ in rate; crystals differ by less than 0.0002, while a
+simulation that does not keep up with real time differs by more."""
+_SAMPLES_NEEDED = 10
+
+
+def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What arrives of the telemetry asked for."""
+    link = config.link
+    least = {
+        "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
+        "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
+    }
+    for name, rate in evidence.streams.items():
+        if name in least and rate.achieved < least[name][1]:
+            key, limit = least[name]
+            yield Finding(
+                f"link.{key}",
+                UNSAFE,
+                f"{name} arrives at {rate.achieved:.0f} Hz, less than link.{key} = {limit:g}",
+                mend="raise the link's speed or lower the limit",
+                source="counted",
+            )
+        else:
+            yield _stream(name, rate, evidence)
+
+
+def _stream(name: str, rate: StreamRate, evidence: Evidence) -> Finding:
+    asked, achieved = rate.asked, rate.achieved
+    found, mend = f"{name} arrives at {achieved:.0f} Hz, as asked ({asked:g} Hz)", ""
+    countable = asked * evidence.window >= _COUNTABLE
+    reached = achieved >= _REACHED * asked if countable else evidence.received[name] > 0
+    if rate.refusal:
+        found, reached = f"{name} is refused ({rate.refusal})", False
+        mend = "a newer version of the autopilot may send it"
+    elif rate.granted < _REACHED * asked:
+        found, reached = f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz", False
+        mend = "ask for less, or let the autopilot's loop run faster"
+    elif not reached:
+        found = f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz"
+        mend = "raise the link's speed, or ask for less, so that nothing has to wait"
+    if reached:
+        return Finding(f"{Key.STREAMS}.{name}", SAFE, found, source="counted")
+    because = "what hangs on it works late or not at all"
+    return Finding(f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, mend, "counted")
+
+
+def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What does not arrive, or not as it was sent."""
+    link = evidence.link
+    share = link.lost / max(1, link.lost + link.frames)
+    verdict = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > _SOME_LOST else SAFE
+    bad = verdict is not SAFE
+    yield Finding(
+        Key.LOSS,
+        verdict,
+        f"{100.0 * share:.1f} % of the vehicle's messages are lost",
+        "so are as many of our setpoints, and the pilot's mode is told late" if bad else "",
+        "ask for lower rates, or use a faster or better link" if bad else "",
+        "gaps in the running numbers",
+    )
+    if link.damaged > _SOME_DAMAGED * max(1, link.frames):
+        yield Finding(
+            Key.DAMAGE,
+            INEFFECTIVE,
+            f"{link.damaged} damaged messages in {evidence.window:g} s",
+            "they are refused, and so lost",
+            "check the wiring, its ground and the baud rate",
+            "checksums",
+        )
+    if link.not_finite:
+        yield Finding(
+            Key.NOT_FINITE,
+            INEFFECTIVE,
+            f"{link.not_finite} messages with a number that is NaN or infinite",
+            "they are refused, and so lost",
+            "let the estimator settle; if it goes on, do not fly",
+            "decoded messages",
+        )
+    if link.reconnects:
+        yield Finding(
+            Key.RECONNECTS,
+            UNSAFE,
+            f"the connection dropped {link.reconnects} times in {evidence.window:g} s",
+            "so it will in flight",
+            "check plugs, cables and power",
+            "the operating system",
+        )
+
+
+def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """How late what arrives is, and how evenly it comes."""
+    stale = 1e-3 * config.deadman.telemetry_stale_ms
+    round_trip, jitter = evidence.link.round_trip, evidence.link.jitter
+    if round_trip is None or jitter is None:
+        yield Finding(
+            Key.ROUND_TRIP,
+            INEFFECTIVE,
+            "the autopilot does not answer TIMESYNC",
+            "how old a sample is when it comes cannot be known",
+            "a router between may hold it back",
+            "TIMESYNC",
+        )
+    elif round_trip > stale:
+        yield Finding(
+            Key.ROUND_TRIP,
+            UNSAFE,
+            f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
+            "deadman.telemetry_stale_ms",
+            mend="use a faster link",
+            source="TIMESYNC",
+        )
+    else:
+        yield Finding(
+            Key.ROUND_TRIP,
+            SAFE,
+            f"the link's round trip takes {1e3 * round_trip:.1f} ms",
+            source="TIMESYNC",
+        )
+        uneven = jitter > 0.5 * stale
+        yield Finding(
+            Key.JITTER,
+            INEFFECTIVE if uneven else SAFE,
+            f"the round trip varies by {1e3 * jitter:.1f} ms",
+            "the planner reckons with one dead time" if uneven else "",
+            "find what holds the messages up: a router, Wi-Fi, a busy computer" if uneven else "",
+            "TIMESYNC",
+        )
+    samples = evidence.samples
+    if samples.longest_pause > stale:
+        yield Finding(
+            Key.PAUSES,
+            INEFFECTIVE,
+            f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
+            "deadman.telemetry_stale_ms",
+            "setpoints pause with it",
+            "find what holds the messages up: a router, Wi-Fi, a busy computer",
+            "ATTITUDE_QUATERNION",
+        )
+
+
+def clocks(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the vehicle's time goes on as time does: the law counts by it."""
+    samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
+    if samples.not_newer:
+        yield Finding(
+            Key.CLOCK,
+            UNSAFE if samples.not_newer > _MANY_LOST * samples.heard else INEFFECTIVE,
+            f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
+            "before",
+            "they are not answered, and the flight is given up when that lasts",
+            "let one link alone bring attitude; start the autopilot anew if its clock stands still",
+            source,
+        )
+    elif samples.heard >= _SAMPLES_NEEDED and samples.clock_rate is not None:
+        apart = abs(samples.clock_rate - 1.0) > _CLOCKS_APART
+        yield Finding(
+            Key.CLOCK,
+            INEFFECTIVE if apart else SAFE,
+            f"the vehicle's clock runs at {samples.clock_rate:.3f} of ours",
+            "limits in time, such as the deadman's, are not what they say" if apart else "",
+            "run a simulation at the speed of real time, or in lockstep" if apart else "",
+            source,
+        )
+
+
+def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether both sides sign, with the same key, or neither."""
+    for notice in evidence.link.notices:
+        found, _semicolon, mend = notice.partition("; ")
+        yield Finding(Key.SIGNING, INEFFECTIVE, found, mend=mend, source="MAVLink 2 signatures")
+
+
+def company(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Who else speaks to the vehicle."""
+    link, others = config.link, evidence.company
+    ours = link.source_system, link.source_component
+    if ours in others.sources:
+        yield Finding(
+            Key.OUR_IDS,
+            UNSAFE,
+            f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
+            "answers meant for one are taken by the other, and it may steer, too",
+            "end the other program, or give each its own link.source_component",
+            "frames heard",
+        )
+    for system, component in sorted(others.companions - {ours}):
+        yield Finding(
+            Key.SECOND_COMPANION,
+            INEFFECTIVE,
+            f"another companion computer is there, {system}/{component}",
+            "should it send commands or setpoints, two steer one vehicle",
+            "see that it only listens",
+            "HEARTBEAT of type onboard controller",
+        )
+    steering = sorted(others.steering)
+    if steering or others.echo:
+        who = ", ".join(f"{system}/{component}" for system, component in steering)
+        yield Finding(
+            Key.OTHER_SETPOINTS,
+            UNSAFE,
+            f"somebody else sends setpoints{': ' + who if who else ''}",
+            "the autopilot obeys whichever came last, so two would steer one vehicle",
+            "end the other program",
+            "setpoints heard" if steering else "ATTITUDE_TARGET while disarmed",
+        )

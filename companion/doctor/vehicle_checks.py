@@ -1,0 +1,128 @@
+"""Checks of the vehicle itself: whether it may be armed now, its battery, its estimator, itself."""
+
+from collections.abc import Iterator
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion.config import Config
+from companion.doctor.evidence import Evidence
+from companion.doctor.finding import Finding, Key
+from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.state import VehicleState
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+
+
+def armed(state: VehicleState) -> Finding:
+    """Whether the motors may turn already."""
+    if state.armed:
+        return Finding(
+            Key.ARMED,
+            UNSAFE,
+            "the vehicle is already armed",
+            mend="land and disarm it first",
+            source="HEARTBEAT",
+        )
+    return Finding(Key.ARMED, SAFE, "the vehicle is disarmed", source="HEARTBEAT")
+
+
+def battery(config: Config, state: VehicleState) -> Finding:
+    """Whether there is charge enough, as far as the vehicle tells."""
+    remaining, least = state.battery_remaining, config.limits.min_battery_percent
+    source = "BATTERY_STATUS, SYS_STATUS"
+    if remaining is None:
+        return Finding(
+            Key.BATTERY,
+            INEFFECTIVE,
+            "the vehicle does not tell its battery's charge",
+            "limits.min_battery_percent protects nothing",
+            "set the battery's capacity or number of cells in the autopilot",
+            source,
+        )
+    if remaining < least / 100.0:
+        return Finding(
+            Key.BATTERY,
+            UNSAFE,
+            f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent",
+            mend="charge it",
+            source=source,
+        )
+    return Finding(Key.BATTERY, SAFE, f"battery at {100 * remaining:.0f} %", source=source)
+
+
+def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Motors and battery."""
+    yield armed(evidence.state)
+    yield battery(config, evidence.state)
+
+
+def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot would arm, and why not, in its own words."""
+    state = evidence.state
+    if state.failsafe:
+        yield Finding(
+            Key.FAILSAFE,
+            UNSAFE,
+            "the autopilot is in a failsafe",
+            "it does what that asks for, and not what we ask",
+            "clear its cause first",
+            "HEARTBEAT system_status",
+        )
+    missing = evidence.family.not_ready(state.readiness)
+    said = "; ".join(dict.fromkeys(evidence.words))
+    if missing is not None:
+        yield Finding(
+            Key.READY,
+            INEFFECTIVE,
+            f"not ready to be armed, it lacks {missing}",
+            f"the autopilot says: {said}" if said else "the flight would wait for it",
+            "wait, or put right what it says",
+            "SYS_STATUS, estimator flags",
+        )
+        return
+    flags = state.estimator.flags if state.estimator else 0
+    found = f"ready to be armed, estimator flags 0x{flags:x}"
+    yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
+    if said:
+        yield Finding(Key.WORDS, SAFE, f"the autopilot says: {said}", source="STATUSTEXT, EVENT")
+
+
+def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the estimate holds still while the vehicle does."""
+    if evidence.resets:
+        yield Finding(
+            Key.ESTIMATOR_RESETS,
+            INEFFECTIVE,
+            f"the estimate jumped {evidence.resets} times in {evidence.window:g} s",
+            "in flight each jump moves the vehicle",
+            "wait until compass and GPS have settled",
+            "ODOMETRY reset_counter",
+        )
+
+
+def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What autopilot it is, where that was asked for."""
+    identity, name = evidence.identity, evidence.family.name
+    if identity is None:
+        return
+    if identity.version is None or identity.capabilities is None:
+        yield Finding(
+            Key.VERSION,
+            INEFFECTIVE,
+            f"{name} does not tell its version",
+            "which of its manners apply cannot be known",
+            "a newer version tells it",
+            "AUTOPILOT_VERSION",
+        )
+    elif not identity.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET:
+        yield Finding(
+            Key.VERSION,
+            INEFFECTIVE,
+            f"{name} {identity.version} does not take SET_ATTITUDE_TARGET",
+            "it is the only setpoint that we send",
+            "use a newer version, or a build with offboard control",
+            "AUTOPILOT_VERSION capabilities",
+        )
+    else:
+        found = f"{name} {identity.version}"
+        yield Finding(Key.VERSION, SAFE, found, source="AUTOPILOT_VERSION")
