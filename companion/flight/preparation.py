@@ -99,19 +99,30 @@ def _ready(rig: Rig) -> bool:
 
 
 async def _check_vital_parameters(rig: Rig) -> None:
-    """Refuse an autopilot that would take our setpoints for something else."""
+    """Refuse an autopilot that would take our setpoints for something else.
+
+    And tell what it would do without them.
+    """
     rig.detail = "reading the autopilot's parameters"
-    vital = [rule for rule in rig.link.family.parameters if rule.vital]
-    values = await survey(rig.link, vital)
+    family = rig.link.family
+    dead_man = family.dead_man
+    vital = [rule for rule in family.parameters if rule.vital]
+    held = [rule for rule in family.parameters if rule.name == dead_man.parameter]
+    values = await survey(rig.link, [*vital, *held])
     for rule in vital:
         if rule.name not in values:
             raise FlightEnded(
                 f"the autopilot has no parameter {rule.name}, so that it cannot be known "
-                f"{rule.meaning}; this needs a newer version of {rig.link.family.name}"
+                f"{rule.meaning}; this needs a newer version of {family.name}"
             )
     for finding in judge(vital, values, autopilot_setup(rig.config)):
         if finding.verdict is not Verdict.SAFE:
             raise FlightEnded(finding.sentence())
+    seconds = values.get(dead_man.parameter, dead_man.default)
+    rig.note(
+        f"should our setpoints stop, {family.name} holds the last rates for {seconds:g} s "
+        f"({dead_man.parameter}); then {dead_man.then}"
+    )
 
 
 def _check_delay(rig: Rig) -> None:
