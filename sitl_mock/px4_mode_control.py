@@ -12,6 +12,7 @@ from sitl_mock.position_control import (
     PositionDemand,
     PositionGains,
 )
+from sitl_mock.px4_modes import PILOTED
 from sitl_mock.quaternion import Quaternion, Vector, along_heading, from_yaw, yaw
 from sitl_mock.setpoints import PositionSetpoint
 from sitl_mock.state import NAN, NAN_VECTOR, PositionTargetEcho, State
@@ -26,6 +27,8 @@ CRAWL_HEIGHT_M = 0.65
 BRAKING_S = 0.7
 """Entering a hold, the point to hold lies this many seconds of velocity ahead."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
+PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
+"""Disarmed, PX4's own modes ask this acceleration, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -95,6 +98,11 @@ class Px4ModeControl:
         state.position_target.active = False
         fresh = self._stream.take_fresh()
         if not state.armed:
+            if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED:
+                yaw_now = yaw(state.estimate.q)
+                state.position_target = PositionTargetEcho(
+                    True, NAN_VECTOR, NAN_VECTOR, PRESSED_DOWN, yaw_now
+                )
             command = _STILL
         elif state.mode is Mode.OFFBOARD:
             command = self._offboard(dt, fresh=fresh)
