@@ -72,17 +72,19 @@ PX4_FLIGHT = Case(
     no_rate=frozenset(OFFBOARD_TARGETS),
     unordered=frozenset(TOLD_WHILE_BOOTING),
     booted_s=3.6,
-    pauses=((29.0, 48.0), (54.0, 65.0)),
+    pauses=((27.0, 49.0), (54.0, 70.0)),
 )
 CASES = {
-    # 7 s at each rate are cut to 2.
+    # 7 s at each rate are cut to 1.5.
     "ardupilot-idle": Case(
         ARDUPILOT_LACKS,
-        pauses=(*((at, at + 5.0) for at in range(55, 117, 7)), (121, 126),
-                (128, 133), (135, 140), (142, 146), (151, 156), (158, 163), (165, 170),
-                (172, 176), (189, 194)),
+        pauses=(
+            *((at, at + 5.5) for at in range(55, 117, 7)),
+            *((at, at + 5.5) for at in (120, 127, 134, 150, 157, 164)),
+            (141.0, 146.5), (171.0, 176.5), (189.0, 195.0),
+        ),
     ),
-    "ardupilot-flight": Case(set(), pauses=((78.0, 97.0),)),
+    "ardupilot-flight": Case(set(), pauses=((59.0, 69.0), (78.0, 98.0))),
     "px4-idle": Case(PX4_LACKS, booted_s=26.5, shift=-20.0),
     "px4-offboard-entry": Case(
         PX4_LACKS, no_rate=frozenset(OFFBOARD_TARGETS), booted_s=210.7, shift=-200.0
@@ -95,7 +97,7 @@ CASES = {
 def flown(name):
     case = CASES[name]
     if name.startswith("ardupilot"):
-        rig, hover = ArduRig(boot=False), ARDUPILOT_HOVER
+        rig, hover = ArduRig(boot=False, lockstep={"enabled": False}), ARDUPILOT_HOVER
     else:
         rig, hover = Rig(boot=False, lockstep={"enabled": False}), PX4_HOVER
     script = Script(digest(name), rig, hover=hover, shift=case.shift, pauses=case.pauses)
