@@ -5,6 +5,8 @@ from typing import Any
 from mock_rig import ACCEPTED, Rig
 from pymavlink.dialects.v20 import ardupilotmega
 
+from sitl_mock.wire import decode
+
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 2, 4, 5, 6, 9, 17
 FAILED = 4
 HOVER = 0.364
@@ -32,6 +34,12 @@ class ArduRig(Rig):
         for frame in self.autopilot.companion.take():
             message = _parser.decode(bytearray(frame))
             self.received.append((self.time, message))
+
+    def say_frame(self, frame: bytes) -> None:
+        """Deliver a frame as it is."""
+        for each in decode(frame):
+            self.autopilot.handle(each, self.autopilot.companion)
+        self._take()
 
     def texts(self) -> list[str]:
         """Every text said so far, its chunks put together."""

@@ -12,7 +12,7 @@ import pytest
 from ardupilot_rig import HOVER as ARDUPILOT_HOVER
 from ardupilot_rig import ArduRig
 from mock_rig import HOVER as PX4_HOVER
-from mock_rig import Rig
+from mock_rig import QUICK, Rig
 from script import Script, digest
 
 TOGETHER_S = 0.6
@@ -57,6 +57,7 @@ class Case:
         booted_s: until then PX4's streams begin one by one, and the mock's all at once.
         pauses: recorded times that are passed over, because nothing changes there.
         shift: the mock's time less the recording's, s.
+        boot_s: the mock's prearm_delay_s.
     """
 
     lacks: set
@@ -65,6 +66,7 @@ class Case:
     booted_s: float = 0.0
     pauses: tuple = ()
     shift: float = 0.0
+    boot_s: float = 4.5
 
 
 PX4_FLIGHT = Case(
@@ -72,19 +74,26 @@ PX4_FLIGHT = Case(
     no_rate=frozenset(OFFBOARD_TARGETS),
     unordered=frozenset(TOLD_WHILE_BOOTING),
     booted_s=3.6,
-    pauses=((27.0, 49.0), (54.0, 70.0)),
+    pauses=((15.0, 22.0), (27.0, 49.0), (54.0, 70.0)),
 )
 CASES = {
-    # 7 s at each rate are cut to 1.5.
+    # 7 s at each rate are cut to 0.8.
     "ardupilot-idle": Case(
         ARDUPILOT_LACKS,
+        boot_s=24.0,
         pauses=(
-            *((at, at + 5.5) for at in range(55, 117, 7)),
-            *((at, at + 5.5) for at in (120, 127, 134, 150, 157, 164)),
-            (141.0, 146.5), (171.0, 176.5), (189.0, 195.0),
+            (21.0, 39.0),
+            (43.0, 49.0),
+            *((at, at + 6.2) for at in range(55, 117, 7)),
+            *((at, at + 6.2) for at in (120, 127, 134, 150, 157, 164)),
+            (141.0, 148.0),
+            (171.0, 184.0),
+            (189.0, 196.5),
         ),
     ),
-    "ardupilot-flight": Case(set(), pauses=((59.0, 69.0), (78.0, 98.0))),
+    "ardupilot-flight": Case(
+        set(), boot_s=22.0, pauses=((21.0, 40.5), (59.0, 69.0), (78.0, 98.0))
+    ),
     "px4-idle": Case(PX4_LACKS, booted_s=26.5, shift=-20.0),
     "px4-offboard-entry": Case(
         PX4_LACKS, no_rate=frozenset(OFFBOARD_TARGETS), booted_s=210.7, shift=-200.0
@@ -97,9 +106,11 @@ CASES = {
 def flown(name):
     case = CASES[name]
     if name.startswith("ardupilot"):
-        rig, hover = ArduRig(boot=False, lockstep={"enabled": False}), ARDUPILOT_HOVER
+        rig = ArduRig(boot=False, prearm_delay_s=case.boot_s, lockstep={"enabled": False})
+        hover = ARDUPILOT_HOVER
     else:
-        rig, hover = Rig(boot=False, lockstep={"enabled": False}), PX4_HOVER
+        rig = Rig(boot=False, parameters=QUICK, lockstep={"enabled": False})
+        hover = PX4_HOVER
     script = Script(digest(name), rig, hover=hover, shift=case.shift, pauses=case.pauses)
     script.run()
     return case, script
