@@ -12,7 +12,7 @@ from typing import TypeAlias, get_args
 from rich.console import Console
 
 from companion import demo
-from companion.commands import flights, identify, tools
+from companion.commands import doctor, flights, identify, tools
 from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_USAGE
 from companion.commands.identify import SHIPPED
 from companion.config_sections import FlightConfig
@@ -76,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"companion {version(_PACKAGE)}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_flights(commands)
+    _add_doctor(commands)
     _add_identify(commands)
     _add_benches(commands)
     _add_study(commands)
@@ -114,6 +115,41 @@ def _add_flights(commands: Commands) -> None:
             help="slow a trajectory down that the limits do not allow, instead of refusing it",
         )
         _add_flight_options(command)
+
+
+def _add_doctor(commands: Commands) -> None:
+    command = commands.add_parser(
+        "doctor",
+        help="find what would go wrong, before take-off",
+        description="Ask the vehicle that the configuration names, without arming it: version, "
+        "parameters, rates, estimator, link, who else is there; and tell what of it is unsafe or "
+        "ineffective, what to set, and where that is known from. `companion fly` makes the same "
+        "checks and refuses what is unsafe unless flight.accept names it. Exit code 1: something "
+        "unsafe was found.",
+    )
+    command.add_argument(
+        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
+    )
+    command.add_argument("--endpoint", help="instead of link.endpoint")
+    command.add_argument(
+        "--wait",
+        type=_seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="for the vehicle to be ready, at most (10)",
+    )
+    what = command.add_mutually_exclusive_group()
+    what.add_argument(
+        "--fix",
+        action="store_true",
+        help="set the parameters proposed, each after asking, and write an undo file before",
+    )
+    what.add_argument(
+        "--undo", type=Path, metavar="FILE", help="set back what such a file says, and no more"
+    )
+    command.add_argument("--yes", action="store_true", help="of --fix: set all without asking")
+    _add_flight_options(command)
+    command.set_defaults(run=doctor.doctor)
 
 
 def _add_identify(commands: Commands) -> None:

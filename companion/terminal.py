@@ -52,6 +52,17 @@ class _Speaker:
                 broken = True
 
 
+async def read_line() -> str:
+    """A line of standard input, which must be a terminal; the event loop goes on meanwhile."""
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[str] = loop.create_future()
+    loop.add_reader(sys.stdin, lambda: answer.set_result(sys.stdin.readline()))
+    try:
+        return await answer
+    finally:
+        loop.remove_reader(sys.stdin)
+
+
 class FlightConsole(Console):
     """A console whose reader may go away: rich would end the program, and silence stdout."""
 
@@ -103,13 +114,7 @@ class TerminalObserver:
         self._speaker.say(
             lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C leaves) ")
         )
-        loop = asyncio.get_running_loop()
-        answer: asyncio.Future[str] = loop.create_future()
-        loop.add_reader(sys.stdin, lambda: answer.set_result(sys.stdin.readline()))
-        try:
-            return (await answer).strip().lower() in ("y", "yes")
-        finally:
-            loop.remove_reader(sys.stdin)
+        return (await read_line()).strip().lower() in ("y", "yes")
 
     def _show_phase(self, name: str, waits_for: str) -> None:
         self._stop_status()

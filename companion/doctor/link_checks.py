@@ -1,6 +1,6 @@
 """Checks of the link: whether enough arrives, soon enough, whole, and from whom it should."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from companion.config import Config
 from companion.doctor.evidence import Evidence
@@ -184,7 +184,12 @@ def clocks(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether both sides sign, with the same key, or neither."""
-    for notice in evidence.link.notices:
+    yield from signing_findings(evidence.link.notices)
+
+
+def signing_findings(notices: Iterable[str]) -> Iterator[Finding]:
+    """What the link said of signatures, as findings."""
+    for notice in notices:
         found, _semicolon, mend = notice.partition("; ")
         yield Finding(Key.SIGNING, INEFFECTIVE, found, mend=mend, source="MAVLink 2 signatures")
 

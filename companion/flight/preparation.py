@@ -6,7 +6,7 @@ from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.rig import Rig
-from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.parameter_rules import Values, Verdict
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -36,6 +36,7 @@ async def checks(rig: Rig) -> None:
     if heartbeats > 0.0:
         rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
     _heed(rig, examine(config, evidence))
+    _tell_dead_man(rig, evidence.survey.values)
 
 
 async def stream(rig: Rig) -> None:
@@ -94,6 +95,17 @@ def _heed(rig: Rig, findings: list[Finding]) -> None:
             rig.note(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
     if refused:
         raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
+
+
+def _tell_dead_man(rig: Rig, values: Values) -> None:
+    """Tell what the autopilot would do without our setpoints."""
+    family = rig.link.family
+    dead_man = family.dead_man
+    seconds = values.get(dead_man.parameter, dead_man.default)
+    rig.note(
+        f"should our setpoints stop, {family.name} holds the last rates for {seconds:g} s "
+        f"({dead_man.parameter}); then {dead_man.then}"
+    )
 
 
 def _handed_over(rig: Rig) -> bool:

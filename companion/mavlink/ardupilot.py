@@ -67,6 +67,7 @@ class ArduPilot:
             "GPS_RAW_INT": 5.0,
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
+            "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
         }
     )
     interval_step_us = 1000

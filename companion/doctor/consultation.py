@@ -1,0 +1,81 @@
+"""One visit to the doctor: connect, wait a little for the vehicle to be ready, listen, judge."""
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
+
+from companion.config import Config
+from companion.doctor.evidence import Evidence
+from companion.doctor.finding import Finding, Key
+from companion.doctor.gathering import gather, wanted_rates
+from companion.doctor.link_checks import signing_findings
+from companion.mavlink.errors import LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.link import Link
+from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.settings import LinkSettings
+
+_LISTENING = 3.0
+"""s; enough to count what comes at 2 Hz."""
+_POLL = 0.05
+
+
+class Patient:
+    """A vehicle at the other end of an open link.
+
+    Args:
+        config: What it is to be flown with.
+        link: To it.
+        notices: What the link says of itself.
+    """
+
+    def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
+        self._config, self._notices = config, notices
+        self.link = link
+
+    async def met(self) -> list[Finding]:
+        """Wait for the heartbeat; what is found where there is nothing more to be asked."""
+        try:
+            await self.link.wait_connected(self._config.flight.connect_timeout_s)
+        except LinkTimeout as error:
+            silence = _stranger(Key.HEARTBEAT, str(error))
+            return [silence, *signing_findings(self._notices)]
+        except UnsupportedAutopilot as error:
+            return [_stranger(Key.SUPPORTED, str(error))]
+        return []
+
+    async def evidence(self, patience: float) -> Evidence:
+        """Ask for telemetry, wait up to `patience` s for readiness, listen.
+
+        Raises:
+            CommandTimeout: It does not answer commands.
+            LinkLost: The connection dropped meanwhile.
+        """
+        link = self.link
+        granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(patience):
+                while self._waits():  # noqa: ASYNC110 - telemetry sets no events
+                    await asyncio.sleep(_POLL)
+        return await gather(link, granted, _LISTENING, thorough=True, notices=self._notices)
+
+    def _waits(self) -> bool:
+        state = self.link.state
+        return not state.armed and self.link.family.not_ready(state.readiness) is not None
+
+
+@asynccontextmanager
+async def patient(config: Config, settings: LinkSettings) -> AsyncIterator[Patient]:
+    """Open the link; nothing but heartbeats and clock requests leaves before something is asked.
+
+    Raises:
+        EndpointError: the endpoint cannot be opened.
+        LinkTimeout: lockstep is asked for, and the vehicle is not in lockstep.
+    """
+    notices: list[str] = []
+    async with Link(settings, notice=notices.append) as link:
+        yield Patient(config, link, notices)
+
+
+def _stranger(key: Key, words: str) -> Finding:
+    found, _semicolon, mend = words.partition("; ")
+    return Finding(key, Verdict.UNSAFE, found, mend=mend, source="HEARTBEAT")

@@ -1,0 +1,97 @@
+"""What the doctor found, as tables for people and as one object for machines."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from companion.config import Config
+from companion.doctor.examination import forbidding, unsafe
+from companion.doctor.finding import Finding
+from companion.doctor.repair import Outcome
+from companion.mavlink.parameter_rules import Verdict
+
+_TITLES = {
+    Verdict.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
+    Verdict.INEFFECTIVE: ("INEFFECTIVE: it will not do what is asked of it", "bold yellow"),
+    Verdict.SAFE: ("SAFE", "bold green"),
+}
+
+
+def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
+    """A table for each verdict that was given, the worst first, and a last line."""
+    parts: list[RenderableType] = []
+    for verdict, (title, style) in _TITLES.items():
+        of_it = [finding for finding in findings if finding.verdict is verdict]
+        if of_it:
+            parts.append(_table(title, style, of_it, config.flight.accept))
+    return Group(*parts, _last_line(config, findings))
+
+
+def _table(
+    title: str, style: str, findings: Iterable[Finding], accepted: Sequence[str]
+) -> RenderableType:
+    table = Table(title=title, title_justify="left", title_style=style, expand=True)
+    table.add_column("found", ratio=3)
+    table.add_column("what comes of it, and what to do", ratio=5)
+    table.add_column("source", ratio=2, style="dim")
+    for finding in findings:
+        excepted = "excepted by flight.accept" if finding.key in accepted else ""
+        advice = "; ".join(filter(None, (finding.because, finding.mend, excepted)))
+        table.add_row(*map(Text, (finding.found, advice, finding.source)))
+    return table
+
+
+def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
+    forbidden, amiss = forbidding(config, findings), len(unsafe(findings))
+    if forbidden:
+        return Text(
+            f"{len(forbidden)} unsafe: `companion fly` refuses; `companion doctor --fix` sets what "
+            "parameters can mend",
+            style="bold red",
+        )
+    if amiss:
+        return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
+    return Text("nothing unsafe was found", style="bold green")
+
+
+def outcome_line(outcome: Outcome) -> str:
+    """What became of a change, for people."""
+    change = outcome.change
+    if outcome.refusal:
+        return f"not set: {outcome.refusal}"
+    later = "; it counts once the autopilot was started anew" if change.reboot else ""
+    return f"{change.parameter}: {change.old:g} → {change.new:g}, read back{later}"
+
+
+def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
+    """For JSON."""
+    counts = {
+        verdict.value: sum(finding.verdict is verdict for finding in findings)
+        for verdict in _TITLES
+    }
+    return {
+        "result": "unsafe" if forbidding(config, findings) else "ok",
+        **counts,
+        "findings": [_finding_as_dict(config, finding) for finding in findings],
+    }
+
+
+def outcome_as_dict(outcome: Outcome) -> dict[str, Any]:
+    """For JSON."""
+    return {**outcome.change._asdict(), "refusal": outcome.refusal or None}
+
+
+def _finding_as_dict(config: Config, finding: Finding) -> dict[str, Any]:
+    return {
+        "key": str(finding.key),
+        "verdict": finding.verdict.value,
+        "accepted": finding.key in config.flight.accept,
+        "found": finding.found,
+        "because": finding.because,
+        "mend": finding.mend,
+        "source": finding.source,
+        "change": None if finding.change is None else finding.change._asdict(),
+    }

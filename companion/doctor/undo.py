@@ -1,0 +1,76 @@
+"""The undo file: what parameters were before the doctor set them, in YAML for people to read."""
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+import yaml
+
+from companion.doctor.evidence import Identity
+from companion.mavlink.link import Link
+from companion.yaml_file import ConfigError, Section
+
+
+class Undo(Section):
+    """What to restore, and on which vehicle."""
+
+    autopilot: str
+    """Name of the autopilot's family."""
+    system: int
+    """The vehicle's system id."""
+    uid: str | None
+    """AUTOPILOT_VERSION's id of the hardware; null: it was not told."""
+    time: str
+    """When the first of them was set, UTC."""
+    parameters: dict[str, float]
+    """Old value of each, in the order in which they were set."""
+
+    def meant_for(self, link: Link, identity: Identity) -> bool:
+        """Whether this is the vehicle whose parameters were changed."""
+        same_hardware = None in (self.uid, identity.uid) or self.uid == identity.uid
+        told = self.autopilot, self.system
+        return same_hardware and told == (link.family.name, link.settings.target_system)
+
+
+class UndoFile:
+    """Grows by one parameter before each of them is set.
+
+    Args:
+        directory: Where it is to be made.
+        link: To the vehicle.
+        identity: What the vehicle said of itself.
+    """
+
+    def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
+        began = datetime.now(UTC)
+        self.path = directory / f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}.yaml"
+        self._undo = Undo(
+            autopilot=link.family.name,
+            system=link.settings.target_system,
+            uid=identity.uid,
+            time=began.isoformat(timespec="seconds"),
+            parameters={},
+        )
+
+    def add(self, parameter: str, old: float) -> None:
+        """Note an old value; on the disk, whole, when this returns.
+
+        Raises:
+            ConfigError: it cannot be written, so nothing must be set.
+        """
+        grown = {**self._undo.parameters, parameter: old}
+        self._undo = self._undo.model_copy(update={"parameters": grown})
+        text = yaml.safe_dump(self._undo.model_dump(), sort_keys=False)
+        part = self.path.with_suffix(".part")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with part.open("w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(self.path)
+        except OSError as error:
+            raise ConfigError(
+                f"recording.directory: the undo file {self.path} cannot be written, so nothing "
+                f"more is set: {error.strerror}"
+            ) from error
