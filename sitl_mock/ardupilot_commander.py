@@ -91,6 +91,12 @@ class ArduPilotCommander:
         self._control.enter(state.mode)
         return ACCEPTED
 
+    def tell_problem(self) -> None:
+        """Say what forbids arming now, if anything does."""
+        problem = self._check()
+        if problem is not None:
+            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+
     def disarm(self, *, force: bool = False) -> int:
         """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
         if not self._state.armed:

@@ -11,6 +11,7 @@ CRITICAL = dialect.MAV_SEVERITY_CRITICAL
 ARDUPILOT_EVENTS: dict[Occasion, Event] = {
     Occasion.ARMED: Event("Arming motors", INFO),
     Occasion.ARMING_DENIED: Event("Arm: {}", CRITICAL),
+    Occasion.PREFLIGHT_FAIL: Event("PreArm: {}", CRITICAL),
     Occasion.DISARMED_BY_COMMAND: Event("Disarming motors", INFO),
     Occasion.DISARMED_BY_LANDING: Event("Disarming motors", INFO),
     Occasion.DISARMED_ON_GROUND: Event("Disarming motors", INFO),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.commander import ACCEPTED, DENIED, UNSUPPORTED, Commander
+from sitl_mock.commander import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Commander
 from sitl_mock.link import Link
 from sitl_mock.state import State
 from sitl_mock.telemetry import Builder
@@ -41,6 +41,7 @@ class Commands:
         self._builders = builders
         self.handlers: dict[int, Handler] = {
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
+            dialect.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
             dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
             dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: (
@@ -71,6 +72,12 @@ class Commands:
         if arm == 0.0:
             return self._commander.disarm(force=force)
         return DENIED
+
+    def _run_checks(self, _: Command, __: Link) -> int:
+        if self._state.armed:
+            return TEMPORARILY_REJECTED
+        self._commander.tell_problem()
+        return ACCEPTED
 
     def _get_interval(self, command: Command, link: Link) -> int:
         message_id = command.parameters[0]

@@ -132,6 +132,12 @@ class Px4Commander:
         """Whether it is armed in OFFBOARD."""
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
+    def tell_problem(self) -> None:
+        """Say what forbids arming now, if anything does."""
+        problem = self.check()
+        if problem is not None:
+            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+
     def check(self) -> str | None:
         """Look for what forbids arming, note it in the state and return it."""
         state = self._state

@@ -65,7 +65,7 @@ class Finding:
         key: A `Key`, or a parameter's (newest) name.
         verdict: How much it matters.
         found: What is so, one clause.
-        because: What comes of it; empty where nothing does.
+        because: What comes of it, or, where nothing does, what it decides; may be empty.
         mend: What to do about it; empty where nothing can or needs to be done.
         source: Where this is known from: a MAVLink message, a reference, a measurement.
         change: The parameter to set, if that mends it.

@@ -58,7 +58,7 @@ async def gather(
         read, achieved, identity = await asyncio.gather(
             survey(link, link.family.parameters),
             link.measure_rates(granted, seconds),
-            _ask(link) if thorough else _nothing(),
+            _identity_and_words(link) if thorough else _nothing(),
         )
     counts = link.stats.by_message
     return Evidence(
@@ -81,16 +81,8 @@ async def gather(
     )
 
 
-async def _nothing() -> None:
-    """Ask nothing more."""
-
-
-async def _ask(link: Link) -> Identity:
-    """What the autopilot is, as far as it says; and let it say what forbids arming."""
-    if not link.state.armed:
-        # It answers in texts, and ArduPilot gives them by itself only every 30 s.
-        with suppress(CommandRefused, LinkTimeout):
-            await link.command(dialect.MAV_CMD_RUN_PREARM_CHECKS, retries=1)
+async def identify(link: Link) -> Identity:
+    """What the autopilot is, as far as it says; raises `LinkLost`."""
     try:
         told = await link.request_message("AUTOPILOT_VERSION")
     except (CommandRefused, LinkTimeout):
@@ -102,6 +94,19 @@ async def _ask(link: Link) -> Identity:
         capabilities=told.capabilities,
         uid=f"{told.uid:016x}",
     )
+
+
+async def _identity_and_words(link: Link) -> Identity:
+    """What the autopilot is; and let it say what forbids arming."""
+    if not link.state.armed:
+        # It answers in texts, and ArduPilot gives them by itself only every 30 s.
+        with suppress(CommandRefused, LinkTimeout):
+            await link.command(dialect.MAV_CMD_RUN_PREARM_CHECKS, retries=1)
+    return await identify(link)
+
+
+async def _nothing() -> None:
+    """Ask nothing more."""
 
 
 def _quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:

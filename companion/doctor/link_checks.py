@@ -29,7 +29,9 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
         "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
     }
+    good = []
     for name, rate in evidence.streams.items():
+        trouble = _trouble(name, rate, evidence)
         if name in least and rate.achieved < least[name][1]:
             key, limit = least[name]
             yield Finding(
@@ -39,28 +41,34 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 mend="raise the link's speed or lower the limit",
                 source="counted",
             )
+        elif trouble is not None:
+            found, mend = trouble
+            because = "what hangs on it works late or not at all"
+            yield Finding(
+                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, mend, source="counted"
+            )
         else:
-            yield _stream(name, rate, evidence)
+            good.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
+    yield Finding(Key.STREAMS, SAFE, f"telemetry arrives, Hz: {', '.join(good)}", source="counted")
 
 
-def _stream(name: str, rate: StreamRate, evidence: Evidence) -> Finding:
+def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
+    """What is wrong with a message's rate, and what to do about it."""
     asked, achieved = rate.asked, rate.achieved
-    found, mend = f"{name} arrives at {achieved:.0f} Hz, as asked ({asked:g} Hz)", ""
-    countable = asked * evidence.window >= _COUNTABLE
-    reached = achieved >= _REACHED * asked if countable else evidence.received[name] > 0
     if rate.refusal:
-        found, reached = f"{name} is refused ({rate.refusal})", False
-        mend = "a newer version of the autopilot may send it"
-    elif rate.granted < _REACHED * asked:
-        found, reached = f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz", False
-        mend = "ask for less, or let the autopilot's loop run faster"
-    elif not reached:
-        found = f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz"
-        mend = "raise the link's speed, or ask for less, so that nothing has to wait"
-    if reached:
-        return Finding(f"{Key.STREAMS}.{name}", SAFE, found, source="counted")
-    because = "what hangs on it works late or not at all"
-    return Finding(f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, mend, "counted")
+        return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
+    if rate.granted < _REACHED * asked:
+        return (
+            f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
+            "ask for less, or let the autopilot's loop run faster",
+        )
+    countable = asked * evidence.window >= _COUNTABLE
+    if achieved >= _REACHED * asked if countable else evidence.received[name] > 0:
+        return None
+    return (
+        f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
+        "raise the link's speed, or ask for less, so that nothing has to wait",
+    )
 
 
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -51,7 +51,7 @@ def _finding(found: ParameterFinding, name: str) -> Finding:
         found.rule.name,
         found.verdict,
         f"{name} is {found.value:g}",
-        found.because,
+        found.because or found.rule.meaning,
         mend,
         found.rule.source,
         change,
