@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import nan, radians
 
+from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.commander import Commander
@@ -67,7 +68,8 @@ class FaultEffects:
         """Whether a message is not streamed at present."""
         if not self._stopped:
             return False
-        name = dialect.mavlink_map[message_id].msgname
+        kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
+        name = kind.msgname
         return any(not fault.messages or name in fault.messages for fault in self._stopped)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:

@@ -44,10 +44,14 @@ def doctor(options: argparse.Namespace) -> int:
     undo = None if options.undo is None else load_yaml(options.undo, Undo)
     run: Callable[..., int] = lockstep.run if config.link.lockstep else link_loop.run
     visit = _Visit(config, Console(stderr=options.json, highlight=False))
-    if undo is None:
-        code = run(visit.examine(options.wait, fix=options.fix, unasked=options.yes))
-    else:
-        code = run(visit.restore(undo, options.undo))
+    try:
+        if undo is None:
+            code = run(visit.examine(options.wait, fix=options.fix, unasked=options.yes))
+        else:
+            code = run(visit.restore(undo, options.undo))
+    except KeyboardInterrupt:
+        visit.say("Interrupted; every parameter that was set is told above.")
+        return EXIT_FLIGHT
     if options.json:
         print(json.dumps(visit.result, ensure_ascii=False, allow_nan=False))
     return code
@@ -72,7 +76,7 @@ class _Visit:
         """Look, tell, and mend if asked to; what is found after that decides the exit code."""
         config = self._config
         async with patient(config, link_settings(config)) as vehicle:
-            self._say(f"Asking the vehicle on {config.link.endpoint} …")
+            self.say(f"Asking the vehicle on {config.link.endpoint} …")
             findings = await vehicle.met()
             if findings:
                 return self._told(findings)
@@ -105,7 +109,7 @@ class _Visit:
         link, config = vehicle.link, self._config
         proposed = [finding for finding in findings if finding.change is not None]
         if not proposed:
-            self._say("No parameter is to be set.")
+            self.say("No parameter is to be set.")
             return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
         require_disarmed(link)
         undo = UndoFile(config.recording.directory, link, evidence.identity or Identity())
@@ -113,7 +117,7 @@ class _Visit:
             await mend(link, proposed, _agree if unasked else self._ask, undo, self._note)
         finally:
             if undo.path.exists():
-                self._say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
+                self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.family.parameters))
         code = self._told(examine(config, evidence))
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
@@ -123,7 +127,7 @@ class _Visit:
     async def _ask(self, finding: Finding) -> Answer:
         change = finding.change
         assert change is not None
-        self._say(f"{finding.verdict.value}: {finding.sentence()}")
+        self.say(f"{finding.verdict.value}: {finding.sentence()}")
         while True:
             self._console.print(
                 f"Set {change.parameter} from {change.old:g} to {change.new:g}? "
@@ -144,9 +148,10 @@ class _Visit:
 
     def _note(self, outcome: Outcome) -> None:
         self._outcomes.append(outcome)
-        self._say(outcome_line(outcome))
+        self.say(outcome_line(outcome))
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Tell a person."""
         self._console.print(text, markup=False, soft_wrap=True)
 
 

@@ -49,7 +49,9 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
             )
         else:
             good.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
-    yield Finding(Key.STREAMS, SAFE, f"telemetry arrives, Hz: {', '.join(good)}", source="counted")
+    if good:
+        found = f"telemetry arrives, Hz: {', '.join(good)}"
+        yield Finding(Key.STREAMS, SAFE, found, source="counted")
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:

@@ -47,11 +47,9 @@ def _table(
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     forbidden, amiss = forbidding(config, findings), len(unsafe(findings))
     if forbidden:
-        return Text(
-            f"{len(forbidden)} unsafe: `companion fly` refuses; `companion doctor --fix` sets what "
-            "parameters can mend",
-            style="bold red",
-        )
+        mendable = sum(finding.change is not None for finding in forbidden)
+        fix = f"; `companion doctor --fix` mends {mendable} of them" if mendable else ""
+        return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
     if amiss:
         return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
     return Text("nothing unsafe was found", style="bold green")

@@ -1,0 +1,201 @@
+"""`companion doctor`, as a user calls it: on vehicles good and bad, silent and strange."""
+
+import json
+import os
+import pty
+import socket
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.cli import main
+from companion.mavlink import lockstep
+from tests.doctor.patients import FAMILIES, config_file, configured, met, shipped_vehicle
+from tests.flight.fly import free_port
+from tests.mavlink.fakes import frames_of
+
+WRONG = {
+    "px4": {"COM_OF_LOSS_T": 5.0, "COM_OBL_RC_ACT": 7, "CBRK_SUPPLY_CHK": 894281},
+    "ardupilot": {"GUID_OPTIONS": 1, "ATC_ANGLE_BOOST": 1, "FS_THR_ENABLE": 0},
+}
+MENDED = {
+    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 5.0, "CBRK_SUPPLY_CHK": 0.0},
+    "ardupilot": {"GUID_OPTIONS": 9.0, "ATC_ANGLE_BOOST": 0.0, "FS_THR_ENABLE": 1.0},
+}
+PLANE, PX4 = 1, 12
+
+
+def doctor(capsys, *arguments):
+    try:
+        code = main(["doctor", *map(str, arguments)])
+    except SystemExit as exit_:  # argparse's own way
+        code = exit_.code
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    return code, captured.out, " ".join(captured.err.split())
+
+
+def found(out):
+    """The JSON object, and the verdicts by key of what is not safe."""
+    told = json.loads(out)
+    keys = {f["key"]: f["verdict"] for f in told["findings"] if f["verdict"] != "safe"}
+    return told, keys
+
+
+def held(folder, mock, names):
+    """What the vehicle holds now."""
+
+    async def scene():
+        async with met(configured(folder, mock)) as vehicle:
+            return {name: float(await vehicle.link.read_parameter(name)) for name in names}
+
+    return lockstep.run(scene())
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_it_finds_mends_and_undoes(capsys, tmp_path, family):
+    wrong = {name: float(value) for name, value in WRONG[family].items()}
+    with shipped_vehicle(tmp_path, family, parameters=WRONG[family]) as mock:
+        config = config_file(tmp_path, mock)
+        code, out, _ = doctor(capsys, "--config", config, "--fix", "--yes", "--json")
+        told, keys = found(out)
+        assert (code, told["result"], keys) == (0, "ok", {})
+        changes = {c["parameter"]: (c["old"], c["new"], c["refusal"]) for c in told["changes"]}
+        assert changes == {n: (wrong[n], MENDED[family][n], None) for n in wrong}
+        assert held(tmp_path, mock, wrong) == MENDED[family]
+        undo = yaml.safe_load(Path(told["undo"]).read_text())
+        assert undo["parameters"] == wrong
+        code, out, _ = doctor(capsys, "--config", config, "--undo", told["undo"], "--json")
+        assert (code, len(json.loads(out)["changes"])) == (0, len(wrong))
+        assert held(tmp_path, mock, wrong) == wrong
+        code, out, _ = doctor(capsys, "--config", config, "--json")
+        told, keys = found(out)
+        assert (code, told["result"], set(keys)) == (1, "unsafe", set(wrong))
+        accept = [key for key, verdict in keys.items() if verdict == "unsafe"]
+        config = config_file(tmp_path, mock, flight={"accept": accept})
+        code, out, _ = doctor(capsys, "--config", config)
+        assert code == 0
+        assert "excepted by flight.accept" in " ".join(out.split())
+        undo["system"] = 7
+        (tmp_path / "other.yaml").write_text(yaml.safe_dump(undo))
+        code, _, err = doctor(capsys, "--config", config, "--undo", tmp_path / "other.yaml")
+        assert code == 2
+        assert "is of another vehicle (" in err
+        assert held(tmp_path, mock, wrong) == wrong
+
+
+def test_it_asks_on_a_terminal(capsys, tmp_path, monkeypatch):
+    """Some nonsense first, then yes to one of two, then no more."""
+    ours, theirs = pty.openpty()
+    os.write(ours, b"what?\ny\nq\n")
+    with (
+        os.fdopen(theirs) as terminal,
+        shipped_vehicle(
+            tmp_path, "px4", parameters={"COM_OF_LOSS_T": 5.0, "COM_OBL_RC_ACT": 7}
+        ) as mock,
+    ):
+        monkeypatch.setattr(sys, "stdin", terminal)
+        code, out, _ = doctor(capsys, "--config", config_file(tmp_path, mock), "--fix")
+        values = held(tmp_path, mock, ("COM_OF_LOSS_T", "COM_OBL_RC_ACT"))
+    os.close(ours)
+    assert (code, values) == (1, {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 7.0})
+    assert out.count("Set COM_OF_LOSS_T from 5 to 1? [y]es, [n]o, [a]ll, [q]uit") == 2
+    assert "COM_OF_LOSS_T: 5 → 1, read back" in out
+    assert "Undo with: companion doctor --config FILE --undo" in out
+
+
+class Neighbour(threading.Thread):
+    """Says the same to a port until its block ends."""
+
+    def __init__(self, port, *messages):
+        super().__init__(daemon=True)
+        self._frames, self._to = frames_of(*messages), ("127.0.0.1", port)
+        self._over = threading.Event()
+
+    def run(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while not self._over.wait(0.05):
+                for frame in self._frames:
+                    sender.sendto(frame, self._to)
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self._over.set()
+        self.join()
+
+
+def far_away(folder, port, **changes):
+    path = folder / "my.yaml"
+    link = {"endpoint": f"udpin://127.0.0.1:{port}", **changes}
+    path.write_text(yaml.safe_dump({"link": link, "flight": {"connect_timeout_s": 0.5}}))
+    return path
+
+
+def beat(kind=2, autopilot=PX4):
+    return dialect.MAVLink_heartbeat_message(kind, autopilot, 29, 0, 3, 3)
+
+
+def test_a_vehicle_that_cannot_be_flown_and_one_that_is_not_there_are_findings(capsys, tmp_path):
+    port = free_port()
+    config = far_away(tmp_path, port)
+    for message, words in (
+        (beat(kind=PLANE), "(MAV_TYPE 1) is no multirotor"),
+        (beat(autopilot=18), "(MAV_AUTOPILOT 18) is not supported; this version flies PX4"),
+    ):
+        with Neighbour(port, message):
+            code, out, _ = doctor(capsys, "--config", config, "--json")
+        told, keys = found(out)
+        assert (code, keys) == (1, {"vehicle.supported": "unsafe"})
+        (finding,) = told["findings"]
+        assert words in f"{finding['found']}; {finding['mend']}"
+    code, out, _ = doctor(capsys, "--config", config, "--json")
+    told, keys = found(out)
+    assert (code, keys) == (1, {"vehicle.heartbeat": "unsafe"})
+    assert told["findings"][0]["found"].startswith("no heartbeat from system 1 within 0.5 s")
+
+
+def test_a_vehicle_that_does_not_sign_is_told_as_that(capsys, tmp_path):
+    (tmp_path / "key").write_text("passphrase\n")
+    port = free_port()
+    config = far_away(tmp_path, port, signing_key_file=str(tmp_path / "key"))
+    with Neighbour(port, beat()):
+        code, out, _ = doctor(capsys, "--config", config, "--json")
+    told, keys = found(out)
+    assert (code, keys) == (1, {"vehicle.heartbeat": "unsafe", "link.signing": "ineffective"})
+    assert "does not sign its frames" in told["findings"][1]["found"]
+
+
+def test_a_vehicle_that_answers_nothing_is_one_sentence(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("companion.mavlink.streams._RETRIES", 0)
+    monkeypatch.setattr("companion.mavlink.streams._TIMEOUT_S", 0.1)
+    port = free_port()
+    with Neighbour(port, beat()):
+        code, _, err = doctor(capsys, "--config", far_away(tmp_path, port))
+    assert code == 1
+    assert "MAV_CMD_SET_MESSAGE_INTERVAL: no answer" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--yes",), "goes with it alone"),
+        (("--fix",), "standard input is no terminal; add --yes"),
+        (("--fix", "--undo", "x.yaml"), "not allowed with"),
+        (("--undo", "/not/there.yaml"), "/not/there.yaml"),
+        (("--wait", "-1"), "above 0"),
+    ],
+)
+def test_wrong_usage_is_told(capsys, tmp_path, monkeypatch, arguments, words):
+    config = far_away(tmp_path, free_port())
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        code, _, err = doctor(capsys, "--config", config, *arguments)
+    assert code == 2
+    assert words in err

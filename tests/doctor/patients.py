@@ -1,0 +1,64 @@
+"""Mock vehicles at the doctor's, set up as the shipped configurations of the two say."""
+
+import asyncio
+from contextlib import asynccontextmanager, contextmanager
+
+import yaml
+
+from companion.config_file import load
+from companion.doctor.consultation import patient
+from companion.flight.assembly import link_settings
+from companion.mavlink.parameter_rules import Verdict
+from tests.flight.fly import CONFIGS, merged, mock_vehicle
+
+FAMILIES = ("px4", "ardupilot")
+
+
+@contextmanager
+def shipped_vehicle(folder, family, **settings):
+    """The vehicle of configs/mock-FAMILY.yaml, in lockstep and soon ready to be armed."""
+    mock = yaml.safe_load((CONFIGS / f"mock-{family}.yaml").read_text())["mock"]
+    settings = merged({"parameters": mock["parameters"]}, settings)
+    with mock_vehicle(folder, autopilot=family, **settings) as vehicle:
+        yield vehicle
+
+
+def config_file(folder, mock, **changes):
+    """configs/mock-FAMILY.yaml with the vehicle's place and other changes."""
+    data = yaml.safe_load((CONFIGS / f"mock-{mock.autopilot}.yaml").read_text())
+    del data["mock"]
+    data["include"] = str(CONFIGS / data["include"])
+    places = {
+        "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep},
+        "recording": {"directory": str(folder / "flights")},
+    }
+    path = folder / "my.yaml"
+    path.write_text(yaml.safe_dump(merged(merged(data, places), changes)))
+    return path
+
+
+@asynccontextmanager
+async def met(config):
+    """A vehicle that was heard."""
+    async with patient(config, link_settings(config)) as vehicle:
+        assert await vehicle.met() == []
+        yield vehicle
+
+
+def configured(folder, mock, **changes):
+    return load(config_file(folder, mock, **changes))
+
+
+def amiss(findings):
+    """Verdict by key of all that is not safe."""
+    return {
+        str(finding.key): finding.verdict
+        for finding in findings
+        if finding.verdict is not Verdict.SAFE
+    }
+
+
+async def until(condition, seconds=10.0):
+    async with asyncio.timeout(seconds):
+        while not condition():  # noqa: ASYNC110 - of either side
+            await asyncio.sleep(0.02)

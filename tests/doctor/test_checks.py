@@ -1,0 +1,226 @@
+"""Each check by itself, on evidence made up: what it finds, and where it begins to."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from companion.config import Config
+from companion.config_file import changed
+from companion.doctor import configuration_checks, link_checks, vehicle_checks
+from companion.doctor.evidence import Company, Evidence, Identity, LinkQuality, SampleTimes
+from companion.doctor.examination import examine, forbidding
+from companion.doctor.finding import Key
+from companion.doctor.parameter_findings import parameters
+from companion.mavlink.families import family_for
+from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.parameter_survey import Survey
+from companion.mavlink.readiness import Readiness
+from companion.mavlink.streams import StreamRate
+from tests.doctor.patients import amiss
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+PX4, ARDUPILOT = family_for(12, 2), family_for(3, 2)
+QUALITY = LinkQuality(1000, 0, 0, 0, 0, 0.004, 0.001)
+READY = Readiness(prearm_good=True, estimator_flags=0x3FF, position=True, home=True)
+ATTITUDE_TARGET_CAPABILITY = 64
+
+
+def state(**changes):
+    """As much of a VehicleState as the checks look at."""
+    told = {
+        "armed": False,
+        "failsafe": False,
+        "battery_remaining": 0.9,
+        "readiness": READY,
+        "estimator": SimpleNamespace(flags=0x3FF),
+    }
+    return SimpleNamespace(**told | changes)
+
+
+GOOD = Evidence(
+    family=PX4,
+    state=state(),
+    survey=Survey({"COM_OF_LOSS_T": 1.0}, {"COM_OF_LOSS_T": "COM_OF_LOSS_T"}),
+    streams={
+        "ATTITUDE_QUATERNION": StreamRate(250.0, 250.0, 197.0),
+        "LOCAL_POSITION_NED": StreamRate(50.0, 50.0, 50.0),
+        "HOME_POSITION": StreamRate(1.0, 1.0, 0.0),
+    },
+    received={"ATTITUDE_QUATERNION": 900, "LOCAL_POSITION_NED": 200, "HOME_POSITION": 1},
+    window=1.0,
+    link=QUALITY,
+    samples=SampleTimes(200, 0.006, 0, 1.0001),
+    company=Company(),
+    resets=0,
+    identity=Identity("1.18.0", ATTITUDE_TARGET_CAPABILITY, "00ab"),
+)
+CONFIG = changed(Config(), {"vehicle": {"lag_ms": 47.0, "dead_time_ms": 40.0}}, "test")
+
+
+def found(check, evidence=GOOD, config=CONFIG):
+    return amiss(check(config, evidence))
+
+
+def test_nothing_is_amiss_with_good_evidence():
+    """PX4's 197 Hz of 250 asked and a message of 1 Hz that did not come this second included."""
+    assert amiss(examine(CONFIG, GOOD)) == {}
+
+
+@pytest.mark.parametrize(
+    ("quality", "key", "verdict"),
+    [
+        ({"lost": 15}, None, None),
+        ({"lost": 30}, Key.LOSS, INEFFECTIVE),
+        ({"lost": 400}, Key.LOSS, UNSAFE),
+        ({"damaged": 9}, None, None),
+        ({"damaged": 11}, Key.DAMAGE, INEFFECTIVE),
+        ({"not_finite": 1}, Key.NOT_FINITE, INEFFECTIVE),
+        ({"reconnects": 1}, Key.RECONNECTS, UNSAFE),
+        ({"frames": 0}, None, None),
+    ],
+)
+def test_what_is_lost_on_the_way(quality, key, verdict):
+    evidence = replace(GOOD, link=QUALITY._replace(**quality))
+    assert found(link_checks.losses, evidence) == ({key: verdict} if key else {})
+
+
+@pytest.mark.parametrize(
+    ("quality", "pause", "expected"),
+    [
+        ({"round_trip": 0.099}, 0.099, {}),
+        ({"round_trip": 0.101}, 0.0, {Key.ROUND_TRIP: UNSAFE}),
+        ({"round_trip": None, "jitter": None}, 0.0, {Key.ROUND_TRIP: INEFFECTIVE}),
+        ({"jitter": 0.051}, 0.0, {Key.JITTER: INEFFECTIVE}),
+        ({}, 0.101, {Key.PAUSES: INEFFECTIVE}),
+    ],
+)
+def test_what_comes_late(quality, pause, expected):
+    """The limit is deadman.telemetry_stale_ms, 100 ms; jitter may take half of it."""
+    samples = GOOD.samples._replace(longest_pause=pause)
+    evidence = replace(GOOD, link=QUALITY._replace(**quality), samples=samples)
+    assert found(link_checks.delays, evidence) == expected
+
+
+@pytest.mark.parametrize(
+    ("samples", "expected"),
+    [
+        ({"clock_rate": 1.019}, {}),
+        ({"clock_rate": 20.0}, {Key.CLOCK: INEFFECTIVE}),
+        ({"clock_rate": 0.97}, {Key.CLOCK: INEFFECTIVE}),
+        ({"heard": 9, "clock_rate": 0.5}, {}),
+        ({"not_newer": 40}, {Key.CLOCK: INEFFECTIVE}),
+        ({"not_newer": 41}, {Key.CLOCK: UNSAFE}),
+    ],
+)
+def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
+    evidence = replace(GOOD, samples=GOOD.samples._replace(**samples))
+    assert found(link_checks.clocks, evidence) == expected
+
+
+@pytest.mark.parametrize(
+    ("company", "expected"),
+    [
+        (Company(sources=frozenset({(255, 190), (1, 154)})), {}),
+        (Company(sources=frozenset({(1, 191)})), {Key.OUR_IDS: UNSAFE}),
+        (
+            Company(sources=frozenset({(1, 192)}), companions=frozenset({(1, 192)})),
+            {Key.SECOND_COMPANION: INEFFECTIVE},
+        ),
+        (Company(steering=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (Company(echo=True), {Key.OTHER_SETPOINTS: UNSAFE}),
+    ],
+)
+def test_others_on_the_link(company, expected):
+    assert found(link_checks.company, replace(GOOD, company=company)) == expected
+
+
+def test_rates_that_are_refused_cut_or_not_reached():
+    def streams(**changes):
+        return replace(GOOD, streams={**GOOD.streams, **changes})
+
+    cut = streams(ATTITUDE_QUATERNION=StreamRate(500.0, 250.0, 250.0))
+    assert found(link_checks.streams, cut) == {"link.streams.ATTITUDE_QUATERNION": INEFFECTIVE}
+    slow = streams(ATTITUDE_QUATERNION=StreamRate(250.0, 250.0, 49.0))
+    assert found(link_checks.streams, slow) == {"link.min_attitude_rate_hz": UNSAFE}
+    refused = streams(HOME_POSITION=StreamRate(1.0, 0.0, 0.0, "UNSUPPORTED"))
+    assert found(link_checks.streams, refused) == {"link.streams.HOME_POSITION": INEFFECTIVE}
+    never = replace(GOOD, received={**GOOD.received, "HOME_POSITION": 0})
+    assert found(link_checks.streams, never) == {"link.streams.HOME_POSITION": INEFFECTIVE}
+
+
+def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
+    notice = "the vehicle signs its frames and we do not; set link.signing_key_file"
+    evidence = replace(GOOD, link=QUALITY._replace(notices=(notice,)))
+    (finding,) = link_checks.signing(CONFIG, evidence)
+    assert (finding.key, finding.verdict) == (Key.SIGNING, INEFFECTIVE)
+    assert finding.mend == "set link.signing_key_file"
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"armed": True}, {Key.ARMED: UNSAFE}),
+        ({"battery_remaining": None}, {Key.BATTERY: INEFFECTIVE}),
+        ({"battery_remaining": 0.19}, {Key.BATTERY: UNSAFE}),
+        ({"failsafe": True}, {Key.FAILSAFE: UNSAFE}),
+        ({"readiness": READY._replace(home=False)}, {Key.READY: INEFFECTIVE}),
+    ],
+)
+def test_the_state_of_the_vehicle(changes, expected):
+    evidence = replace(GOOD, state=state(**changes))
+    assert amiss(examine(CONFIG, evidence)) == expected
+
+
+def test_an_estimate_that_jumps_and_an_autopilot_that_does_not_say_what_it_is():
+    assert found(vehicle_checks.estimator, replace(GOOD, resets=2)) == {
+        Key.ESTIMATOR_RESETS: INEFFECTIVE
+    }
+    for identity in (Identity(), Identity("1.0.0", 0, None)):
+        evidence = replace(GOOD, identity=identity)
+        assert found(vehicle_checks.version, evidence) == {Key.VERSION: INEFFECTIVE}
+
+
+def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
+    silent = replace(GOOD, survey=Survey({}, {}))
+    assert found(parameters, silent) == {Key.PARAMETERS: UNSAFE}
+    old = Survey({"GUID_TIMEOUT": 1.0}, {"GUID_TIMEOUT": "GUID_TIMEOUT"})
+    without = found(parameters, replace(GOOD, family=ARDUPILOT, survey=old))
+    assert without == {"GUID_OPTIONS": UNSAFE, "ATC_ANGLE_BOOST": UNSAFE}
+
+
+def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
+    old = Survey({"MAV_GCS_SYSID": 1.0, "FS_GCS_ENABLE": 1.0}, {"MAV_GCS_SYSID": "SYSID_MYGCS"})
+    old = old._replace(names={**old.names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
+    evidence = replace(GOOD, family=ARDUPILOT, survey=old)
+    (finding,) = (f for f in parameters(CONFIG, evidence) if f.key == "MAV_GCS_SYSID")
+    assert finding.change[:3] == ("SYSID_MYGCS", 1.0, 255.0)
+    assert "set SYSID_MYGCS to 255" in finding.sentence()
+
+
+@pytest.mark.parametrize(
+    ("roll", "expected"), [(0.041, {}), (0.070, {Key.DEAD_TIME: INEFFECTIVE}), (None, {})]
+)
+def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, expected):
+    for name, measured in (("2026-01-01", 0.2), ("2026-01-02", roll)):
+        (tmp_path / name).mkdir()
+        times = {"roll": measured, "pitch": None, "yaw": None}
+        (tmp_path / name / "summary.json").write_text(json.dumps({"dead_time_s": times}))
+    (tmp_path / "2026-01-03").mkdir()
+    (tmp_path / "2026-01-03" / "summary.json").write_text("[")  # cut off
+    config = changed(CONFIG, {"recording": {"directory": tmp_path}}, "test")
+    if roll is None:
+        (tmp_path / "2026-01-01" / "summary.json").unlink()
+        (finding,) = configuration_checks.dead_time(config, GOOD)
+        assert "no flight" in finding.found
+    assert found(configuration_checks.dead_time, config=config) == expected
+
+
+def test_an_exception_lets_one_finding_pass_and_no_other():
+    evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.names))
+    evidence = replace(evidence, link=QUALITY._replace(round_trip=0.5))
+    accepting = changed(CONFIG, {"flight": {"accept": ("COM_OF_LOSS_T",)}}, "test")
+    refused = [finding.key for finding in forbidding(accepting, examine(accepting, evidence))]
+    assert refused == [Key.ROUND_TRIP]
+    assert len(forbidding(CONFIG, examine(CONFIG, evidence))) == 2

@@ -1,0 +1,26 @@
+"""A flight heeds what the doctor finds: it refuses what is unsafe, unless that is excepted."""
+
+from tests.flight.fly import fly, mock_vehicle
+
+
+def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name(tmp_path):
+    told = {}
+    with mock_vehicle(tmp_path, parameters={"COM_OF_LOSS_T": 5.0}) as mock:
+        refused = fly(mock, tmp_path / "refused")
+        assert not mock.state()["armed"]
+        accepted = fly(
+            mock,
+            tmp_path / "accepted",
+            flight={"accept": ["COM_OF_LOSS_T"]},
+            hover={"duration_s": 0.5},
+        )
+    for name, summary in (("refused", refused), ("accepted", accepted)):
+        told[name] = [text for _, text in summary.events]
+    assert (refused.phase, accepted.phase, accepted.result) == ("checks", "disarm", "ok")
+    assert refused.result.startswith("COM_OF_LOSS_T is 5: when our setpoints stop")
+    assert refused.result.endswith("set COM_OF_LOSS_T to 1")
+    assert "unsafe, but excepted by flight.accept: " + refused.result in told["accepted"]
+    assert (
+        "not as it should be: COM_LOW_BAT_ACT, planner.name; `companion doctor` tells why"
+        in told["accepted"]
+    )
