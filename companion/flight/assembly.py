@@ -24,6 +24,8 @@ from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
+from companion.mavlink.transport import Tap
+from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 
@@ -45,6 +47,33 @@ def link_settings(config: Config) -> LinkSettings:
         source_component=link.source_component,
         signing=_signing(link.signing_key_file),
         lockstep=link.lockstep,
+    )
+
+
+def open_link(config: Config, tap: Tap) -> Link:
+    """The link that `link.backend` names, not open yet.
+
+    Raises:
+        SigningError: the key cannot be used.
+        EndpointError: the endpoint's notation is wrong.
+    """
+    settings = link_settings(config)
+    if config.link.backend == "mavsdk":
+        from companion.mavsdk_link.link import MavsdkLink  # noqa: PLC0415  needs the extra
+
+        return MavsdkLink(settings, tap)
+    return Link(settings, tap)
+
+
+def realtime_wishes(config: Config) -> Wishes:
+    """What to ask of the operating system."""
+    section = config.realtime
+    return Wishes(
+        fifo_priority=section.priority if section.scheduler == "fifo" else None,
+        processors=section.cpu_affinity,
+        lock_memory=section.lock_memory,
+        freeze_gc=section.freeze_gc,
+        required=section.required,
     )
 
 

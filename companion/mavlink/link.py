@@ -15,6 +15,7 @@ from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.inbox import Inbox
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
@@ -42,6 +43,7 @@ class Link:
     Args:
         settings: Where the vehicle is and who we are.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+        opener: Opens the transport.
 
     Attributes:
         stats: Counters.
@@ -53,7 +55,12 @@ class Link:
         LinkError: Lockstep is asked for on another event loop than its own.
     """
 
-    def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
+    def __init__(
+        self,
+        settings: LinkSettings,
+        tap: Tap | None = None,
+        opener: OpenTransport = open_transport,
+    ) -> None:
         endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
         self._registry = PendingRegistry()
@@ -68,7 +75,9 @@ class Link:
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(settings, outbox, router, self._registry)
-        self._connection = Connection(endpoint, self._inbox, outbox, self.stats, self._on_dropped)
+        self._connection = Connection(
+            endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
+        )
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):
