@@ -273,9 +273,7 @@ class FlightConfig(Section):
 
 
 class RealtimeConfig(Section):
-    """What is asked of the operating system, so that the loop is not kept waiting. Each is granted
-    or not, and the flight says which; docs/companion-computer.md tells how to be granted it.
-    """
+    """What is asked of the operating system: each is granted or not, and the flight says which."""
 
     scheduler: Literal["other", "fifo"] = "other"
     """other: as every program. fifo: before all of them (SCHED_FIFO), while it has work."""

@@ -190,10 +190,12 @@ class Assembled:
         )
 
 
-def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLanding) -> Assembled:
-    """Wire the rooms together over an open link."""
+def assemble(
+    config: Config, link: Link, observer: Observer, ask_landing: AskLanding, folder: Path
+) -> Assembled:
+    """Wire the rooms together over an open link; what is noted in flight waits in `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
-    trace = FlightTrace()
+    trace = FlightTrace(folder)
     thrust = hover_thrust(config)
     deadman = config.deadman
     loop = ControlLoop(

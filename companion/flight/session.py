@@ -71,7 +71,9 @@ class Session:
             TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
         ):
             async with open_link(self._config, tlog) as link:
-                self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
+                self._assembled = assemble(
+                    self._config, link, self._observer, self._ask_landing, self._folder
+                )
                 for grant in grants:
                     self._assembled.flight.note(str(grant))
                 try:
@@ -129,7 +131,12 @@ class Session:
         flight = assembled.flight
         dead_times = assembled.dead_time_watch.over_the_flight()
         guide = assembled.rig.guide
-        for surprise in (guide.learning.surprise(), guide.estimate.surprise()):
+        trace = assembled.trace
+        for surprise in (
+            guide.learning.surprise(),
+            guide.estimate.surprise(),
+            trace.surprise(),
+        ):
             if surprise is not None:
                 flight.note(surprise)
         summary = Summary(
@@ -139,7 +146,7 @@ class Session:
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={**counts, "not_recorded": tlog_dropped},
-            trace=assembled.trace,
+            trace=trace,
             events=flight.events,
             log=self._folder,
             dead_times=dead_times,
@@ -148,7 +155,7 @@ class Session:
         )
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            assembled.trace.save(self._folder)
+            trace.save(self._folder)
         except OSError as error:
             flight.note(f"{self._folder}: not everything was written: {error.strerror}")
         return summary

@@ -98,7 +98,7 @@ class Summary:
 
     def latency_us(self) -> dict[str, float]:
         """p50, p99 and max of sample in → setpoint out inside this process, µs."""
-        latencies = np.array(self.trace.latencies_ns, dtype=np.float64) / 1e3
+        latencies = self.trace.latencies_ns.rows()[:, 0] / 1e3
         if len(latencies) == 0:
             return {"p50": math.nan, "p99": math.nan, "max": math.nan}
         p50, p99 = np.percentile(latencies, (50, 99))
