@@ -102,9 +102,10 @@ def test_a_disk_that_stands_still_does_not_hold_up_the_flight(tmp_path, monkeypa
 
 
 def test_nothing_stays_on_the_disk_and_the_thread_ends(tmp_path):
+    before = set(threading.enumerate())
     series = noted(100, Spool(tmp_path))
     series.rows()
-    (thread,) = (each for each in threading.enumerate() if each.name == "spool")
+    (thread,) = (each for each in set(threading.enumerate()) - before if each.name == "spool")
     del series
     gc.collect()
     thread.join(5.0)
