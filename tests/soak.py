@@ -97,7 +97,7 @@ def flight_config(folder: Path, port: int, seconds: float) -> Path:
         "include": str(Path(__file__).parents[1] / "configs" / "vehicle-px4.yaml"),
         "link": {"endpoint": f"udpin://127.0.0.1:{port}"},
         "thrust": {"hover_thrust": 0.49},
-        "flight": {"arm": True, "programme": ["hover", "circle"], "takeoff_height_m": 3.0},
+        "flight": {"arm": True, "programme": ["hover", "circle"], "takeoff_height_m": 2.0},
         "hover": {"duration_s": 1.0},
         "circle": {"radius_m": RADIUS_M, "speed_m_s": SPEED_M_S, "laps": laps},
         "realtime": {"scheduler": "fifo"},

@@ -1,4 +1,4 @@
-"""Answers each sample by way of MAVSDK; then, told so on standard input, comes to grief."""
+"""Answers each sample by way of MAVSDK, and gets into the trouble it is told on standard input."""
 
 import asyncio
 import ctypes
@@ -10,8 +10,7 @@ from companion.mavlink import LinkSettings
 from companion.mavlink import loop as link_loop
 from companion.mavsdk_link.link import MavsdkLink
 
-FREEZES = {
-    "nothing": lambda: None,
+TROUBLES = {
     "frozen loop": lambda: time.sleep(1.0),
     # PyDLL keeps the interpreter: no other thread of Python runs meanwhile.
     "held interpreter": lambda: ctypes.PyDLL(None).usleep(900_000),
@@ -25,9 +24,8 @@ async def answer(port: int) -> None:
         link.on_attitude = lambda sample: link.send_setpoint(
             sample.time_boot_ms, BodyRates(0.1, -0.2, 0.3), 0.4
         )
-        trouble = await asyncio.to_thread(sys.stdin.readline)
-        FREEZES[trouble.strip()]()
-        await asyncio.sleep(30.0)
+        while trouble := await asyncio.to_thread(sys.stdin.readline):
+            TROUBLES[trouble.strip()]()
 
 
 if __name__ == "__main__":

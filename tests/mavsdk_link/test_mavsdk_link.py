@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
 
 import pytest
 import yaml
@@ -23,68 +22,67 @@ PROGRAM = "tests.mavsdk_link.answering_program"
 LIMIT_S = 0.3
 
 
-@contextmanager
-def answering(mock):
-    """The program, once its setpoints reach the vehicle."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", PROGRAM, str(mock.port)],
-        stdin=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        enough = mock.state()["setpoints"] + 50
-        mock.until(lambda state: state["setpoints"] > enough)
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
+class Answering:
+    """The program, and how long after something its setpoints end, in s: ours, and the mock's."""
+
+    def __init__(self, mock):
+        self.mock, self.began = mock, 0.0
+        command = [sys.executable, "-m", PROGRAM, str(mock.port)]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True)
+
+    def flows(self):
+        enough = self.mock.state()["setpoints"] + 50
+        self.mock.until(lambda state: state["setpoints"] > enough)
+        self.began = self.mock.state()["time"]
+
+    def gets_into(self, trouble):
+        self.process.stdin.write(f"{trouble}\n")
+        self.process.stdin.flush()
+
+    def ended_after(self):
+        last = self.at(0.7)["last_setpoint"]
+        assert self.at(0.85)["last_setpoint"] == last
+        return last - self.began
+
+    def at(self, seconds):
+        return self.mock.until(lambda state: state["time"] > self.began + seconds)
 
 
-def silent_since(mock, began):
-    """How long after `began` the last setpoint came, s of the vehicle's time, which is ours."""
-    last = mock.until(lambda state: state["time"] > began + 0.7)["last_setpoint"]
-    assert mock.until(lambda state: state["time"] > began + 0.85)["last_setpoint"] == last
-    return last - began
+@pytest.fixture
+def answering(tmp_path):
+    with mock_vehicle(tmp_path, in_lockstep=False, speed=1.0) as mock:
+        program = Answering(mock)
+        try:
+            yield program
+        finally:
+            program.process.kill()
+            program.process.communicate()
 
 
-@pytest.fixture(scope="module")
-def mock(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("vehicle")
-    with mock_vehicle(folder, in_lockstep=False, speed=1.0) as running:
-        yield running
+def test_setpoints_end_with_what_they_answer_whatever_the_program_does(answering):
+    """One program gets into one trouble after the other: to start one takes a second."""
+    answering.flows()
+    assert answering.mock.ask({"fault": {"kind": "stop_telemetry", "duration_s": 1.0}})["ok"]
+    assert 0.0 < answering.ended_after() < LIMIT_S
 
+    answering.flows()  # again, with the samples
+    answering.gets_into("frozen loop")
+    assert 0.0 < answering.ended_after() < LIMIT_S
 
-def test_when_telemetry_stops_setpoints_stop_and_come_again_with_it(mock):
-    with answering(mock):
-        began = mock.state()["time"]
-        assert mock.ask({"fault": {"kind": "stop_telemetry", "duration_s": 1.2}}) == {"ok": True}
-        assert 0.0 < silent_since(mock, began) < LIMIT_S
-        mock.until(lambda state: state["last_setpoint"] > began + 1.2)
-
-
-def test_when_the_event_loop_freezes_setpoints_stop(mock):
-    with answering(mock) as process:
-        began = mock.state()["time"]
-        process.stdin.write("frozen loop\n")
-        process.stdin.flush()
-        assert 0.0 < silent_since(mock, began) < LIMIT_S
-        mock.until(lambda state: state["last_setpoint"] > began + 1.0)
-        assert process.poll() is None
-
-
-def test_when_the_interpreter_is_held_the_kernel_ends_the_process(mock):
-    with answering(mock) as process:
-        began = mock.state()["time"]
-        process.stdin.write("held interpreter\n")
-        process.stdin.flush()
-        assert 0.0 < silent_since(mock, began) < LIMIT_S
-        assert process.wait(5.0) == -signal.SIGALRM
+    answering.flows()  # again, with the loop
+    answering.gets_into("held interpreter")
+    assert 0.0 < answering.ended_after() < LIMIT_S
+    assert answering.process.wait(5.0) == -signal.SIGALRM
 
 
 def test_it_flies_the_same_programme(tmp_path):
     with mock_vehicle(tmp_path, in_lockstep=False, speed=3.0) as mock:
         changes = {
-            "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "backend": "mavsdk"},
+            "link": {
+                "endpoint": f"udpin://127.0.0.1:{mock.port}",
+                "backend": "mavsdk",
+                "attitude_rate_hz": 100.0,
+            },
             "hover": {"duration_s": 1.0},
             "flight": {"takeoff_height_m": 2.0},
             "recording": {"directory": str(tmp_path / "flights")},
