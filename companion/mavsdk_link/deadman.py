@@ -33,15 +33,11 @@ class Deadman:
     Args:
         stop: Stops MAVSDK's repeating. Called in the deadman's thread, never while `sending` runs.
         set_timer: As `set_kernel_timer`.
-
-    Attributes:
-        stopped: How often it had to stop the repeating.
     """
 
     def __init__(
         self, stop: Callable[[], None], set_timer: Callable[[float], None] = set_kernel_timer
     ) -> None:
-        self.stopped = 0
         self._stop, self._set_timer = stop, set_timer
         self._lock = threading.Lock()
         self._last: float | None = None
@@ -76,4 +72,3 @@ class Deadman:
             self._stop()
             self._last = None
             self._set_timer(0.0)
-            self.stopped += 1

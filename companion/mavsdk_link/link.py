@@ -24,7 +24,8 @@ class MavsdkLink(Link):
     `Link`, for MAVSDK forwards it; so samples carry the vehicle's time, which MAVSDK's own
     telemetry does not give. What is different: MAVSDK repeats a setpoint until it is stopped, so
     `send_setpoint` has a deadman (`companion.mavsdk_link.deadman`), and MAVSDK stamps setpoints
-    with a clock of its own.
+    with a clock of its own. What the vehicle answers to MAVSDK's own questions does not come here,
+    and counts as lost in `stats`.
 
     Args:
         settings: As of `Link`.
