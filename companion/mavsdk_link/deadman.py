@@ -5,9 +5,10 @@ it is told to stop. Two things stop it when no new setpoint comes:
 
 - A thread, after `SILENCE_LIMIT_S`. An event loop that is frozen does not stop this thread: Python
   takes turns between threads every 5 ms, and a system call that blocks lets others run.
-- The kernel's timer, after `KERNEL_LIMIT_S`, for what does stop every thread of Python: an
-  extension that never gives the interpreter back. It ends the process (SIGALRM), and with it
-  MAVSDK's thread; then the autopilot's failsafe has the vehicle.
+- The kernel's timer, after `KERNEL_LIMIT_S`, for what does stop this thread: an extension that
+  never gives the interpreter back, a port that MAVSDK cannot write to, a computer that lets the
+  program wait for so long. It ends the process (SIGALRM), and with it MAVSDK's thread; then the
+  autopilot's failsafe has the vehicle.
 """
 
 import signal
