@@ -10,7 +10,7 @@ import gc
 import os
 import resource
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,6 +22,12 @@ _HOW_MEMORY = (
     "run it by docs/companion.service, or allow `memlock unlimited` to its user in "
     "/etc/security/limits.conf"
 )
+
+
+def schedule_as_usual(pid: int) -> None:
+    """Take from a process that we have begun the priority that it has from us."""
+    with suppress(ProcessLookupError):  # it has ended already
+        os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
 class RealtimeError(Exception):
@@ -111,16 +117,15 @@ def _steps(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
 
 def _take_fifo(priority: int) -> _Undo:
     before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    # What is begun from here (the recording's thread, the solver's process) must not inherit it.
-    policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    # Threads that begin from here on (recording, MAVSDK) inherit it, and must: one that is kept
+    # from the processor while it holds the interpreter would keep the loop waiting with it.
     try:
-        os.sched_setscheduler(0, policy, os.sched_param(priority))
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         raise Refused(f"this user may not; {_HOW_FIFO}") from None
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
-    # That flag stays: to clear it takes a privilege that to set it does not.
-    return lambda: os.sched_setscheduler(0, before | os.SCHED_RESET_ON_FORK, parameters)
+    return lambda: os.sched_setscheduler(0, before, parameters)
 
 
 def _run_on(processors: tuple[int, ...]) -> _Undo:

@@ -69,7 +69,7 @@ class DeadTimeWatch:
         self._due = -inf
         self._looks = 0
         self._row_counts = deque([0], maxlen=_LOOKS + 1)  # at the last looks
-        self._ages: deque[NDArray[np.float64]] = deque(maxlen=_AGES)
+        self._ages: deque[NDArray[np.float32]] = deque(maxlen=_AGES)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -111,7 +111,7 @@ class DeadTimeWatch:
         self._row_counts.append(len(self._trace.rates))
         offset = self._clock_offset()
         if offset is not None:
-            self._ages.append(rows[:, 1] + offset - rows[:, 0])
+            self._ages.append((rows[:, 1] + offset - rows[:, 0]).astype(np.float32))
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """What the rows say of one axis."""

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from companion.attitude import BodyRates, Quaternion, Target
 from companion.recording.series import Series, Spool
 
-_LOOKED_AT = 16_384
-"""So many of the newest rates are looked at in flight: 16 s at 1000 Hz."""
+_LOOKED_AT = 10_240
+"""So many of the newest rates are looked at in flight: 10 s at 1000 Hz."""
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (
