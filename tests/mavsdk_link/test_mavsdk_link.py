@@ -1,7 +1,6 @@
 """The link by way of MAVSDK, judged by the mock; MAVSDK runs in processes of its own."""
 
 import json
-import signal
 import subprocess
 import sys
 
@@ -72,11 +71,11 @@ def test_setpoints_end_with_what_they_answer_whatever_the_program_does(answering
     answering.flows()  # again, with the loop
     answering.gets_into("held interpreter")
     assert -0.1 < answering.ended_after() < LIMIT_S
-    assert answering.process.wait(5.0) == -signal.SIGALRM
+    answering.flows()  # again, with the interpreter
 
 
 def test_it_flies_the_same_programme(tmp_path):
-    with mock_vehicle(tmp_path, in_lockstep=False, speed=3.0) as mock:
+    with mock_vehicle(tmp_path, in_lockstep=False, speed=2.0) as mock:
         changes = {
             "link": {
                 "endpoint": f"udpin://127.0.0.1:{mock.port}",
@@ -86,6 +85,13 @@ def test_it_flies_the_same_programme(tmp_path):
             "hover": {"duration_s": 1.0},
             "flight": {"takeoff_height_m": 2.0},
             "recording": {"directory": str(tmp_path / "flights")},
+            # It flies in real time, on a computer that may have other things to do.
+            "deadman": {
+                "telemetry_stale_ms": 400.0,
+                "target_stale_ms": 400.0,
+                "position_stale_ms": 800.0,
+                "silence_limit_ms": 1000.0,
+            },
         }
         config = tmp_path / "fly.yaml"
         config.write_text(yaml.safe_dump(merged(QUICK_FLIGHT, changes)))
