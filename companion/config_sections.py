@@ -50,8 +50,6 @@ class LinkConfig(Section):
             raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
         if self.min_position_rate_hz > self.position_rate_hz:
             raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
-        if self.lockstep and not self.endpoint.startswith("udp"):
-            raise ValueError("lockstep is for the bundled vehicle, over a udp endpoint")
         ours, theirs = self.source_component, self.target_component
         if (self.source_system, ours) == (self.target_system, theirs):
             raise ValueError("source_system and source_component are the autopilot's own")

@@ -59,10 +59,12 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
     Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
     ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
     ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
-    counted), ``last_setpoint`` (vehicle time in s, None if none).
+    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
+    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
     """
     state, stream = autopilot.state, autopilot.stream
     now = autopilot.vehicle.truth
+    signing = autopilot.companion.signing
     touched = now.touchdown_speed == now.touchdown_speed  # not NaN
     return {
         "time": state.time_s,
@@ -81,4 +83,5 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
         "battery": autopilot.vehicle.battery.remaining,
         "setpoints": stream.received,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
+        "signing": None if signing is None else signing.counts(),
     }

@@ -284,7 +284,7 @@ class Link:
         except TimeoutError:
             raise LinkTimeout(
                 f"no lockstep beacon within {timeout_s:g} s on {self.settings.endpoint}; is the "
-                "vehicle running, in lockstep, and sending to this port?"
+                "vehicle running, in lockstep, and on the other end of this?"
             ) from None
 
 
