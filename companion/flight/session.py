@@ -41,6 +41,7 @@ class Session:
         self._observer = observer
         self._ask_landing = ask_landing
         self._assembled: Assembled | None = None
+        self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
         """Hand the vehicle back; False if there is no flight to interrupt yet."""
@@ -66,8 +67,10 @@ class Session:
             loop.call_soon_threadsafe(self._note, text)
 
         with TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog:
-            async with Link(settings, tap=tlog) as link:
+            async with Link(settings, tap=tlog, notice=self._note) as link:
                 self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
+                for text in self._early_notes:
+                    self._note(text)
                 try:
                     result = await self._run(link, self._assembled)
                 finally:
@@ -76,7 +79,9 @@ class Session:
         return self._finish(link, self._assembled, result, tlog.dropped)
 
     def _note(self, text: str) -> None:
-        if self._assembled is not None:
+        if self._assembled is None:
+            self._early_notes.append(text)
+        else:
             self._assembled.flight.note(text)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:

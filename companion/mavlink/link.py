@@ -13,7 +13,7 @@ from companion.mavlink.connection import Connection
 from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
 from companion.mavlink.family import AutopilotFamily
-from companion.mavlink.inbox import Inbox
+from companion.mavlink.inbox import Inbox, Notice
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
@@ -42,6 +42,8 @@ class Link:
     Args:
         settings: Where the vehicle is and who we are.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+        notice: Told, once each, of what keeps the two sides from understanding each other; by
+            default the log.
 
     Attributes:
         stats: Counters.
@@ -53,7 +55,9 @@ class Link:
         LinkError: Lockstep is asked for on another event loop than its own.
     """
 
-    def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
+    def __init__(
+        self, settings: LinkSettings, tap: Tap | None = None, notice: Notice = _LOG.warning
+    ) -> None:
         endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
         self._registry = PendingRegistry()
@@ -62,7 +66,7 @@ class Link:
         self.stats = LinkStats()
         texts = TextAssembler()
         self._router = router = Router(self.stats)
-        self._inbox = Inbox(settings, self.stats, router, tap)
+        self._inbox = Inbox(settings, self.stats, router, tap, notice)
         self._outbox = outbox = Outbox(settings, self.stats, tap)
         self.state = VehicleState(router, self.stats, texts, self._loop.time)
         self.timesync = TimeSync(outbox, router, self._loop.time)
@@ -282,10 +286,9 @@ class Link:
             async with asyncio.timeout(timeout_s):
                 await lockstep.first_beacon
         except TimeoutError:
-            raise LinkTimeout(
-                f"no lockstep beacon within {timeout_s:g} s on {self.settings.endpoint}; is the "
-                "vehicle running, in lockstep, and on the other end of this?"
-            ) from None
+            start = f"no lockstep beacon within {timeout_s:g} s"
+            why = f"{start} on {self.settings.endpoint}; is the vehicle running, and in lockstep?"
+            raise LinkTimeout(_refused(start, self.stats) or why) from None
 
 
 def _log_failure(task: asyncio.Task[None]) -> None:
@@ -295,13 +298,22 @@ def _log_failure(task: asyncio.Task[None]) -> None:
 
 def _why_silent(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
     start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    if stats.ignored_foreign:
-        return (
-            f"{start}, but {stats.ignored_foreign} frames from other systems or components; is "
-            "the target's system id right?"
-        )
-    if stats.bad_signature:
-        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+    refused = _refused(start, stats)
+    if refused is not None:
+        return refused
     if stats.bad_crc:
         return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
     return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"
+
+
+def _refused(start: str, stats: LinkStats) -> str | None:
+    """What came instead and was refused, `None` if nothing was."""
+    if stats.ignored_foreign:
+        source = "/".join(map(str, min(stats.foreign_sources)))
+        return (
+            f"{start}, but {stats.ignored_foreign} frames from others, such as system/component "
+            f"{source}; is link.target_system right?"
+        )
+    if stats.bad_signature:
+        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+    return None
