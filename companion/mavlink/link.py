@@ -19,6 +19,7 @@ from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.presence import send_heartbeat, send_heartbeats, synchronise
+from companion.mavlink.px4_events import EventReader
 from companion.mavlink.records import Heartbeat
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.samples import AttitudeSample
@@ -69,6 +70,7 @@ class Link:
         self._inbox = Inbox(settings, self.stats, router, tap, notice)
         self._outbox = outbox = Outbox(settings, self.stats, tap)
         self.state = VehicleState(router, self.stats, texts, self._loop.time)
+        router.subscribe_raw("EVENT", EventReader(texts, self._loop.time).take)
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(settings, outbox, router, self._registry)
