@@ -1,17 +1,17 @@
 """PX4's pilot and ground station: their sticks, their loss, and what parameters make of it."""
 
 import pytest
-from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
+from mock_rig import ACCEPTED, QUICK, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-HOLD = "Failsafe activated, entering Hold for 5 seconds\t"
+HOLD = "Failsafe activated, entering Hold for 2 seconds\t"
 
 
 class Piloted(Rig):
     """A rig with somebody at the sticks, until ``sticks`` is None."""
 
-    def __init__(self, **settings):
-        super().__init__(boot=False, prearm_delay_s=0.2, lockstep={"enabled": True}, **settings)
+    def __init__(self):
+        super().__init__(boot=False, prearm_delay_s=0.2)
         self.sticks = (0, 0, 0)
         self.setpoint = None
         self.each_tick = self._speak
@@ -25,21 +25,32 @@ class Piloted(Rig):
         if self.setpoint is not None:
             self.rates(**self.setpoint)
 
-    def take_off_to_offboard(self):
-        for name, value in (("MPC_TKO_RAMP_T", 0.3), ("COM_SPOOLUP_TIME", 0.1)):
+    def set(self, **parameters):
+        for name, value in parameters.items():
             self.autopilot.parameters.set(name, value)
-        self.autopilot.parameters.set("MPC_TKO_SPEED", 3.0)
-        self.take_off(4.0)
-        self.setpoint = {}
-        self.run(0.1)
-        assert self.offboard() == ACCEPTED
-        self.run(0.1)
+
+
+@pytest.fixture(scope="module")
+def flying():
+    rig = Piloted()
+    rig.set(**QUICK)
+    rig.take_off(9.0)
+    rig.defaults = {name: rig.autopilot.parameters[name] for name in rig.autopilot.parameters}
+    return rig
 
 
 @pytest.fixture
-def rig():
-    flying = Piloted()
-    flying.take_off_to_offboard()
+def rig(flying):
+    """In OFFBOARD with a pilot at rest; what went before is undone, but for where it is."""
+    flying.set(**flying.defaults)
+    flying.sticks, flying.setpoint = (0, 0, 0), {}
+    flying.run(0.6)  # the sticks come to rest
+    assert flying.mode(4, 3) == ACCEPTED
+    assert flying.offboard() == ACCEPTED
+    flying.run(0.1)
+    assert mode(flying) == "OFFBOARD"
+    assert not flying.state.failsafe
+    flying.received.clear()
     return flying
 
 
@@ -65,9 +76,8 @@ def test_slow_sticks_do_not_take_over(rig):
     assert mode(rig) == "OFFBOARD"
 
 
-def test_a_negative_speed_switches_the_override_off():
-    rig = Piloted(parameters={"MAN_OVERRIDE_SPD": -1.0})
-    rig.take_off_to_offboard()
+def test_a_negative_speed_switches_the_override_off(rig):
+    rig.set(MAN_OVERRIDE_SPD=-1.0)
     rig.sticks = (0, 900, 0)
     rig.run(0.5)
     assert mode(rig) == "OFFBOARD"
@@ -77,36 +87,23 @@ def test_a_negative_speed_switches_the_override_off():
     ("action", "modes"),
     [(0, ("OFFBOARD",)), (1, ("LOITER",)), (2, ("LOITER", "RTL")), (3, ("LOITER", "LAND"))],
 )
-def test_lost_sticks_hold_then_do_what_nav_rcl_act_says(action, modes):
-    rig = Piloted(parameters={"NAV_RCL_ACT": action})
-    rig.take_off_to_offboard()
+def test_lost_sticks_hold_then_do_what_nav_rcl_act_says(action, modes, rig):
+    rig.set(NAV_RCL_ACT=action, COM_FAIL_ACT_T=2.0)
     rig.sticks = None
     rig.run(0.8)
     assert mode(rig) == modes[0]
-    assert ("Manual control lost\t" in rig.texts()) is True
+    assert "Manual control lost\t" in rig.texts()
     assert (HOLD in rig.texts()) is (len(modes) > 1)
-    rig.run(5.0)
+    rig.run(2.0)
     assert mode(rig) == modes[-1]
 
 
-@pytest.mark.parametrize("parameters", [{"COM_RCL_EXCEPT": 4}, {"COM_RC_IN_MODE": 4}])
-def test_lost_sticks_may_be_of_no_matter(parameters):
-    rig = Piloted(parameters=parameters)
-    rig.take_off_to_offboard()
+@pytest.mark.parametrize("parameter", ["COM_RCL_EXCEPT", "COM_RC_IN_MODE"])
+def test_lost_sticks_may_be_of_no_matter(parameter, rig):
+    rig.set(**{parameter: 4})
     rig.sticks = None
-    rig.run(7.0)
+    rig.run(2.0)
     assert mode(rig) == "OFFBOARD"
-
-
-def test_a_pilot_who_was_never_there_is_not_missed():
-    rig = Rig()
-    rig.fly_offboard()
-    rig.run(6.0)
-    assert mode_is(rig, "OFFBOARD")
-
-
-def mode_is(rig, name):
-    return rig.state.mode.name == name
 
 
 @pytest.mark.parametrize(
@@ -120,20 +117,18 @@ def mode_is(rig, name):
         (5, "LOITER", "LOITER"),
     ],
 )
-def test_offboard_loss_with_a_pilot_and_alone(action, with_pilot, alone):
-    for piloted, expected in ((True, with_pilot), (False, alone)):
-        rig = Piloted(parameters={"COM_OBL_RC_ACT": action})
-        if not piloted:
-            rig.sticks = None
-            rig.run(1.0)
-        rig.take_off_to_offboard()
+def test_offboard_loss_with_a_pilot_and_alone(action, with_pilot, alone, rig):
+    rig.set(COM_OBL_RC_ACT=action, COM_RC_IN_MODE=1)
+    for sticks, expected in (((0, 0, 0), with_pilot), (None, alone)):
+        rig.set(COM_RC_IN_MODE=1 if sticks else 4)
+        rig.sticks = sticks
+        rig.setpoint = {}
+        rig.run(0.6)
+        assert mode(rig) == "OFFBOARD", "streaming again re-enters"
         rig.setpoint = None
         rig.run(1.2)
-        assert mode_is(rig, expected)
+        assert mode(rig) == expected
         assert rig.state.failsafe
-        rig.setpoint = {}
-        rig.run(0.1)
-        assert mode_is(rig, "OFFBOARD"), "streaming again re-enters"
 
 
 @pytest.mark.parametrize("action", [6, 7])
@@ -147,11 +142,11 @@ def test_offboard_loss_may_turn_the_motors_off(action):
 
 
 def test_a_ground_station_may_be_of_no_matter_in_offboard_and_is_never_on_landing():
-    rig = Rig(parameters={"NAV_DLL_ACT": 2, "COM_DLL_EXCEPT": 4})
+    rig = Rig(parameters={"NAV_DLL_ACT": 2, "COM_DLL_EXCEPT": 4, "COM_DL_LOSS_T": 3})
     rig.heartbeat()
     rig.fly_offboard(height=3.0)
-    rig.run(13.0)
-    assert mode_is(rig, "OFFBOARD")
+    rig.run(6.0)
+    assert mode(rig) == "OFFBOARD"
     assert "Connection to ground station lost\t" in rig.texts()
     assert rig.mode(4, 3) == ACCEPTED
     rig.each_tick = None
