@@ -23,7 +23,17 @@ QUICK_MOCK = {
     "prearm_delay_s": 0.2,
     "speed": 20.0,
     "lockstep": {"patience_s": 0.5},
-    "parameters": {"MPC_TKO_RAMP_T": 0.3, "COM_SPOOLUP_TIME": 0.1, "MPC_TKO_SPEED": 3.0},
+    "parameters": {
+        "MPC_TKO_RAMP_T": 0.3,
+        "COM_SPOOLUP_TIME": 0.1,
+        "MPC_TKO_SPEED": 3.0,
+        "MPC_LAND_SPEED": 3.0,
+        "MPC_LAND_CRWL": 1.5,
+        "MPC_LAND_ALT1": 2.0,
+        "MPC_LAND_ALT2": 1.0,
+        "MPC_Z_V_AUTO_DN": 3.0,
+        "COM_DISARM_LAND": 0.2,
+    },
 }
 QUICK_FLIGHT = {
     "flight": {"arm": True, "takeoff_height_m": 3.0, "programme": ["hover"]},
