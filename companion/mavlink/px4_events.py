@@ -14,7 +14,7 @@ from companion.mavlink.texts import TextAssembler
 _EVENT = struct.Struct("<IIHBBB40s")  # id, time, sequence, destination, log levels, arguments
 _AUTOPILOT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
-_INFO, _WARNING, _FOR_PROGRAMS = 6, 4, 8
+_WARNING, _FOR_PROGRAMS = 4, 8
 
 _REASONS = {
     1: "stick gesture",
@@ -108,9 +108,6 @@ _EVENTS = {
 }
 
 _CHECKS = {
-    "check_modes_offboard_signal": "No offboard signal",
-    "check_modes_offboard_no_signal": "No offboard signal",
-    "check_modes_offboard_signal_lost": "Offboard signal lost",
     "check_modes_attitude": "No valid attitude estimate",
     "check_modes_angular_velocity": "Angular velocity not valid",
     "check_modes_local_pos": "Navigation error: No valid position estimate",
@@ -123,6 +120,13 @@ _CHECKS = {
     "check_rc_dl_no_dllink": "No connection to the ground control station",
 }
 """What a health report names as failing."""
+
+_OUR_STREAM = (
+    "check_modes_offboard_signal",
+    "check_modes_offboard_no_signal",
+    "check_modes_offboard_signal_lost",
+)
+"""Fails whenever we do not stream, which we know."""
 
 
 def event_id(name: str) -> int:
@@ -140,6 +144,7 @@ _WORDS_BY_ID = {event_id(name): words for name, words in _EVENTS.items()} | {
 _CHECKS_BY_ID = {event_id(name): words for name, words in _CHECKS.items()} | {
     30203637: "No heading reference",
 }
+_OUR_STREAM_IDS = {event_id(name) for name in _OUR_STREAM}
 _REPORT_BEGINS = event_id("commander_arming_check_summary")
 _REPORT_ENDS = event_id("commander_health_summary")
 
@@ -148,7 +153,7 @@ class EventReader:
     """Puts events into words, beside the autopilot's texts.
 
     A health report names all that fails each time that anything changes; what it named the time
-    before is not said again, nor what is no more than a remark.
+    before is not said again, nor what is no more than a remark, nor that our stream is missing.
 
     Args:
         texts: takes the words.
@@ -178,7 +183,8 @@ class EventReader:
             self._failed_before, self._in_report = self._failing, False
         elif self._in_report:
             self._failing.add(number)
-            if number not in self._failed_before and severity <= _WARNING:
+            known = self._failed_before | _OUR_STREAM_IDS
+            if number not in known and severity <= _WARNING:
                 self._say(severity, number, _CHECKS_BY_ID.get(number))
         elif severity < _FOR_PROGRAMS:
             words = _WORDS_BY_ID.get(number)

@@ -21,7 +21,7 @@ RECORDED = [
     (17980399, 0x66, "ea070b15042a1c", "Logging to 2026-11-21/04_42_28.ulg"),
 ]
 SUMMARY, HEALTH = 27825120, 18691879
-NO_STREAM, NO_MISSION, NO_PILOT = 28241790, 17154777, 17231145
+NO_STREAM, NO_MISSION, NO_PILOT, NO_POSITION = 28241790, 17154777, 17231145, 30612409
 
 
 class Scene:
@@ -72,14 +72,17 @@ def test_failsafes_say_why_and_what():
 
 def test_a_health_report_says_what_is_new_and_no_mere_remark():
     scene = Scene()
-    scene.report((NO_STREAM, 3), (NO_MISSION, 6), (NO_PILOT, 4))
-    assert scene.said == [(3, "Offboard signal lost"), (4, "No manual control input")]
-    scene.report((NO_STREAM, 3), (NO_PILOT, 4))
+    scene.report((NO_STREAM, 3), (NO_POSITION, 3), (NO_MISSION, 6), (NO_PILOT, 4))
+    assert scene.said == [
+        (3, "Navigation error: No valid position estimate"),
+        (4, "No manual control input"),
+    ]
+    scene.report((NO_POSITION, 3), (NO_PILOT, 4))
     assert len(scene.said) == 2
     scene.report((NO_PILOT, 4))
     scene.now = 5.0
-    scene.report((NO_STREAM, 3), (NO_PILOT, 4))
-    assert scene.said[2:] == [(3, "Offboard signal lost")]
+    scene.report((NO_POSITION, 3), (NO_PILOT, 4))
+    assert scene.said[2:] == [(3, "Navigation error: No valid position estimate")]
 
 
 def test_an_unknown_event_is_named_by_its_number_once():
