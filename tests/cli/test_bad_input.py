@@ -63,7 +63,6 @@ def config(tmp_path, text):
         ),
         ("a: [", "not valid YAML"),
         ("flight: {arm: 'yes'}", "`flight.arm`"),
-        ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
         ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
         ("link: 3", "`link`"),
         ("vehicle: {dead_time_ms: true}", "`vehicle.dead_time_ms`: must not be true or false"),

@@ -155,4 +155,4 @@ def test_nothing_boots_before_the_client_is_there():
         with socket.create_connection((HOST, port), timeout=5.0) as client:
             first = decode(client.recv(4096))
             assert "HEARTBEAT" in {message.get_type() for message in first}
-            assert ask(control, {"state": True})["time"] > 0.0
+            soon(lambda: ask(control, {"state": True})["time"] > 0.0)
