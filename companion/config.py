@@ -23,6 +23,7 @@ from companion.config_sections import (
     GuidanceConfig,
     LimitsConfig,
     LinkConfig,
+    NmpcConfig,
     PlannerConfig,
     RecordingConfig,
     ThrustConfig,
@@ -44,6 +45,7 @@ class Config(Section):
     limits: LimitsConfig = LimitsConfig()
     deadman: DeadmanConfig = DeadmanConfig()
     guidance: GuidanceConfig = GuidanceConfig()
+    nmpc: NmpcConfig = NmpcConfig()
     thrust: ThrustConfig = ThrustConfig()
     flight: FlightConfig = FlightConfig()
     hover: HoverConfig = HoverConfig()

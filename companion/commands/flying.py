@@ -13,12 +13,13 @@ from typing import Any
 from companion import demo
 from companion.config import Config
 from companion.config_file import changed, load
-from companion.extras import require
+from companion.flight.outer_loop import predictive_settings
 from companion.flight.programmes import programme
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
+from companion.nmpc.solvers import compile_ahead
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
 from companion.terminal import FlightConsole, TerminalObserver
@@ -51,7 +52,7 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     # What cannot be flown is to be found out before anything is begun.
     programme(told)
     if told.guidance.kind == "nmpc":
-        require("casadi", "nmpc", "guidance.kind: nmpc")
+        compile_ahead(predictive_settings(told), told.nmpc.python)
     return told
 
 

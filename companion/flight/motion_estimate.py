@@ -6,6 +6,7 @@ from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
 from companion.guidance.horizontal import Horizontal
+from companion.guidance.slope_history import SlopeHistory
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
 from companion.nmpc import Vehicle
@@ -43,9 +44,7 @@ class MotionEstimate:
         self._observer = observer
         self._drag = drag
         self._offset = offset
-        self._slope: Horizontal = (0.0, 0.0)
-        self._north = self._east = 0.0
-        self._samples = 0
+        self._slopes = SlopeHistory()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
@@ -55,10 +54,7 @@ class MotionEstimate:
         self._q, self._body_rates = sample.q, sample.body_rates
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
-        self._slope = north, east = -2.0 * ay / cosine, 2.0 * ax / cosine
-        self._north += north
-        self._east += east
-        self._samples += 1
+        self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
         """Take a measured position and velocity; the same one twice counts once.
@@ -68,16 +64,13 @@ class MotionEstimate:
         before, self._position = self._position, position
         if before is not None and position.vehicle_time == before.vehicle_time:
             return
-        slope = self._slope
-        if self._samples:
-            slope = self._north / self._samples, self._east / self._samples
+        since = position.vehicle_time if before is None else before.vehicle_time
+        slope = self._slopes.mean(since, position.vehicle_time)
         measured = VehicleMotion(position.position_ned, position.velocity_ned)
         known = self._known(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known)
         if obeyed and before is not None:
             self._learn_drag(before, position, slope)
-        self._north = self._east = 0.0
-        self._samples = 0
 
     def situation(self, now: float, ahead: float, thrust_limits: tuple[float, float]) -> Situation:
         """The vehicle now (s on our clock), and `ahead` seconds later.
@@ -94,10 +87,11 @@ class MotionEstimate:
             raise RuntimeError("guidance was asked to hold before any position came")
         time = self._vehicle_time(now, self._position)
         still = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
-        motion = self._observer.at(time, self._known(self._slope, still)) or still
-        known = self._known(self._slope, motion)
-        later = self._observer.at(time + ahead, known) or still
-        north, east = self._slope
+        slope = self._slopes.mean(self._position.vehicle_time, time)
+        motion = self._observer.at(time, self._known(slope, still)) or still
+        slope = self._slopes.mean(self._position.vehicle_time, time + ahead)
+        later = self._observer.at(time + ahead, self._known(slope, motion)) or still
+        north, east = self._slopes.newest
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self._drag.drag
         return Situation(motion, later, thrust, disturbance, drag, thrust_limits)

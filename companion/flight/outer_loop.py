@@ -116,12 +116,27 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
 
     Raises:
         ConfigError: the planner's response is too quick for the horizon's steps.
-        MissingExtraError: casadi is not installed.
+        MissingExtraError: the solver is not installed.
+    """
+    settings = predictive_settings(config)
+    return Predictive(
+        lambda report: Solver(settings, part.trajectory, report, config.nmpc.python),
+        period=settings.lead,
+        lockstep=config.link.lockstep,
+        note=note,
+    )
+
+
+def predictive_settings(config: Config) -> Settings:
+    """What predictive control is told of the vehicle.
+
+    Raises:
+        ConfigError: the planner's response is too quick for the horizon's steps.
     """
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     period = 1.0 / config.guidance.rate_hz
     try:
-        settings = Settings(
+        return Settings(
             gain=config.planner.gain_per_s,
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
@@ -133,18 +148,13 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
             min_thrust=min_thrust,
             max_thrust=max_thrust,
             lead=period,
+            solver=config.nmpc.solver,
             deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
         )
     except ValueError as error:
         raise ConfigError(
             f"guidance.kind: nmpc cannot be had with this vehicle: {error}"
         ) from error
-    return Predictive(
-        lambda report: Solver(settings, part.trajectory, report),
-        period=period,
-        lockstep=config.link.lockstep,
-        note=note,
-    )
 
 
 def _identifies(config: Config) -> bool:

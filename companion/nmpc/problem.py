@@ -1,31 +1,20 @@
-"""The solver of one model's problem: CasADi's SQP with HPIPM for its quadratic programs."""
+"""One model's problem, planned again and again from the plan before."""
 
 from collections.abc import Sequence
 from time import thread_time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from companion.nmpc.model import Given, Motion
+from companion.nmpc.backend import Backend
+from companion.nmpc.casadi_backend import CasadiBackend
+from companion.nmpc.model import Given, Model, Motion
 from companion.nmpc.models import make_model
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
-from companion.nmpc.transcription import Program, parameters_of, transcribe
+from companion.nmpc.transcription import parameters_of
 from companion.nmpc.warm_start import Floats, moved_on, on_reference
-
-_LIMITED = "SOLVER_RET_LIMITED"
-_SQP: dict[str, Any] = {
-    "qpsol": "hpipm",
-    "tol_pr": 1e-6,
-    "tol_du": 1e-3,
-    "error_on_fail": False,
-    "print_header": False,
-    "print_iteration": False,
-    "print_status": False,
-    "print_time": False,
-    "show_eval_warnings": False,  # what is not finite is refused; nobody reads our output
-}
 
 
 class Plan(NamedTuple):
@@ -64,13 +53,13 @@ class Problem:
 
     Raises:
         ValueError: there is no model of that name.
+        BuildError: acados' solver cannot be compiled.
     """
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._model = make_model(settings)
-        self._program = transcribe(self._model, settings)
-        self._solver = _solver(self._program, settings.iterations)
+        self._backend = _backend(self._model, settings)
         inputs = [self._model.state, self._model.control, self._model.given]
         self._target = ca.Function("target", inputs, [self._model.target])
         self._plan: Floats | None = None
@@ -89,37 +78,25 @@ class Problem:
             nodes: the reference at the ends of the steps: one more than these.
             given: what is the same over the horizon.
         """
-        model, program = self._model, self._program
+        model = self._model
         start = np.array(model.state_of(motion))
         guess = self._guess(time, nodes)
-        for values in (guess, program.lower, program.upper):
-            values[: len(start)] = start
+        guess[: len(start)] = start
         parameters = parameters_of(given, nodes, [model.aim_of(node) for node in nodes])
         if not (np.isfinite(start).all() and np.isfinite(parameters).all()):
             self.forget()
             return _NO_PLAN
         began = thread_time()
-        found = self._solver(
-            x0=guess,
-            p=parameters,
-            lbx=program.lower,
-            ubx=program.upper,
-            lbg=program.g_lower,
-            ubg=program.g_upper,
-        )
+        found = self._backend.solve(guess, parameters)
         seconds = thread_time() - began
-        plan = np.asarray(found["x"], dtype=np.float64).ravel()
-        stats = self._solver.stats()
-        converged = bool(stats["success"])
-        solved = converged or stats["unified_return_status"] == _LIMITED
-        if not (solved and np.isfinite(plan).all()):
+        if not (found.solved and np.isfinite(found.plan).all()):
             self.forget()
             return _NO_PLAN
-        self._plan, self._time = plan, time
+        plan = self._plan = found.plan
+        self._time = time
         control = plan[len(start) : len(start) + model.control.numel()]
         target = np.asarray(self._target(start, control, list(given)), dtype=np.float64).ravel()
-        iterations = int(stats["iter_count"])
-        return Plan(True, converged, iterations, seconds, *(float(v) for v in target))
+        return Plan(True, found.converged, found.iterations, seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         if self._plan is None or not time >= self._time:
@@ -127,36 +104,10 @@ class Problem:
         return moved_on(self._model, self._plan, (time - self._time) / self._settings.step)
 
 
-def _solver(program: Program, iterations: int) -> ca.Function:
-    """`sqpmethod` with the Hessian of Gauss and Newton; the step of a single iteration is whole."""
-    jacobian = ca.jacobian(program.residual, program.unknown)
-    factor = ca.SX.sym("lam_f")
-    multipliers = ca.SX.sym("lam_g", program.constraints.numel())
-    hessian = ca.Function(
-        "gauss_newton",
-        [program.unknown, program.parameters, factor, multipliers],
-        [factor * ca.mtimes(jacobian.T, jacobian)],
-        ["x", "p", "lam_f", "lam_g"],
-        ["hess_gamma_x_x"],
-    )
-    single = iterations == 1
-    options = {
-        "hess_lag": hessian,
-        "max_iter": iterations,
-        "max_iter_ls": 0 if single else 10,  # of the search along the line, in every iteration
-        "qpsol_options": {
-            # What is solved once need not be solved to the last digit, which takes a fifth longer.
-            "hpipm": {"mode": "speed_abs" if single else "speed"},
-            # HPIPM takes no bound for infinite, so CasADi gives it large ones: with those of its
-            # default, 1e8, rounding costs ten times as many iterations.
-            "inf": 1e4,
-            "error_on_fail": False,
-        },
-    }
-    problem = {
-        "x": program.unknown,
-        "p": program.parameters,
-        "f": 0.5 * ca.sumsqr(program.residual),
-        "g": program.constraints,
-    }
-    return ca.nlpsol("nmpc", "sqpmethod", problem, _SQP | options)
+def _backend(model: Model, settings: Settings) -> Backend:
+    """The one that the settings name."""
+    if settings.solver == "acados":
+        from companion.nmpc.acados_backend import AcadosBackend  # noqa: PLC0415  seldom installed
+
+        return AcadosBackend(model, settings)
+    return CasadiBackend(model, settings)

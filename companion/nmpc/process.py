@@ -15,13 +15,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum
 from math import hypot, isfinite, sin
+from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
 from companion.attitude.kinematics import tilt_products
-from companion.extras import require
 from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
 from companion.nmpc.settings import Settings
+from companion.nmpc.solvers import check
 from companion.trajectory.sample import Trajectory
 
 _LARGEST_MESSAGE = 4096
@@ -68,17 +69,24 @@ class Solver:
         settings: vehicle, horizon and solver.
         trajectory: what is followed; one solver follows one. It is pickled.
         report: called for each trouble, from within the method that notices it.
+        python: the interpreter of the process; None is ours.
 
     Attributes:
         alive: whether the process has not been found dead, nor closed.
         pid: of the process.
 
     Raises:
-        MissingExtraError: casadi is not installed.
+        MissingExtraError: the solver is not installed there.
     """
 
-    def __init__(self, settings: Settings, trajectory: Trajectory, report: Report) -> None:
-        require("casadi", "nmpc", "Predictive control")
+    def __init__(
+        self,
+        settings: Settings,
+        trajectory: Trajectory,
+        report: Report,
+        python: Path | None = None,
+    ) -> None:
+        check(settings.solver, python)
         self._settings = settings
         self._report = report
         self._asked: _Asked | None = None
@@ -92,7 +100,7 @@ class Solver:
             pickle.dump((settings, trajectory), told)
             told.seek(0)
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "companion.nmpc.worker", str(theirs.fileno())],
+                [python or sys.executable, "-m", "companion.nmpc.worker", str(theirs.fileno())],
                 stdin=told,
                 stdout=self._words,
                 stderr=self._words,

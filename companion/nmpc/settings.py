@@ -5,6 +5,7 @@ from math import isfinite, pi
 from typing import Literal
 
 ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion"]
+SolverName = Literal["hpipm", "acados"]
 
 
 def _check_positive(name: str, value: float) -> None:
@@ -58,6 +59,7 @@ class Settings:
         horizon: s.
         steps: of the horizon; each is one control.
         iterations: most SQP iterations of a solve; 1 is the real-time iteration.
+        solver: `hpipm` is CasADi's SQP with HPIPM, `acados` is acados' with the same.
         lead: an answer is for so long after the time of its request, s.
         deadline: an answer that takes longer is late, s.
         niceness: of the solver's process, 0 (as ours) to 19.
@@ -82,6 +84,7 @@ class Settings:
     horizon: float = 1.0
     steps: int = 20
     iterations: int = 1
+    solver: SolverName = "hpipm"
     lead: float = 0.02
     deadline: float = 0.02
     niceness: int = 5

@@ -40,11 +40,10 @@ class Program(NamedTuple):
 
 def transcribe(model: Model, settings: Settings) -> Program:
     """Write the problem of this model out over the horizon."""
-    given = model.given
-    node = ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
+    given, node = model.given, node_symbols(model)
     advance = integrator(model)
     running = ca.Function(
-        "r", [model.state, model.control, node], [_running(model, node, settings)]
+        "r", [model.state, model.control, node], [running_residual(model, node, settings)]
     )
     bounded = ca.Function("b", [model.state, model.control, given], [model.bounded])
     everywhere = ca.SX.sym("given", given.numel())
@@ -59,7 +58,7 @@ def transcribe(model: Model, settings: Settings) -> Program:
         constraints.append(advance(x, u, everywhere, settings.step) - after)
         constraints.append(bounded(x, u, everywhere))
         x = after
-    residual.append(_final(x, nodes[-1], settings))
+    residual.append(final_residual(x, nodes[-1], settings))
     return Program(
         ca.vertcat(*unknown),
         ca.vertcat(everywhere, *nodes),
@@ -78,8 +77,13 @@ def parameters_of(given: Given, nodes: Sequence[Node], aims: Sequence[Sequence[f
     return np.array(values)
 
 
-def _running(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
-    """The residual of one step."""
+def node_symbols(model: Model) -> ca.SX:
+    """(7 + k,), the reference of one node as `parameters_of` writes it: p, v, thrust, aim."""
+    return ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
+
+
+def running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
+    """What one step adds to the residual r, at the symbols of the model and of `node`."""
     weights = settings.weights
     scaled = (
         (weights.position, model.state[0:3] - node[0:3]),
@@ -94,7 +98,8 @@ def _running(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
     return residual
 
 
-def _final(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
+def final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
+    """What the end of the horizon adds to it, in the state x."""
     weights = settings.weights
     residual: ca.SX = ca.vertcat(
         sqrt(weights.final * weights.position) * (x[0:3] - node[0:3]),

@@ -66,7 +66,8 @@ class Bench:
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
         q, still = (cos(half), sin(half), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
-        self.guide.note_attitude(SimpleNamespace(q=q, body_rates=still))
+        sample = SimpleNamespace(vehicle_time=self.now, q=q, body_rates=still)
+        self.guide.note_attitude(sample)
         self.guide.step()
         return self.loop.command
 
