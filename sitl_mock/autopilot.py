@@ -103,7 +103,8 @@ class Autopilot:
 
     def handle(self, message: Message, link: Link) -> None:
         """Take one message that came on a link; answers are queued on that link."""
-        self._receiver.handle(message, link)
+        if not self.state.aborted:
+            self._receiver.handle(message, link)
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
         """Give TIMESYNC a finer clock of vehicle time than the ticks are."""
@@ -114,6 +115,9 @@ class Autopilot:
         state = self.state
         next_us = self.next_us
         self._slots += 1
+        if state.aborted:
+            state.time_us = next_us
+            return
         command = self._rules.control.command((next_us - state.time_us) / 1e6)
         vehicle = self.vehicle
         step = vehicle.step

@@ -25,6 +25,7 @@ class Link:
         self.streams = streams
         self.outbox: list[bytes] = []
         self.gcs_heard = False
+        self.heard = False
         self.tamper: Callable[[Message], None] | None = None
         self._framer = framer
 

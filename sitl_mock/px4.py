@@ -8,6 +8,7 @@ from sitl_mock.announcer import Announcer
 from sitl_mock.land_detector import LandDetector
 from sitl_mock.modes import Mode
 from sitl_mock.parameter_protocol import ParameterProtocol
+from sitl_mock.parameters import BytewiseEncoding
 from sitl_mock.personality import Event, Identity, Occasion, Parts, Rules
 from sitl_mock.px4_commander import Px4Commander
 from sitl_mock.px4_commands import Px4Commands
@@ -131,7 +132,7 @@ class Px4:
             control,
             commander,
             Px4Commands(state, commander, builders, parts.origin),
-            ParameterProtocol(parameters),
+            ParameterProtocol(parameters, BytewiseEncoding()),
             LandDetector(
                 state,
                 announce,

@@ -1,7 +1,8 @@
 """Whether PX4 may be armed, and if not, why: the first problem found, in words."""
 
-from sitl_mock.modes import PILOTED, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.parameters import ParameterTable
+from sitl_mock.px4_modes import PILOTED
 from sitl_mock.state import BatteryWarning, State
 
 _NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND})

@@ -4,7 +4,7 @@ import struct
 
 from sitl_mock.commander import ACCEPTED, TEMPORARILY_REJECTED
 from sitl_mock.link import Link
-from sitl_mock.modes import NEEDS_POSITION, PILOTED, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
@@ -12,10 +12,11 @@ from sitl_mock.px4_checks import arming_problem
 from sitl_mock.px4_failsafe import Announce, Failsafe
 from sitl_mock.px4_health import HealthReport
 from sitl_mock.px4_mode_control import Px4ModeControl
-from sitl_mock.px4_modes import custom_mode
-from sitl_mock.px4_setpoints import attitude_setpoint, position_setpoint
+from sitl_mock.px4_modes import NEEDS_POSITION, PILOTED, custom_mode
+from sitl_mock.px4_setpoints import attitude_setpoint
 from sitl_mock.px4_sticks import Sticks
 from sitl_mock.quaternion import Vector
+from sitl_mock.setpoints import position_setpoint
 from sitl_mock.state import State
 from sitl_mock.wire import Message
 

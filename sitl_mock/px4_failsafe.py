@@ -6,7 +6,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.modes import NEEDS_POSITION, PILOTED, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
@@ -22,7 +22,7 @@ from sitl_mock.px4_actions import (
     Action,
     Cause,
 )
-from sitl_mock.px4_modes import custom_mode
+from sitl_mock.px4_modes import NEEDS_POSITION, PILOTED, custom_mode
 from sitl_mock.state import BatteryWarning, State
 
 _NO_MANUAL_CONTROL = 4

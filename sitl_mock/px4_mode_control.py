@@ -12,7 +12,7 @@ from sitl_mock.position_control import (
     PositionDemand,
     PositionGains,
 )
-from sitl_mock.quaternion import Quaternion, Vector, from_yaw, yaw
+from sitl_mock.quaternion import Quaternion, Vector, along_heading, from_yaw, yaw
 from sitl_mock.setpoints import PositionSetpoint
 from sitl_mock.state import NAN, NAN_VECTOR, PositionTargetEcho, State
 from sitl_mock.vehicle import ActuatorCommand
@@ -237,8 +237,8 @@ class Px4ModeControl:
             self._yaw += setpoint.yaw_rate * dt
         velocity, acceleration = setpoint.velocity, setpoint.acceleration
         if setpoint.in_body_heading:
-            heading = from_yaw(yaw(self._state.estimate.q))
-            velocity, acceleration = _turn(heading, velocity), _turn(heading, acceleration)
+            q = self._state.estimate.q
+            velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
         return PositionDemand(
             setpoint.position,
             velocity,
@@ -294,11 +294,3 @@ class Px4ModeControl:
                 radians(parameters["MC_YAWRATE_MAX"]),
             ),
         )
-
-
-def _turn(heading: Quaternion, vector: Vector) -> Vector:
-    """Return a vector given along the heading in world axes; NaN components stay NaN."""
-    w, _, _, z = heading
-    c, s = w * w - z * z, 2.0 * w * z
-    x, y, down = vector
-    return (c * x - s * y, s * x + c * y, down)

@@ -34,6 +34,12 @@ _STANDARD_MODES = {
     Mode.TAKEOFF: dialect.MAV_STANDARD_MODE_TAKEOFF,
 }
 
+PILOTED = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
+"""Modes that need a pilot's sticks."""
+
+NEEDS_POSITION = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
+"""Modes that need a horizontal position."""
+
 MODES_BY_COMMAND: dict[tuple[int, int], Mode] = {
     numbers: mode for mode, numbers in MODE_NUMBERS.items()
 }

@@ -65,6 +65,7 @@ class Receiver:
         """
         if not link.admits(message):
             return
+        link.heard = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._for_us(message):
             handler(message, link)
