@@ -17,6 +17,7 @@ from sitl_mock.config import (
     RateLoopConfig,
     Section,
     SensorConfig,
+    SigningConfig,
     WindConfig,
 )
 from sitl_mock.config_errors import ConfigError, explain, suggestion
@@ -54,17 +55,6 @@ class LockstepConfig(Section):
     """Send the frames of a step in one datagram (PX4 sends one each); the beacon stays alone."""
     patience_s: Positive = 2.0
     """Wall time without an answer after which the vehicle runs on in paced time."""
-
-
-class SigningConfig(Section):
-    """MAVLink 2 signing, on every link of the vehicle."""
-
-    passphrase_file: Path
-    """Its first line is the passphrase; the key is its SHA-256, as ground stations make it."""
-    accept_unsigned: bool = False
-    """Obey frames without a signature, too; wrongly signed ones never."""
-    link_id: Annotated[int, Field(ge=0, le=254)] = 0
-    """Of the companion's link in our signatures; the ground station's has the next."""
 
 
 class MockSettings(Section):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.config import SigningConfig
 from sitl_mock.config_errors import ConfigError
-from sitl_mock.settings import SigningConfig
 from sitl_mock.wire import SIGNED, Message
 
 _EPOCH_UNIX_S = 1420070400

@@ -6,8 +6,8 @@ import pytest
 from mock_rig import Rig
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.config import SigningConfig
 from sitl_mock.config_errors import ConfigError
-from sitl_mock.settings import SigningConfig
 from sitl_mock.signing import Signing, key_from_passphrase, link_signing
 from sitl_mock.wire import decode
 
