@@ -52,8 +52,6 @@ class LinkConfig(Section):
             raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
         if self.min_position_rate_hz > self.position_rate_hz:
             raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
-        if self.lockstep and not self.endpoint.startswith("udp"):
-            raise ValueError("lockstep is for the bundled vehicle, over a udp endpoint")
         if self.backend == "mavsdk" and (self.lockstep or self.signing_key_file is not None):
             raise ValueError("backend: mavsdk can neither fly in lockstep nor sign; use direct")
         ours, theirs = self.source_component, self.target_component

@@ -1,203 +1,53 @@
-"""Arming, modes and what ends them: the autopilot's rules of state, by PX4's measured behaviour."""
+"""Arming, modes and what ends them: what every autopilot family's rules of state must answer."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.checks import arming_problem
-from sitl_mock.failsafe import Failsafe
-from sitl_mock.mode_control import ModeControl
-from sitl_mock.modes import NEEDS_POSITION, PILOTED, Mode
-from sitl_mock.offboard import OffboardStream
-from sitl_mock.parameters import ParameterTable
+from sitl_mock.modes import Mode
 from sitl_mock.personality import Occasion
-from sitl_mock.quaternion import Vector
-from sitl_mock.state import State
+from sitl_mock.wire import Message
 
 ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
 TEMPORARILY_REJECTED = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+DENIED = int(dialect.MAV_RESULT_DENIED)
+UNSUPPORTED = int(dialect.MAV_RESULT_UNSUPPORTED)
+FAILED = int(dialect.MAV_RESULT_FAILED)
 
 Announce = Callable[[Occasion, str], None]
-
-PREFLIGHT_MARGIN_US = 1_000_000
-"""Armed but never flown, the vehicle disarms this much after COM_DISARM_PRFLT (measured 11 s)."""
+"""Tells the outside of an occasion, with a detail."""
 
 
-class Commander:
-    """Owns ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state.
+class Commander(Protocol):
+    """Owns ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
-    Args:
-        state: the autopilot's state.
-        parameters: its parameters.
-        control: told of every mode entered.
-        stream: the offboard setpoints.
-        announce: tells the outside of an occasion, with a detail.
-        ready_us: vehicle time from which arming is possible.
-    """
+    refusal: str | None
+    """A reason given from outside why arming is refused (fault injection)."""
+    pilot: bool
+    """Whether somebody holds the sticks."""
 
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        control: ModeControl,
-        stream: OffboardStream,
-        announce: Announce,
-        *,
-        ready_us: int,
-    ) -> None:
-        self.refusal: str | None = None
-        self.pilot = False
-        self.failsafe = Failsafe(state, parameters, stream, announce, self._enter)
-        self._state = state
-        self._parameters = parameters
-        self._control = control
-        self._stream = stream
-        self._announce = announce
-        self._ready_us = ready_us
-        self._landed_since_us = 0
-        self._crashed = False
-        self._asked_takeoff_z: float | None = None
+    @property
+    def under_setpoints(self) -> bool:
+        """Whether the vehicle now flies what setpoints ask."""
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
-        state = self._state
-        if state.armed:
-            return ACCEPTED
-        problem = self.check()
-        if problem is not None and (not force or self._crashed):
-            self._announce(Occasion.ARMING_DENIED, "")
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
-            return TEMPORARILY_REJECTED
-        state.armed = True
-        state.armed_at_us = self._landed_since_us = state.time_us
-        state.flown = False
-        state.home_ned = state.estimate.position_ned
-        state.home_q = state.estimate.q
-        state.home_set_at_us = state.time_us
-        self._announce(Occasion.ARMED, "")
-        self._enter(state.mode)
-        return ACCEPTED
 
     def disarm(self, *, force: bool = False) -> int:
         """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
-        if not self._state.armed:
-            return ACCEPTED
-        if not self._state.landed and not force:
-            self._announce(Occasion.DISARM_DENIED, "")
-            return TEMPORARILY_REJECTED
-        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
-        return ACCEPTED
 
-    def request_mode(
-        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
-    ) -> int:
-        """Change the intended mode, and return a MAV_RESULT.
-
-        Disarmed, every mode is entered (arming is what fails then); armed, a mode that cannot run
-        is refused.
-
-        Args:
-            mode: the mode asked.
-            takeoff_z: where TAKEOFF ends, m down; None = MIS_TAKEOFF_ALT above home.
-            hold: where LOITER goes, NED; None = here.
-        """
-        state = self._state
-        if state.armed and not self._can_run(mode):
-            self._announce(Occasion.MODE_DENIED, mode.name.capitalize())
-            return TEMPORARILY_REJECTED
-        state.intended_mode = mode
-        self.failsafe.clear()
-        if mode is Mode.TAKEOFF:
-            self._asked_takeoff_z = takeoff_z
-        self._enter(mode, hold=hold)
-        return ACCEPTED
+    def request_mode(self, mode: Mode) -> int:
+        """Change the mode, and return a MAV_RESULT."""
 
     def take_over(self, mode: Mode) -> None:
         """Let the pilot's sticks change the mode (fault injection)."""
-        self.pilot = True
-        self._announce(Occasion.PILOT_TOOK_OVER, "")
-        self.request_mode(mode)
 
-    def check(self) -> str | None:
-        """Look for what forbids arming, note it in the state and return it."""
-        state = self._state
-        problem = arming_problem(
-            state,
-            self._parameters,
-            ready_us=self._ready_us,
-            crashed=self._crashed,
-            offboard_alive=self.offboard_alive,
-            gcs_alive=self.failsafe.gcs_alive,
-            refusal=self.refusal,
-        )
-        state.prearm_problem = problem
-        return problem
+    def heard(self, heartbeat: Message) -> None:
+        """Note the heartbeat of another system or component."""
 
-    @property
-    def offboard_alive(self) -> bool:
-        """Whether setpoints stream in often enough."""
-        return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
+    def setpoint(self, message: Message) -> None:
+        """Take a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""
 
     def step(self, *, crashed: bool) -> None:
         """Run the rules once; called at 20 Hz of vehicle time."""
-        state = self._state
-        self._crashed = crashed
-        if state.armed and crashed:
-            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
-        self.check()
-        if state.armed and state.mode in PILOTED and not self.pilot:
-            self.failsafe.pilot_lost()
-        self.failsafe.step()
-        if state.armed:
-            if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
-                if state.intended_mode is Mode.TAKEOFF:
-                    state.intended_mode = Mode.LOITER
-                self._enter(Mode.LOITER)
-            self._disarm_on_ground()
-
-    def _disarm_on_ground(self) -> None:
-        state, parameters = self._state, self._parameters
-        if not state.landed:
-            self._landed_since_us = state.time_us
-            return
-        waited = state.time_us - self._landed_since_us
-        if state.flown:
-            limit = parameters["COM_DISARM_LAND"]
-            if limit > 0 and waited >= limit * 1e6:
-                self._stop_motors(Occasion.DISARMED_BY_LANDING)
-        else:
-            limit = parameters["COM_DISARM_PRFLT"]
-            if limit > 0 and waited >= limit * 1e6 + PREFLIGHT_MARGIN_US:
-                self._stop_motors(Occasion.DISARMED_ON_GROUND)
-
-    def _stop_motors(self, occasion: Occasion) -> None:
-        state = self._state
-        state.armed = False
-        # A finished landing leaves LOITER behind (recorded); OFFBOARD by command stays OFFBOARD.
-        if state.mode in (Mode.LAND, Mode.RTL, Mode.TAKEOFF):
-            state.intended_mode = Mode.LOITER
-        self.failsafe.clear()
-        self._enter(state.intended_mode)
-        self._announce(occasion, "")
-
-    def _can_run(self, mode: Mode) -> bool:
-        if mode is Mode.OFFBOARD:
-            return self.offboard_alive
-        if mode in PILOTED and not self.pilot:
-            return False
-        return self._state.position_valid or mode not in NEEDS_POSITION
-
-    def _enter(self, mode: Mode, *, hold: Vector | None = None) -> None:
-        """Enter a mode at the present estimate, whatever the intended one is."""
-        self._state.mode = mode
-        takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
-        self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)
-
-    def _takeoff_z(self) -> float:
-        """Return where TAKEOFF ends, m down: as asked, else MIS_TAKEOFF_ALT above home."""
-        if self._asked_takeoff_z is not None:
-            return self._asked_takeoff_z
-        altitude = self._parameters["MIS_TAKEOFF_ALT"]
-        if self._state.armed:
-            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}")
-        return self._state.home_ned[2] - altitude

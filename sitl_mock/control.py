@@ -57,12 +57,15 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
     """Return what is really so: SI, NED (origin: home on the ground), FRD, q body to world.
 
     Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
+    ``aborted`` (the autopilot's process has ended: nothing moves or answers any more),
     ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
     ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
-    counted), ``last_setpoint`` (vehicle time in s, None if none).
+    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
+    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
     """
     state, stream = autopilot.state, autopilot.stream
     now = autopilot.vehicle.truth
+    signing = autopilot.companion.signing
     touched = now.touchdown_speed == now.touchdown_speed  # not NaN
     return {
         "time": state.time_s,
@@ -71,6 +74,7 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
         "intended_mode": state.intended_mode.name,
         "failsafe": state.failsafe,
         "landed": state.landed,
+        "aborted": state.aborted,
         "position": now.position_ned,
         "velocity": now.velocity_ned,
         "q": now.q,
@@ -81,4 +85,5 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
         "battery": autopilot.vehicle.battery.remaining,
         "setpoints": stream.received,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
+        "signing": None if signing is None else signing.counts(),
     }

@@ -87,6 +87,7 @@ class PilotTakeover(Timed):
 
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
+    """PX4's words; ArduCopter takes them as LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
 
 
 class EstimatorReset(Timed):

@@ -4,7 +4,7 @@ from enum import Enum, auto
 
 
 class Mode(Enum):
-    """A flight mode."""
+    """A flight mode, as its autopilot calls it: PX4's down to OFFBOARD, then ArduCopter's own."""
 
     MANUAL = auto()
     ALTCTL = auto()
@@ -15,10 +15,7 @@ class Mode(Enum):
     RTL = auto()
     LAND = auto()
     OFFBOARD = auto()
-
-
-PILOTED = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
-"""Modes that need a pilot's sticks."""
-
-NEEDS_POSITION = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
-"""Modes that need a horizontal position."""
+    STABILIZE = auto()
+    ALT_HOLD = auto()
+    GUIDED = auto()
+    BRAKE = auto()

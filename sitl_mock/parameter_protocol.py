@@ -7,10 +7,9 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.link import Link
 from sitl_mock.parameters import (
     UINT32,
+    Encoding,
     ParameterRefusedError,
     ParameterTable,
-    from_wire,
-    to_wire,
 )
 from sitl_mock.wire import Message
 
@@ -25,15 +24,18 @@ class ParameterProtocol:
 
     Args:
         parameters: the table that is read and changed.
+        encoding: the autopilot's way with them.
     """
 
-    def __init__(self, parameters: ParameterTable) -> None:
+    def __init__(self, parameters: ParameterTable, encoding: Encoding) -> None:
         self._parameters = parameters
+        self._encoding = encoding
         self._listing: dict[str, tuple[Link, int]] = {}
 
     def request_list(self, _: Message, link: Link) -> None:
         """PARAM_REQUEST_LIST: the hash, then every parameter, a few each tick."""
-        self._send_hash(link)
+        if self._encoding.hashed:
+            self._send_hash(link)
         self._listing[link.name] = (link, 0)
 
     def request_read(self, message: Message, link: Link) -> None:
@@ -41,15 +43,15 @@ class ParameterProtocol:
         index = message.param_index
         if index == _NO_INDEX:
             name = message.param_id
-            if name == HASH_NAME:
+            if name == HASH_NAME and self._encoding.hashed:
                 self._send_hash(link)
             elif name in self._parameters:
-                self._send(name, link)
+                self.send(name, link)
             else:
                 self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         try:
-            self._send(self._parameters.name_of(index), link)
+            self._send(self._parameters.name_of(index), index, link)
         except IndexError:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
@@ -62,32 +64,39 @@ class ParameterProtocol:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         try:
-            self._parameters.set(name, from_wire(message.param_value, message.param_type))
+            self._parameters.set(
+                name, self._encoding.from_wire(name, message.param_value, message.param_type)
+            )
         except ParameterRefusedError:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             return
-        self._send(name, link)
+        self.send(name, link)
 
     def step(self) -> None:
         """Send the next few parameters of every list asked for."""
         for key, (link, index) in list(self._listing.items()):
             end = min(index + _SENT_PER_TICK, len(self._parameters))
             for position in range(index, end):
-                self._send(self._parameters.name_of(position), link)
+                self._send(self._parameters.name_of(position), position, link)
             if end == len(self._parameters):
                 del self._listing[key]
             else:
                 self._listing[key] = (link, end)
 
-    def _send(self, name: str, link: Link) -> None:
-        value, kind = to_wire(self._parameters[name])
+    def send(self, name: str, link: Link) -> None:
+        """Send a parameter outside of a list."""
+        indexed = self._encoding.indexed
+        self._send(name, self._parameters.index_of(name) if indexed else _NO_INDEX_UNSIGNED, link)
+
+    def _send(self, name: str, index: int, link: Link) -> None:
+        value, kind = self._encoding.to_wire(name, self._parameters[name])
         link.send(
             dialect.MAVLink_param_value_message(
                 name.encode(),
                 value,
                 kind,
                 len(self._parameters),
-                self._parameters.index_of(name),
+                index,
             )
         )
 

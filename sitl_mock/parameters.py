@@ -3,8 +3,8 @@
 import math
 import struct
 import zlib
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -24,26 +24,78 @@ class ParameterRefusedError(Exception):
     """A value or type that the parameter cannot take."""
 
 
-def to_wire(value: int | float) -> tuple[float, int]:
-    """Return (param_value, param_type): an integer's bytes travel inside the float field."""
-    if isinstance(value, int):
-        return float(struct.unpack("<f", struct.pack("<i", value))[0]), INT32
-    return value, REAL32
+class Encoding(Protocol):
+    """How an autopilot puts parameters into messages."""
+
+    hashed: bool
+    """Whether the list begins with a hash over all values."""
+    indexed: bool
+    """Whether a parameter that was read by its name, or set, comes with its index."""
+
+    def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
+        """Return (param_value, param_type)."""
+
+    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+        """Return the value carried by a PARAM_SET.
+
+        Raises:
+            ParameterRefusedError: a type or a value that the parameter cannot have.
+        """
 
 
-def from_wire(value: float, kind: int) -> int | float:
-    """Return the value carried by a PARAM_SET.
+class BytewiseEncoding:
+    """PX4's: an integer's bytes travel inside the float field."""
 
-    Raises:
-        ParameterRefusedError: a type that PX4 does not have, or a value that is not finite.
+    hashed = True
+    indexed = True
+
+    def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
+        """Return (param_value, param_type)."""
+        if isinstance(value, int):
+            return float(struct.unpack("<f", struct.pack("<i", value))[0]), INT32
+        return value, REAL32
+
+    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+        """Return the value carried by a PARAM_SET.
+
+        Raises:
+            ParameterRefusedError: a type that PX4 does not have, or a value that is not finite.
+        """
+        if kind == INT32:
+            return int(struct.unpack("<i", struct.pack("<f", value))[0])
+        if kind == REAL32:
+            if not math.isfinite(value):
+                raise ParameterRefusedError("the value is not finite")
+            return value
+        raise ParameterRefusedError(f"parameter type {kind} is neither INT32 nor REAL32")
+
+
+class FloatEncoding:
+    """ArduPilot's: the value is the float, whatever the type; whole numbers are cut to be so.
+
+    Args:
+        types: MAV_PARAM_TYPE by name.
     """
-    if kind == INT32:
-        return int(struct.unpack("<i", struct.pack("<f", value))[0])
-    if kind == REAL32:
+
+    hashed = False
+    indexed = False
+
+    def __init__(self, types: Mapping[str, int]) -> None:
+        self._types = types
+
+    def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
+        """Return (param_value, param_type)."""
+        return float(value), self._types[name]
+
+    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+        """Return the value carried by a PARAM_SET; the type that it names is not looked at.
+
+        Raises:
+            ParameterRefusedError: the value is not finite.
+        """
         if not math.isfinite(value):
             raise ParameterRefusedError("the value is not finite")
-        return value
-    raise ParameterRefusedError(f"parameter type {kind} is neither INT32 nor REAL32")
+        return value if self._types[name] == REAL32 else int(value)
 
 
 class ParameterTable:

@@ -1,11 +1,33 @@
-"""What differs between autopilot families, as one interface: numbers, rules of the link, words."""
+"""What differs between autopilot families, as one interface.
 
-from collections.abc import Mapping
+A personality has numbers and words of its own, and puts its family's rules together (`Rules`) from
+what every vehicle has (`Parts`). Nothing else of the mock knows a family.
+"""
+
+from __future__ import annotations
+
 from enum import Enum, auto
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from sitl_mock.modes import Mode
-from sitl_mock.parameters import Parameter
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from sitl_mock.commander import Commander
+    from sitl_mock.commands import Commands
+    from sitl_mock.geodesy import Origin
+    from sitl_mock.land_detector import LandDetector
+    from sitl_mock.link import Link
+    from sitl_mock.mode_control import ModeControl
+    from sitl_mock.modes import Mode
+    from sitl_mock.offboard import OffboardStream
+    from sitl_mock.parameter_protocol import ParameterProtocol
+    from sitl_mock.parameters import ParameterTable
+    from sitl_mock.settings import MockSettings
+    from sitl_mock.state import State
+    from sitl_mock.streams import StreamSchedule
+    from sitl_mock.telemetry import Builder
+    from sitl_mock.vehicle import Vehicle
+    from sitl_mock.wire import Message
 
 
 class Occasion(Enum):
@@ -23,9 +45,13 @@ class Occasion(Enum):
     DEFAULT_TAKEOFF_ALTITUDE = auto()
     TAKEOFF_DETECTED = auto()
     LANDING_DETECTED = auto()
-    OFFBOARD_LOST = auto()
-    OFFBOARD_REGAINED = auto()
+    DISARMED_BY_FAILSAFE = auto()
+    FAILSAFE = auto()
+    FAILSAFE_UNNAMED = auto()
+    FAILSAFE_HOLD = auto()
+    FAILSAFE_WARNING = auto()
     GCS_LOST = auto()
+    GCS_REGAINED = auto()
     COMPANION_LOST = auto()
     COMPANION_REGAINED = auto()
     POSITION_LOST = auto()
@@ -40,13 +66,15 @@ class Event(NamedTuple):
     """How an autopilot tells of an occasion: words for a ground station, an id for machines.
 
     ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = words
-    only; ``arguments`` are the event's bytes.
+    only; ``arguments`` are the event's bytes; ``internal`` is its severity in the vehicle's own
+    log, None = the same.
     """
 
     text: str
     severity: int
     event_id: int = 0
     arguments: bytes = b""
+    internal: int | None = None
 
 
 class Identity(NamedTuple):
@@ -59,31 +87,56 @@ class Identity(NamedTuple):
     flight_custom_version: tuple[int, ...]
 
 
+class Parts(NamedTuple):
+    """What every vehicle has, whatever its autopilot."""
+
+    state: State
+    parameters: ParameterTable
+    vehicle: Vehicle
+    stream: OffboardStream
+    origin: Origin
+    links: list[Link]
+    ready_us: int
+    """Vehicle time from which arming is possible."""
+
+
+class Rules(NamedTuple):
+    """What an autopilot family does, put together for one vehicle."""
+
+    control: ModeControl
+    commander: Commander
+    commands: Commands
+    parameter_protocol: ParameterProtocol
+    land_detector: LandDetector
+    builders: dict[int, Builder]
+    """Message id -> builder."""
+    handlers: dict[str, Callable[[Message, Link], None]]
+    """Handlers of messages that only this family takes, by the message's name."""
+    converged_us: float
+    """Vehicle time at which the position becomes valid."""
+    position_timeout_us: Callable[[], float]
+    """How long the position stays valid without GPS."""
+
+
 class Personality(Protocol):
     """One autopilot family."""
 
-    autopilot_type: int
-    """MAV_AUTOPILOT."""
-    identity: Identity
-    modes_by_command: Mapping[tuple[int, int], Mode]
-    """(main mode, sub mode) of DO_SET_MODE -> mode."""
     events: Mapping[Occasion, Event]
     """What is said on each occasion."""
+    boot_mode: Mode
+    system_id_parameter: str
+    """Name of the parameter that holds the vehicle's system id."""
+    any_component: bool
+    """Whether messages to any component of this system are taken."""
 
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return all parameters with their defaults."""
+    def slot_us(self, settings: MockSettings) -> int:
+        """Return the period of the turns in which telemetry leaves, us."""
 
-    def stream_rates(self, link: str) -> Mapping[int, float]:
-        """Return message id -> Hz at boot on a link (``companion`` or ``gcs``)."""
-
-    def custom_mode(self, mode: Mode) -> int:
-        """Return HEARTBEAT.custom_mode."""
+    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+        """Return the streams of a link (``companion`` or ``gcs``) as they are at boot."""
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode a custom_mode means, None if there is no such mode."""
 
-    def base_mode(self, mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-        """Return HEARTBEAT.base_mode; ``attitude_controlled`` tells apart OFFBOARD's forms."""
-
-    def standard_mode(self, mode: Mode) -> int:
-        """Return CURRENT_MODE.standard_mode (MAV_STANDARD_MODE)."""
+    def rules(self, parts: Parts) -> Rules:
+        """Put the family's rules together for one vehicle."""

@@ -1,14 +1,16 @@
 """The position controller of the autopilot's own modes: P and PI to attitude and thrust."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan2, copysign, cos, hypot, isnan, pi, sin, sqrt, tan
+from math import atan2, copysign, cos, hypot, isnan, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
-from sitl_mock.parameters import ParameterTable
 from sitl_mock.quaternion import Quaternion, Vector, normalise
 from sitl_mock.state import NAN, NAN_VECTOR
 
 GRAVITY = 9.80665
+_STEEPEST = radians(80.0)
+"""No limit on the tilt lets it grow beyond this."""
 
 
 class PositionDemand(NamedTuple):
@@ -36,15 +38,33 @@ class PositionOutput(NamedTuple):
     acceleration: Vector
 
 
-@dataclass
-class PositionController:
-    """PX4's multicopter position control in its plain form.
+class PositionGains(NamedTuple):
+    """Gains and limits: velocity per position error (1/s), acceleration per velocity error.
 
-    Args:
-        parameters: gains and limits, read at every step so that a PARAM_SET acts at once.
+    Thrusts are normalised: at a hover, the least and the most.
     """
 
-    parameters: ParameterTable
+    horizontal: float
+    vertical: float
+    horizontal_speed: float  # 1/s
+    vertical_speed: float  # 1/s
+    horizontal_integral: float  # 1/s^2
+    vertical_integral: float  # 1/s^2
+    max_tilt: float  # rad
+    hover_thrust: float
+    min_thrust: float
+    max_thrust: float
+
+
+@dataclass
+class PositionController:
+    """A multicopter's position control in its plain form: P on position, PI on velocity.
+
+    Args:
+        gains: asked at every step, so that a PARAM_SET acts at once.
+    """
+
+    gains: Callable[[], PositionGains]
     _integral: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def reset(self) -> None:
@@ -59,40 +79,23 @@ class PositionController:
         dt: float,
     ) -> PositionOutput:
         """Return attitude and thrust for one period of ``dt`` s from the estimated state."""
-        asked_velocity = self._velocity(demand, position)
-        acceleration = self._acceleration(demand, asked_velocity, velocity, dt)
-        return self._thrust_vector(acceleration, asked_velocity, demand.yaw)
-
-    def _velocity(self, demand: PositionDemand, position: Vector) -> Vector:
-        gains = (
-            self.parameters["MPC_XY_P"],
-            self.parameters["MPC_XY_P"],
-            self.parameters["MPC_Z_P"],
-        )
-        asked = []
-        for axis in range(3):
-            error = demand.position[axis] - position[axis]
-            wanted = demand.velocity[axis]
-            if isnan(error):
-                asked.append(wanted)
-            else:
-                asked.append(gains[axis] * error + (0.0 if isnan(wanted) else wanted))
-        north, east, down = asked
-        speed = hypot(north, east)
-        if speed > demand.speed:
-            north, east = north * demand.speed / speed, east * demand.speed / speed
-        if not isnan(down):
-            down = max(-demand.up_speed, min(demand.down_speed, down))
-        return (north, east, down)
+        gains = self.gains()
+        asked_velocity = _velocity(gains, demand, position)
+        acceleration = self._acceleration(gains, demand, asked_velocity, velocity, dt)
+        return _thrust_vector(gains, acceleration, asked_velocity, demand.yaw)
 
     def _acceleration(
-        self, demand: PositionDemand, asked: Vector, velocity: Vector, dt: float
+        self,
+        gains: PositionGains,
+        demand: PositionDemand,
+        asked: Vector,
+        velocity: Vector,
+        dt: float,
     ) -> Vector:
-        parameters = self.parameters
-        xy = (parameters["MPC_XY_VEL_P_ACC"], parameters["MPC_XY_VEL_I_ACC"])
-        gains = (xy, xy, (parameters["MPC_Z_VEL_P_ACC"], parameters["MPC_Z_VEL_I_ACC"]))
+        xy = (gains.horizontal_speed, gains.horizontal_integral)
+        z = (gains.vertical_speed, gains.vertical_integral)
         result = []
-        for axis, (proportional, integral) in enumerate(gains):
+        for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
             total = 0.0 if isnan(feed_forward) else feed_forward
             error = asked[axis] - velocity[axis]
@@ -104,19 +107,43 @@ class PositionController:
         north, east, down = result
         return (north, east, down)
 
-    def _thrust_vector(self, acceleration: Vector, asked: Vector, yaw: float) -> PositionOutput:
-        north, east, down = acceleration
-        lift = max(GRAVITY - down, 0.1 * GRAVITY)
-        limit = lift * tan(min(self.parameters["MPC_TILTMAX_AIR"], 80.0) * pi / 180.0)
-        side = hypot(north, east)
-        if side > limit:
-            north, east = north * limit / side, east * limit / side
-        specific = sqrt(north * north + east * east + lift * lift)
-        q = _thrust_attitude((-north / specific, -east / specific, lift / specific), yaw)
-        thrust = self.parameters["MPC_THR_HOVER"] * max(GRAVITY - down, 0.0) / GRAVITY
-        thrust *= specific / lift
-        thrust = max(self.parameters["MPC_THR_MIN"], min(self.parameters["MPC_THR_MAX"], thrust))
-        return PositionOutput(q, thrust, asked, (north, east, down))
+
+def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
+    """Return the velocity asked, NED; NaN = none."""
+    factors = (gains.horizontal, gains.horizontal, gains.vertical)
+    asked = []
+    for axis in range(3):
+        error = demand.position[axis] - position[axis]
+        wanted = demand.velocity[axis]
+        if isnan(error):
+            asked.append(wanted)
+        else:
+            asked.append(factors[axis] * error + (0.0 if isnan(wanted) else wanted))
+    north, east, down = asked
+    speed = hypot(north, east)
+    if speed > demand.speed:
+        north, east = north * demand.speed / speed, east * demand.speed / speed
+    if not isnan(down):
+        down = max(-demand.up_speed, min(demand.down_speed, down))
+    return (north, east, down)
+
+
+def _thrust_vector(
+    gains: PositionGains, acceleration: Vector, asked: Vector, yaw: float
+) -> PositionOutput:
+    """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw."""
+    north, east, down = acceleration
+    lift = max(GRAVITY - down, 0.1 * GRAVITY)
+    limit = lift * tan(min(gains.max_tilt, _STEEPEST))
+    side = hypot(north, east)
+    if side > limit:
+        north, east = north * limit / side, east * limit / side
+    specific = sqrt(north * north + east * east + lift * lift)
+    q = _thrust_attitude((-north / specific, -east / specific, lift / specific), yaw)
+    thrust = gains.hover_thrust * max(GRAVITY - down, 0.0) / GRAVITY
+    thrust *= specific / lift
+    thrust = max(gains.min_thrust, min(gains.max_thrust, thrust))
+    return PositionOutput(q, thrust, asked, (north, east, down))
 
 
 def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:

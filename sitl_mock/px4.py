@@ -1,44 +1,32 @@
-"""PX4's numbers and words: modes, stream rates, identity, events (recorded from PX4 main, SIH)."""
+"""PX4's personality: its numbers, and its rules put together (recorded from PX4 main, SIH)."""
 
 from collections.abc import Mapping
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.announcer import Announcer
+from sitl_mock.land_detector import LandDetector
 from sitl_mock.modes import Mode
-from sitl_mock.parameters import Parameter
-from sitl_mock.personality import Event, Identity, Occasion
+from sitl_mock.parameter_protocol import ParameterProtocol
+from sitl_mock.parameters import BytewiseEncoding
+from sitl_mock.personality import Event, Identity, Occasion, Parts, Rules
+from sitl_mock.px4_commander import Px4Commander
+from sitl_mock.px4_commands import Px4Commands
+from sitl_mock.px4_event_log import EventLog
 from sitl_mock.px4_events import PX4_EVENTS
-from sitl_mock.px4_parameters import PX4_PARAMETERS
+from sitl_mock.px4_health import HealthReport
+from sitl_mock.px4_mode_control import Px4ModeControl
+from sitl_mock.px4_modes import mode_of
+from sitl_mock.px4_streams import SLOT_US, Px4Streams
+from sitl_mock.px4_telemetry import Px4SystemTelemetry
+from sitl_mock.settings import MockSettings
+from sitl_mock.streams import StreamSchedule
+from sitl_mock.telemetry import MotionTelemetry
 
-_ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
-_MANUAL = dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
-_STABILIZE = dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
-_GUIDED = dialect.MAV_MODE_FLAG_GUIDED_ENABLED
-_AUTO = dialect.MAV_MODE_FLAG_AUTO_ENABLED
-_CUSTOM = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-
-MAIN_AUTO = 4
-
-MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
-    Mode.MANUAL: (1, 0),
-    Mode.ALTCTL: (2, 0),
-    Mode.POSCTL: (3, 0),
-    Mode.TAKEOFF: (MAIN_AUTO, 2),
-    Mode.LOITER: (MAIN_AUTO, 3),
-    Mode.RTL: (MAIN_AUTO, 5),
-    Mode.LAND: (MAIN_AUTO, 6),
-    Mode.OFFBOARD: (6, 0),
-    Mode.STABILIZED: (7, 0),
-}
-"""(main mode, sub mode) of each mode; custom_mode carries them in bytes 2 and 3."""
-
-_STANDARD_MODES = {
-    Mode.ALTCTL: dialect.MAV_STANDARD_MODE_ALTITUDE_HOLD,
-    Mode.POSCTL: dialect.MAV_STANDARD_MODE_POSITION_HOLD,
-    Mode.RTL: dialect.MAV_STANDARD_MODE_SAFE_RECOVERY,
-    Mode.LAND: dialect.MAV_STANDARD_MODE_LAND,
-    Mode.TAKEOFF: dialect.MAV_STANDARD_MODE_TAKEOFF,
-}
+CONVERGED_SHARE = 0.7
+"""The position becomes valid this far into the time before arming is possible (recorded: 3.2 s)."""
+LANDED_AFTER_US = 1_100_000
+"""Contact with little thrust for this long is a landing (measured 1.1 s)."""
 
 _COMPANION_RATES: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
@@ -90,7 +78,10 @@ _GCS_RATES: dict[int, float] = {
 class Px4:
     """The PX4 personality."""
 
-    autopilot_type: int = dialect.MAV_AUTOPILOT_PX4
+    events: Mapping[Occasion, Event] = PX4_EVENTS
+    boot_mode = Mode.LOITER
+    any_component = False
+    system_id_parameter = "MAV_SYS_ID"
     identity = Identity(
         capabilities=0xE8FF,
         flight_sw_version=18022464,
@@ -98,37 +89,62 @@ class Px4:
         os_sw_version=101854463,
         flight_custom_version=(0, 0, 0, 245, 216, 154, 203, 253),
     )
-    modes_by_command: Mapping[tuple[int, int], Mode] = {
-        numbers: mode for mode, numbers in MODE_NUMBERS.items()
-    }
-    events: Mapping[Occasion, Event] = PX4_EVENTS
 
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return PX4's parameters."""
-        return PX4_PARAMETERS
+    def slot_us(self, settings: MockSettings) -> int:
+        """Return the slot period that the inner loop sets."""
+        return SLOT_US[settings.inner_loop_hz]
 
-    def stream_rates(self, link: str) -> Mapping[int, float]:
+    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
         """Return the measured onboard rates, and lower ones for the ground station's link."""
-        return _GCS_RATES if link == "gcs" else _COMPANION_RATES
-
-    def custom_mode(self, mode: Mode) -> int:
-        """Return main mode << 16 | sub mode << 24."""
-        main, sub = MODE_NUMBERS[mode]
-        return main << 16 | sub << 24
+        lockstep = settings.lockstep.enabled
+        rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
+        if lockstep and link == "companion":
+            del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # there, that message is the beacon
+        misses = settings.inner_loop_hz == 250 and not lockstep and not settings.exact_rates
+        return Px4Streams(rates, misses=misses)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode of a custom_mode, None if the mock has none such."""
-        return self.modes_by_command.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
+        """Return the mode a custom_mode means, None if there is no such mode."""
+        return mode_of(custom_mode)
 
-    def base_mode(self, mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-        """Return the recorded flags: 29 auto, 1 offboard by rates, 17 above rates, +128 armed."""
-        flags = _CUSTOM | (_ARMED if armed else 0)
-        if mode is Mode.OFFBOARD:
-            return int(flags | (_STABILIZE if attitude_controlled else 0))
-        if MODE_NUMBERS[mode][0] == MAIN_AUTO:
-            return int(flags | _STABILIZE | _GUIDED | _AUTO)
-        return int(flags | _STABILIZE | _MANUAL)
-
-    def standard_mode(self, mode: Mode) -> int:
-        """Return MAV_STANDARD_MODE, 0 for what has none."""
-        return int(_STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD))
+    def rules(self, parts: Parts) -> Rules:
+        """Put PX4's rules together."""
+        state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
+        events = EventLog(state, parts.links)
+        announce = Announcer(self, parts.links, events)
+        control = Px4ModeControl(state, parameters, parts.stream)
+        commander = Px4Commander(
+            state,
+            parameters,
+            control,
+            parts.stream,
+            announce,
+            HealthReport(state, events, parts.ready_us),
+            ready_us=parts.ready_us,
+        )
+        builders = {
+            **MotionTelemetry(state, vehicle, parts.origin).builders(),
+            **Px4SystemTelemetry(
+                state, parts.origin, self.identity, vehicle, parts.stream
+            ).builders(),
+        }
+        return Rules(
+            control,
+            commander,
+            Px4Commands(state, commander, builders, parts.origin),
+            ParameterProtocol(parameters, BytewiseEncoding()),
+            LandDetector(
+                state,
+                announce,
+                hover_thrust=lambda: parameters["MPC_THR_HOVER"],
+                landed_after_us=LANDED_AFTER_US,
+                climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
+            ),
+            builders,
+            handlers={
+                "MANUAL_CONTROL": commander.manual_control,
+                "REQUEST_EVENT": events.requested,
+            },
+            converged_us=CONVERGED_SHARE * parts.ready_us,
+            position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
+        )

@@ -49,3 +49,11 @@ def yaw(q: Quaternion) -> float:
     """Euler (Z-Y-X) yaw, rad in (-pi, pi]."""
     w, x, y, z = q
     return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def along_heading(q: Quaternion, vector: Vector) -> Vector:
+    """Return a vector given along the heading of ``q`` in world axes; NaN components stay NaN."""
+    w, _, _, z = from_yaw(yaw(q))
+    c, s = w * w - z * z, 2.0 * w * z
+    x, y, down = vector
+    return (c * x - s * y, s * x + c * y, down)

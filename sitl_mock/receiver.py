@@ -5,14 +5,10 @@ from math import nan
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.commander import Commander
-from sitl_mock.commands import DENIED, Command, Commands
+from sitl_mock.commander import DENIED
+from sitl_mock.commands import Command
 from sitl_mock.link import Link
-from sitl_mock.offboard import OffboardStream
-from sitl_mock.parameter_protocol import ParameterProtocol
-from sitl_mock.parameters import ParameterTable
-from sitl_mock.personality import Personality
-from sitl_mock.setpoints import Setpoint, attitude_setpoint, position_setpoint
+from sitl_mock.personality import Personality, Rules
 from sitl_mock.state import State
 from sitl_mock.wire import Message
 
@@ -33,51 +29,43 @@ class Receiver:
 
     Args:
         state: the autopilot's state.
-        commander: hears heartbeats and mode requests.
-        commands: carries out commands.
-        protocol: answers parameter messages.
-        parameters: the autopilot's parameters.
-        stream: takes setpoints.
+        rules: what the autopilot's family does.
         personality: translates custom modes.
         system_id: this vehicle's.
     """
 
     def __init__(
-        self,
-        state: State,
-        commander: Commander,
-        commands: Commands,
-        protocol: ParameterProtocol,
-        parameters: ParameterTable,
-        stream: OffboardStream,
-        personality: Personality,
-        system_id: int,
+        self, state: State, rules: Rules, personality: Personality, system_id: int
     ) -> None:
         self.clock_ns: Callable[[], int] = lambda: state.shown_us * 1000
-        self._state = state
-        self._commander = commander
-        self._commands = commands
-        self._stream = stream
-        self._parameters = parameters
+        self._commander = commander = rules.commander
+        self._commands = rules.commands
         self._personality = personality
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
-            "SET_ATTITUDE_TARGET": self._attitude_target,
-            "SET_POSITION_TARGET_LOCAL_NED": self._position_target,
+            "SET_ATTITUDE_TARGET": lambda message, _: commander.setpoint(message),
+            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.setpoint(message),
             "HEARTBEAT": self._heartbeat,
             "COMMAND_LONG": self._command_long,
             "COMMAND_INT": self._command_int,
             "SET_MODE": self._set_mode,
             "TIMESYNC": self._timesync,
             "PING": self._ping,
-            "PARAM_REQUEST_LIST": protocol.request_list,
-            "PARAM_REQUEST_READ": protocol.request_read,
-            "PARAM_SET": protocol.set,
+            "PARAM_REQUEST_LIST": rules.parameter_protocol.request_list,
+            "PARAM_REQUEST_READ": rules.parameter_protocol.request_read,
+            "PARAM_SET": rules.parameter_protocol.set,
             "MISSION_REQUEST_LIST": self._mission_list,
+            **rules.handlers,
         }
 
     def handle(self, message: Message, link: Link) -> None:
-        """Handle one message; what is not for this autopilot, or unknown, is ignored in silence."""
+        """Handle one message.
+
+        What is not for this autopilot, unknown, or not signed as it must be, is ignored in silence.
+        """
+        if not link.admits(message):
+            return
+        link.heard = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._for_us(message):
             handler(message, link)
@@ -85,23 +73,15 @@ class Receiver:
     def _for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", _BROADCAST)
         component = getattr(message, "target_component", _BROADCAST)
-        return system in (_BROADCAST, self._system_id) and component in (_BROADCAST, _COMPONENT)
-
-    def _attitude_target(self, message: Message, _: Link) -> None:
-        self._accept(attitude_setpoint(message))
-
-    def _position_target(self, message: Message, _: Link) -> None:
-        self._accept(position_setpoint(message))
-
-    def _accept(self, setpoint: Setpoint | None) -> None:
-        if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
-            self._stream.accept(setpoint, self._state.time_us)
+        return system in (_BROADCAST, self._system_id) and (
+            component in (_BROADCAST, _COMPONENT) or self._personality.any_component
+        )
 
     def _heartbeat(self, message: Message, link: Link) -> None:
         if message.get_srcSystem() == self._system_id and message.get_srcComponent() == _COMPONENT:
             return
         link.gcs_heard = link.gcs_heard or message.type == dialect.MAV_TYPE_GCS
-        self._commander.failsafe.heard(message.type)
+        self._commander.heard(message)
 
     def _command_long(self, message: Message, link: Link) -> None:
         parameters = tuple(getattr(message, f"param{number}") for number in range(1, 8))

@@ -4,8 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from sitl_mock.ardupilot_parameters import ARDUPILOT_PARAMETERS
+from sitl_mock.ardupilot_settings import with_ardupilot_defaults
 from sitl_mock.config import (
     AirframeConfig,
     BatteryConfig,
@@ -15,17 +17,21 @@ from sitl_mock.config import (
     RateLoopConfig,
     Section,
     SensorConfig,
+    SigningConfig,
     WindConfig,
 )
 from sitl_mock.config_errors import ConfigError, explain, suggestion
 from sitl_mock.fault_config import Fault
-from sitl_mock.parameters import ParameterRefusedError, ParameterTable
+from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
 from sitl_mock.px4_parameters import PX4_PARAMETERS
+from sitl_mock.wiring import for_vehicle, parse_wiring
 
 PORT_OFFSET = 40
 """The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
 GCS_PORT_OFFSET = 4020
 """The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
+
+_PARAMETERS = {"px4": PX4_PARAMETERS, "ardupilot": ARDUPILOT_PARAMETERS}
 
 Port = Annotated[int, Field(ge=0, le=65535)]
 
@@ -54,8 +60,12 @@ class LockstepConfig(Section):
 class MockSettings(Section):
     """Everything about one mock vehicle."""
 
-    autopilot: Literal["px4"] = "px4"
+    autopilot: Literal["px4", "ardupilot"] = "px4"
+    """Whose rules it follows; ArduPilot's brings its own airframe, battery and rate loop along."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
+    endpoint: str = "udp"
+    """The companion's wire: udp (by ``port``), tcpin://HOST:PORT (for one client, and nothing boots
+    before it is there) or serial:///PATH (a pseudo-terminal, PATH a link to it)."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
     """0 = no ground station link."""
     control_port: Port = 0
@@ -64,12 +74,14 @@ class MockSettings(Section):
     speed: Positive = 1.0
     """Vehicle seconds per wall second, when not in lockstep."""
     inner_loop_hz: Literal[250, 800] = 250
-    """Sets which telemetry rates are achieved."""
+    """Sets which telemetry rates PX4 achieves; ArduPilot has SCHED_LOOP_RATE for it."""
     exact_rates: bool = False
     """Never skip a slot at the full rate, as PX4's loop does; always so in lockstep."""
     prearm_delay_s: NonNegative = 4.5
-    """Arming is refused before; PX4 took 4.3 to 6.5 s."""
+    """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""
     lockstep: LockstepConfig = LockstepConfig()
+    signing: SigningConfig | None = None
+    """None: nothing is signed, and signatures are not looked at."""
     home: HomeConfig = HomeConfig()
     parameters: dict[str, Finite] = Field(default_factory=dict)
     """Autopilot parameters that differ from their defaults."""
@@ -80,24 +92,46 @@ class MockSettings(Section):
     sensors: SensorConfig = SensorConfig()
     faults: tuple[Fault, ...] = ()
 
+    @field_validator("endpoint")
+    @classmethod
+    def _known_endpoint(cls, endpoint: str) -> str:
+        parse_wiring(endpoint)
+        return endpoint
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_the_family_is(cls, section: object) -> object:
+        if isinstance(section, dict) and section.get("autopilot") == "ardupilot":
+            return with_ardupilot_defaults(section)
+        return section
+
     @field_validator("parameters")
     @classmethod
-    def _known_parameters(cls, parameters: dict[str, float]) -> dict[str, float]:
-        names = [parameter.name for parameter in PX4_PARAMETERS]
+    def _known_parameters(
+        cls, parameters: dict[str, float], info: ValidationInfo
+    ) -> dict[str, float]:
+        known = _PARAMETERS[info.data.get("autopilot", "px4")]
+        names = [parameter.name for parameter in known]
         for name in parameters:
             if name not in names:
                 raise ValueError(f"unknown parameter {name}{suggestion(name, names)}")
         try:
-            ParameterTable(PX4_PARAMETERS, parameters)
+            ParameterTable(known, parameters)
         except ParameterRefusedError as error:
             raise ValueError(str(error)) from error
         return parameters
+
+    @property
+    def known_parameters(self) -> tuple[Parameter, ...]:
+        """The autopilot's parameters with their defaults."""
+        return _PARAMETERS[self.autopilot]
 
     def for_vehicle(self, index: int) -> "MockSettings":
         """Return the settings of the vehicle with this index: its own ports and its own luck."""
         return self.model_copy(
             update={
                 "port": self.port + index,
+                "endpoint": for_vehicle(self.endpoint, index),
                 "gcs_port": self.gcs_port + index if self.gcs_port else 0,
                 "control_port": self.control_port + index if self.control_port else 0,
                 "seed": self.seed + index,

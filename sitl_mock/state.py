@@ -56,6 +56,8 @@ class State:
     Times are vehicle time in us since boot. ``shown_us`` is what telemetry carries as the time; it
     differs from ``time_us`` only while a fault freezes the clock. ``contact`` is touching the
     ground, ``landed`` what the land detector makes of it; ``flown``: took off since arming.
+    ``height_controlled`` and ``position_controlled``: ArduPilot's controllers run. ``aborted``: its
+    process has ended, and nothing comes any more.
     """
 
     estimate: Estimate
@@ -82,6 +84,9 @@ class State:
         default_factory=lambda: ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
     )
     attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
+    height_controlled: bool = False
+    position_controlled: bool = False
+    aborted: bool = False
     position_target: PositionTargetEcho = field(default_factory=PositionTargetEcho)
 
     @property

@@ -1,197 +1,55 @@
-"""The messages that tell how the vehicle and its autopilot are, in PX4's conventions."""
-
-from math import hypot
+"""The messages about the vehicle and its autopilot that every family builds alike."""
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.geodesy import Origin, to_geodetic
-from sitl_mock.offboard import OffboardStream
-from sitl_mock.personality import Personality
-from sitl_mock.setpoints import AttitudeSetpoint
-from sitl_mock.state import NAN, State
-from sitl_mock.telemetry import Builder, clip
-from sitl_mock.vehicle import Vehicle
+from sitl_mock.personality import Identity
+from sitl_mock.quaternion import Quaternion
+from sitl_mock.state import State
+from sitl_mock.telemetry import Builder
 from sitl_mock.wire import Message
 
 UNIX_AT_BOOT_US = 1_795_236_148_441_838
 """SYSTEM_TIME's wall clock at boot: fixed, so that a run repeats to the bit."""
-
-_SENSORS_PRESENT = 50380847
-_SENSORS_ENABLED = 50446383
-_SENSORS_HEALTHY = 320915519
-_PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
-_GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
-_ESTIMATOR_GOOD = 895
-_ESTIMATOR_ON_GROUND = 1023
-_ESTIMATOR_NO_POSITION = 164
-_NO_VALUE = 65535
+NO_VALUE = 65535
+"""An unsigned 16-bit field that tells nothing."""
 
 
 class SystemTelemetry:
-    """Builds messages about the state, the battery, GPS and the link.
+    """Builds messages about the state and the link; a family's own come on top.
 
     Args:
         state: the autopilot's state.
-        vehicle: for the battery and the resets.
         origin: of the local frame.
-        personality: the autopilot family's numbers.
-        stream: tells in which form OFFBOARD runs.
+        identity: what AUTOPILOT_VERSION says.
     """
 
-    def __init__(
-        self,
-        state: State,
-        vehicle: Vehicle,
-        origin: Origin,
-        personality: Personality,
-        stream: OffboardStream,
-    ) -> None:
+    def __init__(self, state: State, origin: Origin, identity: Identity) -> None:
         self._state = state
-        self._vehicle = vehicle
         self._origin = origin
-        self._personality = personality
-        self._stream = stream
-        self._ping = 0
+        self._identity = identity
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
         return {
-            dialect.MAVLINK_MSG_ID_HEARTBEAT: self.heartbeat,
-            dialect.MAVLINK_MSG_ID_CURRENT_MODE: self.current_mode,
-            dialect.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
-            dialect.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
-            dialect.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
-            dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
             dialect.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
             dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
             dialect.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
             dialect.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
-            dialect.MAVLINK_MSG_ID_PING: self.ping,
             dialect.MAVLINK_MSG_ID_MISSION_CURRENT: self.mission_current,
             dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.autopilot_version,
         }
-
-    def heartbeat(self) -> Message:
-        """Return HEARTBEAT."""
-        state = self._state
-        return dialect.MAVLink_heartbeat_message(
-            dialect.MAV_TYPE_QUADROTOR,
-            self._personality.autopilot_type,
-            self._personality.base_mode(
-                state.mode, armed=state.armed, attitude_controlled=self._above_rates()
-            ),
-            self._personality.custom_mode(state.mode),
-            self.system_status(),
-            3,
-        )
-
-    def system_status(self) -> int:
-        """Return MAV_STATE with PX4's meanings: 0 not ready, 3 ready, 4 armed, 5 failsafe."""
-        state = self._state
-        if state.armed:
-            return int(dialect.MAV_STATE_CRITICAL if state.failsafe else dialect.MAV_STATE_ACTIVE)
-        return int(
-            dialect.MAV_STATE_STANDBY if state.prearm_problem is None else dialect.MAV_STATE_UNINIT
-        )
-
-    def _above_rates(self) -> bool:
-        setpoint = self._stream.setpoint
-        if isinstance(setpoint, AttitudeSetpoint):
-            return setpoint.q is not None
-        return setpoint is not None
-
-    def current_mode(self) -> Message:
-        """Return CURRENT_MODE, with the mode that the user intends."""
-        state, personality = self._state, self._personality
-        return dialect.MAVLink_current_mode_message(
-            personality.standard_mode(state.mode),
-            personality.custom_mode(state.mode),
-            personality.custom_mode(state.intended_mode),
-        )
-
-    def sys_status(self) -> Message:
-        """Return SYS_STATUS; the prearm bit is what clients call armable."""
-        state, battery = self._state, self._vehicle.battery
-        health = _SENSORS_HEALTHY
-        if state.prearm_problem is not None:
-            health &= ~_PREARM_CHECK
-        if not state.gps_ok:
-            health &= ~_GPS_SENSOR
-        return dialect.MAVLink_sys_status_message(
-            _SENSORS_PRESENT,
-            _SENSORS_ENABLED,
-            health,
-            100,
-            clip(battery.voltage_v * 1e3, 15),
-            clip(battery.current_a * 1e2, 15),
-            round(100 * battery.remaining),
-            *(0,) * 6,
-        )
 
     def extended_sys_state(self) -> Message:
         """Return EXTENDED_SYS_STATE."""
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
-    def battery_status(self) -> Message:
-        """Return BATTERY_STATUS; the whole pack's voltage is in the first cell, as PX4 sends it."""
-        battery = self._vehicle.battery
-        return dialect.MAVLink_battery_status_message(
-            0,
-            dialect.MAV_BATTERY_FUNCTION_ALL,
-            dialect.MAV_BATTERY_TYPE_LIPO,
-            32767,
-            [round(battery.voltage_v * 1e3)] + [_NO_VALUE] * 9,
-            clip(battery.current_a * 1e2, 15),
-            0,
-            -1,
-            round(100 * battery.remaining),
-            0,
-            int(self._state.battery_warning),
-        )
-
-    def gps_raw_int(self) -> Message:
-        """Return GPS_RAW_INT."""
-        state = self._state
-        time_us = state.shown_us
-        if not state.gps_ok:
-            return dialect.MAVLink_gps_raw_int_message(
-                time_us, 0, 0, 0, 0, _NO_VALUE, _NO_VALUE, _NO_VALUE, _NO_VALUE, 0
-            )
-        place = to_geodetic(self._origin, state.estimate.position_ned)
-        altitude_mm = round(place.altitude_m * 1e3)
-        vx, vy, _ = state.estimate.velocity_ned
-        return dialect.MAVLink_gps_raw_int_message(
-            time_us,
-            dialect.GPS_FIX_TYPE_3D_FIX,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            altitude_mm,
-            70,
-            110,
-            clip(hypot(vx, vy) * 100, 15),
-            _NO_VALUE,
-            10,
-            altitude_mm,
-            900,
-            1780,
-            400,
-        )
-
-    def estimator_status(self) -> Message:
-        """Return ESTIMATOR_STATUS with the recorded flags and typical ratios."""
-        state = self._state
-        if not state.position_valid:
-            ratios = (NAN, NAN, 0.004, 0.05, NAN, NAN, 14.0, 1.25)
-            return dialect.MAVLink_estimator_status_message(
-                state.shown_us, _ESTIMATOR_NO_POSITION, *ratios
-            )
-        flags = _ESTIMATOR_ON_GROUND if state.landed else _ESTIMATOR_GOOD
-        ratios = (0.015, 0.008, 0.004, 0.08, 0.001, NAN, 0.295, 0.275)
-        return dialect.MAVLink_estimator_status_message(state.shown_us, flags, *ratios)
-
-    def home_position(self) -> Message:
+    def home_position(self) -> Message | None:
         """Return HOME_POSITION."""
+        return self._home_position(self._state.home_q)
+
+    def _home_position(self, q: Quaternion) -> Message:
         state = self._state
         place = to_geodetic(self._origin, state.home_ned)
         return dialect.MAVLink_home_position_message(
@@ -199,14 +57,14 @@ class SystemTelemetry:
             round(place.longitude_deg * 1e7),
             round(place.altitude_m * 1e3),
             *state.home_ned,
-            state.home_q,
+            q,
             0.0,
             0.0,
             0.0,
             state.home_set_at_us,
         )
 
-    def gps_global_origin(self) -> Message:
+    def gps_global_origin(self) -> Message | None:
         """Return GPS_GLOBAL_ORIGIN."""
         latitude, longitude, altitude = self._origin
         return dialect.MAVLink_gps_global_origin_message(
@@ -222,18 +80,13 @@ class SystemTelemetry:
         """Return a TIMESYNC request with the vehicle's clock, ns."""
         return dialect.MAVLink_timesync_message(0, self._state.shown_us * 1000)
 
-    def ping(self) -> Message:
-        """Return a PING request."""
-        self._ping += 1
-        return dialect.MAVLink_ping_message(self._state.shown_us, self._ping - 1, 0, 0)
-
     def mission_current(self) -> Message:
         """Return MISSION_CURRENT: there is no mission."""
-        return dialect.MAVLink_mission_current_message(0, _NO_VALUE, 1, 2)
+        return dialect.MAVLink_mission_current_message(0, NO_VALUE, 1, 2)
 
     def autopilot_version(self) -> Message:
         """Return AUTOPILOT_VERSION."""
-        identity = self._personality.identity
+        identity = self._identity
         return dialect.MAVLink_autopilot_version_message(
             identity.capabilities,
             identity.flight_sw_version,

@@ -14,7 +14,7 @@ from sitl_mock.wire import Message
 Builder = Callable[[], Message | None]
 
 _SEA_LEVEL_HPA = 1013.25
-_MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)
+MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
 
@@ -32,6 +32,9 @@ class MotionTelemetry:
         self._state = state
         self._vehicle = vehicle
         self._origin = origin
+
+    airspeed = NAN
+    """VFR_HUD's: there is no sensor for it."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -151,23 +154,28 @@ class MotionTelemetry:
             self._state.shown_us,
             *estimate.specific_force_frd,
             *estimate.gyro,
-            *_MAGNETIC_FIELD_NED,
-            _SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * altitude) ** 5.25588,
+            *MAGNETIC_FIELD_NED,
+            self.pressure_hpa(),
             0.0,
             altitude,
             15.0,
             63,
         )
 
+    def pressure_hpa(self) -> float:
+        """Return the air's pressure at the estimated height (ICAO standard atmosphere)."""
+        altitude = self._origin.altitude_m - self._state.estimate.position_ned[2]
+        return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * altitude) ** 5.25588)
+
     def vfr_hud(self) -> Message:
         """Return VFR_HUD."""
         state = self._state
         vx, vy, vz = state.estimate.velocity_ned
-        thrust = state.command.thrust
+        thrust = state.attitude_target.thrust
         percent = 0 if isnan(thrust) else round(100 * max(0.0, min(1.0, thrust)))
         altitude = self._origin.altitude_m - state.estimate.position_ned[2]
         return dialect.MAVLink_vfr_hud_message(
-            NAN, hypot(vx, vy), int(self._heading_deg()), percent, altitude, -vz
+            self.airspeed, hypot(vx, vy), int(self._heading_deg()), percent, altitude, -vz
         )
 
     def altitude(self) -> Message:

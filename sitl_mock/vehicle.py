@@ -141,6 +141,10 @@ class Vehicle:
         """Put the charge to a fraction 0..1 of the capacity."""
         self._battery.set_remaining(remaining)
 
+    def throttle(self, specific_thrust: float) -> float:
+        """Return the collective throttle that settles at a specific thrust (m/s^2), at most 1."""
+        return self._multirotor.throttle(specific_thrust)
+
     @property
     def reset_counter(self) -> int:
         """Estimator resets since boot."""

@@ -114,18 +114,21 @@ def fly_bundled(
 ) -> Summary:
     """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
 
+    They are joined as `link.endpoint` says, by UDP, TCP or a serial line, on free ports.
+
     Raises:
         ConfigError: the configuration, or the vehicle's own section of it, is wrong.
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
-    port = demo.free_port()
-    options.endpoint, options.arm = f"udpin://127.0.0.1:{port}", True
-    config = as_told(load(path), options, planner)
-    demo.check_mock(path)
-    folder = flight_folder(config)
-    with demo.bundled_vehicle(path, port, folder / "mock.log", lockstep=config.link.lockstep):
-        return fly(config, folder, console)
+    config = load(path)
+    with demo.wire_like(config.link.endpoint) as wire:
+        options.endpoint, options.arm = wire.endpoint, True
+        config = as_told(config, options, planner)
+        demo.check_mock(path)
+        folder = flight_folder(config)
+        with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
+            return fly(config, folder, console)
 
 
 async def _interruptible(session: Session) -> Summary:

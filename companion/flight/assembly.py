@@ -21,6 +21,7 @@ from companion.flight.rig import Rig
 from companion.flight.safety import Fence, SafetyMonitors
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, ThrustSettings
+from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
@@ -50,8 +51,8 @@ def link_settings(config: Config) -> LinkSettings:
     )
 
 
-def open_link(config: Config, tap: Tap) -> Link:
-    """The link that `link.backend` names, not open yet.
+def open_link(config: Config, tap: Tap, notice: Notice) -> Link:
+    """The link that `link.backend` names, not open yet; `tap` and `notice` as of `Link`.
 
     Raises:
         SigningError: the key cannot be used.
@@ -61,8 +62,8 @@ def open_link(config: Config, tap: Tap) -> Link:
     if config.link.backend == "mavsdk":
         from companion.mavsdk_link.link import MavsdkLink  # noqa: PLC0415  needs the extra
 
-        return MavsdkLink(settings, tap)
-    return Link(settings, tap)
+        return MavsdkLink(settings, tap, notice)
+    return Link(settings, tap, notice=notice)
 
 
 def realtime_wishes(config: Config) -> Wishes:

@@ -42,6 +42,7 @@ class Session:
         self._observer = observer
         self._ask_landing = ask_landing
         self._assembled: Assembled | None = None
+        self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
         """Hand the vehicle back; False if there is no flight to interrupt yet."""
@@ -70,12 +71,12 @@ class Session:
             realtime.asked_for(realtime_wishes(self._config)) as grants,
             TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
         ):
-            async with open_link(self._config, tlog) as link:
+            async with open_link(self._config, tlog, self._note) as link:
                 self._assembled = assemble(
                     self._config, link, self._observer, self._ask_landing, self._folder
                 )
-                for grant in grants:
-                    self._assembled.flight.note(str(grant))
+                for text in (*self._early_notes, *map(str, grants)):
+                    self._assembled.flight.note(text)
                 try:
                     result = await self._run(link, self._assembled)
                 finally:
@@ -84,7 +85,9 @@ class Session:
         return self._finish(link, self._assembled, result, tlog.dropped, grants)
 
     def _note(self, text: str) -> None:
-        if self._assembled is not None:
+        if self._assembled is None:
+            self._early_notes.append(text)
+        else:
             self._assembled.flight.note(text)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:

@@ -1,17 +1,21 @@
 """The same link to the same vehicle, by way of MAVSDK."""
 
 import asyncio
+import logging
 from math import degrees
 
 from companion.attitude import BodyRates
 from companion.mavlink.codec import SET_ATTITUDE_TARGET, SetpointEncoder
 from companion.mavlink.errors import LinkError, LinkTimeout
+from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.records import Heartbeat
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport import Receive, Tap, Transport
 from companion.mavsdk_link.offboard import OffboardSetpoints
 from companion.mavsdk_link.transport import MavsdkTransport
+
+_LOG = logging.getLogger(__name__)
 
 _MESSAGE_ID = 7  # of a MAVLink 2 frame; the two higher bytes are 0 for all that counts here
 _POLL_S = 0.02
@@ -30,16 +34,19 @@ class MavsdkLink(Link):
     Args:
         settings: As of `Link`.
         tap: As of `Link`; it sees the setpoints that MAVSDK really sent, repeated ones included.
+        notice: As of `Link`.
 
     Raises:
         EndpointError: The endpoint's notation is wrong.
         LinkError: Lockstep or signing is asked for, which MAVSDK cannot do.
     """
 
-    def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
+    def __init__(
+        self, settings: LinkSettings, tap: Tap | None = None, notice: Notice = _LOG.warning
+    ) -> None:
         if settings.lockstep or settings.signing is not None:
             raise LinkError("MAVSDK can neither fly in lockstep nor sign; use link.backend: direct")
-        super().__init__(settings, tap, self._open)
+        super().__init__(settings, tap, self._open, notice)
         self._sent_tap = tap
         self._transport: MavsdkTransport | None = None
         self._setpoints: OffboardSetpoints | None = None

@@ -66,7 +66,6 @@ def config(tmp_path, text):
         ("link: {backend: mavsdk, lockstep: true}", "neither fly in lockstep nor sign"),
         ("link: {backend: mavsdk, signing_key_file: key}", "neither fly in lockstep nor sign"),
         ("realtime: {scheduler: fifo, priority: 95}", "`realtime.priority`"),
-        ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
         ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
         ("link: 3", "`link`"),
         ("vehicle: {dead_time_ms: true}", "`vehicle.dead_time_ms`: must not be true or false"),

@@ -1,7 +1,8 @@
-"""Whether the vehicle may be armed, and if not, why: the first problem found, in words."""
+"""Whether PX4 may be armed, and if not, why: the first problem found, in words."""
 
-from sitl_mock.modes import PILOTED, Mode
+from sitl_mock.modes import Mode
 from sitl_mock.parameters import ParameterTable
+from sitl_mock.px4_modes import PILOTED
 from sitl_mock.state import BatteryWarning, State
 
 _NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND})
@@ -15,6 +16,7 @@ def arming_problem(
     crashed: bool,
     offboard_alive: bool,
     gcs_alive: bool,
+    pilot: bool,
     refusal: str | None,
 ) -> str | None:
     """Return why arming is refused now, None if it is not.
@@ -26,6 +28,7 @@ def arming_problem(
         crashed: whether the vehicle is broken.
         offboard_alive: whether setpoints stream in.
         gcs_alive: whether a ground station is heard.
+        pilot: whether somebody is at the sticks.
         refusal: a reason given from outside (fault injection).
     """
     problems = (
@@ -42,13 +45,13 @@ def arming_problem(
     for present, problem in problems:
         if present:
             return problem
-    return _mode_problem(state.mode, offboard_alive=offboard_alive)
+    return _mode_problem(state.mode, offboard_alive=offboard_alive, pilot=pilot)
 
 
-def _mode_problem(mode: Mode, *, offboard_alive: bool) -> str | None:
+def _mode_problem(mode: Mode, *, offboard_alive: bool, pilot: bool) -> str | None:
     if mode is Mode.OFFBOARD and not offboard_alive:
         return "no offboard signal"
-    if mode in PILOTED:
+    if mode in PILOTED and not pilot:
         return "no manual control input"
     if mode in _NEVER_ARMED_IN:
         return "mode is not suitable for arming"

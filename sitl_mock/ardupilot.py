@@ -1,0 +1,167 @@
+"""ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
+
+from collections.abc import Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.ardupilot_announcer import ArduPilotAnnouncer
+from sitl_mock.ardupilot_boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
+from sitl_mock.ardupilot_commander import ArduPilotCommander
+from sitl_mock.ardupilot_commands import ArduPilotCommands
+from sitl_mock.ardupilot_guided import Guided
+from sitl_mock.ardupilot_mode_control import ArduPilotModeControl
+from sitl_mock.ardupilot_modes import MODES_BY_NUMBER
+from sitl_mock.ardupilot_motion import ArduPilotMotionTelemetry
+from sitl_mock.ardupilot_parameters import ARDUPILOT_TYPES
+from sitl_mock.ardupilot_streams import ArduPilotStreams
+from sitl_mock.ardupilot_telemetry import ArduPilotSystemTelemetry
+from sitl_mock.ardupilot_texts import ARDUPILOT_EVENTS
+from sitl_mock.land_detector import LandDetector
+from sitl_mock.modes import Mode
+from sitl_mock.parameter_protocol import ParameterProtocol
+from sitl_mock.parameters import FloatEncoding
+from sitl_mock.personality import Event, Identity, Occasion, Parts, Rules
+from sitl_mock.settings import MockSettings
+from sitl_mock.streams import StreamSchedule
+
+LANDED_AFTER_US = 1_000_000
+"""Contact with little thrust for this long is a landing."""
+POSITION_TIMEOUT_US = 10_000_000
+"""How long the position stays valid without GPS; not measured."""
+DEFAULT_LOOP_HZ = 400.0
+_BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
+_SUPPORTED = frozenset(
+    {
+        *_BOOT_RATES,
+        dialect.MAVLINK_MSG_ID_ATTITUDE,
+        dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+        dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+        dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        dialect.MAVLINK_MSG_ID_BATTERY_STATUS,
+        dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        dialect.MAVLINK_MSG_ID_GPS_RAW_INT,
+        dialect.MAVLINK_MSG_ID_HIGHRES_IMU,
+        dialect.MAVLINK_MSG_ID_HOME_POSITION,
+        dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        dialect.MAVLINK_MSG_ID_MISSION_CURRENT,
+        dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+        dialect.MAVLINK_MSG_ID_RAW_IMU,
+        dialect.MAVLINK_MSG_ID_RC_CHANNELS,
+        dialect.MAVLINK_MSG_ID_SCALED_PRESSURE,
+        dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+        dialect.MAVLINK_MSG_ID_SYS_STATUS,
+        dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
+        dialect.MAVLINK_MSG_ID_VFR_HUD,
+        dialect.MAVLINK_MSG_ID_VIBRATION,
+        ardupilotmega.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    }
+)
+"""Messages that can be asked for."""
+
+
+class ArduPilot:
+    """The ArduPilot personality, a Copter."""
+
+    events: Mapping[Occasion, Event] = ARDUPILOT_EVENTS
+    boot_mode = Mode.STABILIZE
+    any_component = True
+    system_id_parameter = "MAV_SYSID"
+    identity = Identity(
+        capabilities=64495,
+        flight_sw_version=0x04070000,
+        middleware_sw_version=0,
+        os_sw_version=0,
+        flight_custom_version=tuple(b"12f6aa4e"),
+    )
+
+    def slot_us(self, settings: MockSettings) -> int:
+        """Return a turn of the main loop."""
+        return self._loop_us(settings)
+
+    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+        """Return the streams of a link: silent but for the boot's until it is asked."""
+        silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
+        return ArduPilotStreams(
+            _BOOT_RATES,
+            _SUPPORTED,
+            loop_us=self._loop_us(settings),
+            silent_until_us=silent_s * 1e6,
+        )
+
+    def mode_of(self, custom_mode: int) -> Mode | None:
+        """Return the mode a custom_mode means, None if the mock has none such."""
+        return MODES_BY_NUMBER.get(custom_mode)
+
+    def rules(self, parts: Parts) -> Rules:
+        """Put ArduCopter's rules together."""
+        state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
+        announce = ArduPilotAnnouncer(parts.links)
+        protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
+        guided = Guided()
+        control = ArduPilotModeControl(state, parameters, guided, vehicle.throttle)
+
+        def tell_home() -> None:
+            for link in parts.links:
+                commands.send(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, link)
+                commands.send(dialect.MAVLINK_MSG_ID_HOME_POSITION, link)
+
+        def tell_parameter(name: str) -> None:
+            for link in parts.links:
+                if link.heard:
+                    protocol.send(name, link)
+
+        boot = Boot(
+            state,
+            Voice(announce, tell_home, tell_parameter),
+            ready_us=parts.ready_us,
+            elevation=parts.origin.altitude_m,
+        )
+        commander = ArduPilotCommander(
+            state,
+            parameters,
+            vehicle,
+            control,
+            guided,
+            parts.stream,
+            announce,
+            boot,
+            system_id=int(parameters["MAV_SYSID"]),
+            tell_home=tell_home,
+        )
+        builders = {
+            **ArduPilotMotionTelemetry(state, vehicle, parts.origin).builders(),
+            **ArduPilotSystemTelemetry(
+                state,
+                parts.origin,
+                self.identity,
+                vehicle,
+                initialised=lambda: boot.initialised,
+                origin_set=lambda: boot.origin_set,
+            ).builders(),
+        }
+        commands = ArduPilotCommands(state, commander, builders, announce)
+        return Rules(
+            control,
+            commander,
+            commands,
+            protocol,
+            LandDetector(
+                state,
+                announce,
+                hover_thrust=control.hover_throttle,
+                landed_after_us=LANDED_AFTER_US,
+                climbing=lambda: control.taking_off,
+            ),
+            builders,
+            handlers={"REQUEST_DATA_STREAM": commands.data_stream},
+            converged_us=parts.ready_us,
+            position_timeout_us=lambda: POSITION_TIMEOUT_US,
+        )
+
+    @staticmethod
+    def _loop_us(settings: MockSettings) -> int:
+        rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
+        return round(1e6 / rate)

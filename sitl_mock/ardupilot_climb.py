@@ -1,0 +1,27 @@
+"""A climb rate asked, turned into a height to follow: the rate changes no faster than a limit."""
+
+from math import sqrt
+
+
+class Climb:
+    """The height and the climb rate that are followed now, m and m/s, up positive."""
+
+    def __init__(self) -> None:
+        self.height = 0.0
+        self.rate = 0.0
+
+    def begin(self, height: float, rate: float) -> None:
+        """Begin where the vehicle is, as fast as it climbs."""
+        self.height = height
+        self.rate = rate
+
+    def step(self, asked: float, acceleration: float, dt: float) -> None:
+        """Move on by ``dt`` s towards the climb rate ``asked``."""
+        most = acceleration * dt
+        self.rate += max(-most, min(most, asked - self.rate))
+        self.height += self.rate * dt
+
+
+def approach(way: float, acceleration: float, fastest: float) -> float:
+    """Return the speed from which ``acceleration`` still stops within the ``way``, m/s."""
+    return min(fastest, sqrt(2.0 * acceleration * max(0.0, way)))
