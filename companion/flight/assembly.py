@@ -236,6 +236,7 @@ def assemble(
     watch = Watch(rig, silence_limit=deadman.silence_limit_ms * _MS, clock=clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
+    rig.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:

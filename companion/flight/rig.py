@@ -29,6 +29,7 @@ class Rig:
         heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
             from the rate at which heartbeats really come.
         arm_sent: whether we asked the autopilot to arm.
+        note: writes down and shows that something happened.
     """
 
     config: Config
@@ -41,6 +42,7 @@ class Rig:
     rate_hz: float = 0.0
     heartbeat_limit: float = _SLOWEST_HEARTBEAT
     arm_sent: bool = False
+    note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:
         """Stop answering samples: from here on nothing is sent that steers."""
