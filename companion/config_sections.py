@@ -168,7 +168,8 @@ class DeadmanConfig(Section):
     """Control that stood still this long is not taken up again: hand back. Keep it below the
     autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
     deadline_ms: Positive = 4.0
-    """An answer that takes longer inside this process counts as a missed deadline."""
+    """An answer that leaves later than this after its sample reached this computer (over TCP and
+    serial: after it was read) counts as a missed deadline."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "DeadmanConfig":
