@@ -1,7 +1,6 @@
 """What arrives: checked, and passed on to the control loop and to the router."""
 
 import asyncio
-import logging
 from collections.abc import Callable
 
 from fastcrc import crc16
@@ -18,13 +17,28 @@ from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.router import Router
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.signing import Verdict
 from companion.mavlink.stats import LinkStats, SequenceTracker
 from companion.mavlink.transport import Tap
 
-_LOG = logging.getLogger(__name__)
+Notice = Callable[[str], None]
+"""Takes a sentence about the link that its user should read."""
 
 _SOURCE_AND_ID = slice(5, 10)  # system, component and the three bytes of the message id
 _ATTITUDE_EXTRA = CRC_EXTRA[ATTITUDE_QUATERNION]
+
+_REFUSED = {
+    Verdict.UNSIGNED: "the vehicle does not sign its frames, so they are refused; give it the same "
+    "key as link.signing_key_file, or leave signing out on both sides",
+    Verdict.WRONG_KEY: "the vehicle signs its frames with another key, so they are refused; give "
+    "both sides the same key (link.signing_key_file)",
+}
+"""A replayed frame is no more than a repeated one, and only counted."""
+
+_WE_DO_NOT_SIGN = (
+    "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
+    "link.signing_key_file to a file with its passphrase"
+)
 
 
 class Inbox:
@@ -33,10 +47,22 @@ class Inbox:
     Attributes:
         on_attitude: Called with each attitude sample, synchronously.
         lockstep: Set when vehicle time drives the loop.
+
+    Args:
+        settings: Whom to hear, and the key.
+        stats: Counts.
+        router: Takes all but the samples.
+        tap: Is shown every frame that is accepted.
+        notice: Is told, once each, of what keeps the two sides from understanding each other.
     """
 
     def __init__(
-        self, settings: LinkSettings, stats: LinkStats, router: Router, tap: Tap | None
+        self,
+        settings: LinkSettings,
+        stats: LinkStats,
+        router: Router,
+        tap: Tap | None,
+        notice: Notice,
     ) -> None:
         self._source = (settings.target_system, settings.target_component)
         self._signing = settings.signing
@@ -46,7 +72,8 @@ class Inbox:
         self._quick = False
         self._sequence = SequenceTracker()
         self._explained = 0
-        self._signature_said = False
+        self._notice = notice
+        self._noticed: set[str] = set()
         self._held: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
@@ -129,19 +156,27 @@ class Inbox:
 
     def _admit(self, frame: Frame) -> bool:
         stats = self._stats
-        if (frame.system, frame.component) != self._source:
+        source = (frame.system, frame.component)
+        if source != self._source:
             stats.ignored_foreign += 1
+            stats.foreign_sources.add(source)
             return False
-        if self._signing is not None and not self._signing.accepts(frame):
-            stats.bad_signature += 1
-            if not self._signature_said:
-                self._signature_said = True
-                _LOG.warning(
-                    "the vehicle's frames are not signed with our key and are refused; give both "
-                    "sides the same key, or leave signing out on both"
-                )
-            return False
-        return True
+        if self._signing is None:
+            if frame.signed:
+                self._notice_once(_WE_DO_NOT_SIGN)
+            return True
+        verdict = self._signing.judge(frame)
+        if verdict is Verdict.GOOD:
+            return True
+        stats.bad_signature += 1
+        if verdict in _REFUSED:
+            self._notice_once(_REFUSED[verdict])
+        return False
+
+    def _notice_once(self, text: str) -> None:
+        if text not in self._noticed:
+            self._noticed.add(text)
+            self._notice(text)
 
     def _count(self, message_id: int, sequence: int) -> None:
         stats = self._stats

@@ -13,12 +13,14 @@ from companion.mavlink.connection import Connection
 from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
 from companion.mavlink.family import AutopilotFamily
-from companion.mavlink.inbox import Inbox
+from companion.mavlink.inbox import Inbox, Notice
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.presence import send_heartbeat, send_heartbeats, synchronise
+from companion.mavlink.px4_events import EventReader
 from companion.mavlink.records import Heartbeat
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.samples import AttitudeSample
@@ -42,6 +44,9 @@ class Link:
     Args:
         settings: Where the vehicle is and who we are.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+        opener: Opens the transport.
+        notice: Told, once each, of what keeps the two sides from understanding each other; by
+            default the log.
 
     Attributes:
         stats: Counters.
@@ -53,7 +58,13 @@ class Link:
         LinkError: Lockstep is asked for on another event loop than its own.
     """
 
-    def __init__(self, settings: LinkSettings, tap: Tap | None = None) -> None:
+    def __init__(
+        self,
+        settings: LinkSettings,
+        tap: Tap | None = None,
+        opener: OpenTransport = open_transport,
+        notice: Notice = _LOG.warning,
+    ) -> None:
         endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
         self._registry = PendingRegistry()
@@ -62,13 +73,16 @@ class Link:
         self.stats = LinkStats()
         texts = TextAssembler()
         self._router = router = Router(self.stats)
-        self._inbox = Inbox(settings, self.stats, router, tap)
+        self._inbox = Inbox(settings, self.stats, router, tap, notice)
         self._outbox = outbox = Outbox(settings, self.stats, tap)
         self.state = VehicleState(router, self.stats, texts, self._loop.time)
+        router.subscribe_raw("EVENT", EventReader(texts, self._loop.time).take)
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(settings, outbox, router, self._registry)
-        self._connection = Connection(endpoint, self._inbox, outbox, self.stats, self._on_dropped)
+        self._connection = Connection(
+            endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
+        )
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):
@@ -282,10 +296,9 @@ class Link:
             async with asyncio.timeout(timeout_s):
                 await lockstep.first_beacon
         except TimeoutError:
-            raise LinkTimeout(
-                f"no lockstep beacon within {timeout_s:g} s on {self.settings.endpoint}; is the "
-                "vehicle running, in lockstep, and sending to this port?"
-            ) from None
+            start = f"no lockstep beacon within {timeout_s:g} s"
+            why = f"{start} on {self.settings.endpoint}; is the vehicle running, and in lockstep?"
+            raise LinkTimeout(_refused(start, self.stats) or why) from None
 
 
 def _log_failure(task: asyncio.Task[None]) -> None:
@@ -295,13 +308,22 @@ def _log_failure(task: asyncio.Task[None]) -> None:
 
 def _why_silent(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
     start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    if stats.ignored_foreign:
-        return (
-            f"{start}, but {stats.ignored_foreign} frames from other systems or components; is "
-            "the target's system id right?"
-        )
-    if stats.bad_signature:
-        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+    refused = _refused(start, stats)
+    if refused is not None:
+        return refused
     if stats.bad_crc:
         return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
     return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"
+
+
+def _refused(start: str, stats: LinkStats) -> str | None:
+    """What came instead and was refused, `None` if nothing was."""
+    if stats.ignored_foreign:
+        source = "/".join(map(str, min(stats.foreign_sources)))
+        return (
+            f"{start}, but {stats.ignored_foreign} frames from others, such as system/component "
+            f"{source}; is link.target_system right?"
+        )
+    if stats.bad_signature:
+        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+    return None

@@ -9,6 +9,7 @@ import hmac
 import re
 import time
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 
 from companion.mavlink.errors import SigningError
@@ -47,6 +48,15 @@ def key_from_passphrase_file(path: Path) -> bytes:
     return hashlib.sha256(lines[0].strip().encode()).digest()
 
 
+class Verdict(Enum):
+    """What a signature is worth."""
+
+    GOOD = "signed with our key, and newer than all before it on its stream"
+    UNSIGNED = "not signed"
+    WRONG_KEY = "signed with another key"
+    REPLAYED = "not newer than what came before: repeated on the way, or a recording"
+
+
 class Signing:
     """Signs our frames and judges theirs.
 
@@ -76,23 +86,23 @@ class Signing:
         tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
-    def accepts(self, frame: Frame) -> bool:
-        """Whether a frame is signed with our key and newer than all before it on its stream."""
+    def judge(self, frame: Frame) -> Verdict:
+        """Judge a frame; only a good one moves what is kept of its stream."""
         if not frame.signed:
-            return False
+            return Verdict.UNSIGNED
         signature = frame.raw[-SIGNATURE_LENGTH:]
         if not hmac.compare_digest(signature[-_HASH_BYTES:], self._hash(frame.raw[:-_HASH_BYTES])):
-            return False
+            return Verdict.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
         # A stream not heard before may lag our clock by a minute at most, or a recording of an
         # old flight could be played to us.
         oldest = self._streams.get(stream, max(self._stamp, self._now()) - _NEW_STREAM_WINDOW)
         if stamp <= oldest:
-            return False
+            return Verdict.REPLAYED
         self._streams[stream] = stamp
         self._stamp = max(self._stamp, stamp)
-        return True
+        return Verdict.GOOD
 
     def _now(self) -> int:
         return int((self._clock() - _EPOCH_UNIX_S) * _TICKS_PER_S)

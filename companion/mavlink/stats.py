@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class LinkStats:
-    """What a link has seen so far. All but the last count frames.
+    """What a link has seen so far. All but the last two count frames.
 
     Attributes:
         frames: Accepted from the vehicle.
@@ -21,6 +21,7 @@ class LinkStats:
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
         reconnects: How often the connection was opened again.
         by_message: Accepted frames for each message id.
+        foreign_sources: (system, component) of those that are ignored.
     """
 
     frames: int = 0
@@ -36,6 +37,7 @@ class LinkStats:
     not_sent: int = 0
     reconnects: int = 0
     by_message: dict[int, int] = field(default_factory=dict)
+    foreign_sources: set[tuple[int, int]] = field(default_factory=set)
 
 
 class SequenceTracker:

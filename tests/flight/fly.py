@@ -102,7 +102,7 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
     link = {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep}
-    text = yaml.safe_dump(merged(merged(QUICK_FLIGHT, changes), {"link": link}))
+    text = yaml.safe_dump(merged(merged(QUICK_FLIGHT, {"link": link}), changes))
     folder.mkdir(exist_ok=True)
     return Session(
         parse(text, "test", Config), folder, observer or Silent(), ask_landing or decline

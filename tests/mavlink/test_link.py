@@ -264,7 +264,7 @@ def test_no_vehicle_is_said_clearly(run):
                 await link.wait_connected(0.02)
             other = await FakeVehicle(link.local_address).open_udp()
             other.send_raw(frames_of(heartbeat(), system=2)[0])
-            with pytest.raises(LinkTimeout, match="system id"):
+            with pytest.raises(LinkTimeout, match="target_system right"):
                 await link.wait_connected(0.1)
             other.close()
 

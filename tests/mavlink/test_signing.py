@@ -18,6 +18,7 @@ from companion.mavlink import (
 )
 from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner
+from companion.mavlink.signing import Verdict
 from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
 
 KEY = bytes(range(32))
@@ -46,33 +47,42 @@ def test_pymavlinks_signature_is_accepted_once():
     mav = signer()
     first, second = (frame_of(heartbeat().pack(mav)) for _ in range(2))
     assert first.signed
-    assert ours.accepts(first)
-    assert ours.accepts(second)
-    assert not ours.accepts(second), "a replay"
-    assert not ours.accepts(first), "an older one"
+    assert ours.judge(first) is Verdict.GOOD
+    assert ours.judge(second) is Verdict.GOOD
+    assert ours.judge(second) is Verdict.REPLAYED
+    assert ours.judge(first) is Verdict.REPLAYED
 
 
 def test_another_key_a_changed_byte_and_no_signature_are_refused():
     ours = signing()
-    assert not ours.accepts(frame_of(heartbeat().pack(signer(bytes(32)))))
-    assert not ours.accepts(frame_of(heartbeat().pack(dialect.MAVLink(None, 1, 1))))
+    assert ours.judge(frame_of(heartbeat().pack(signer(bytes(32))))) is Verdict.WRONG_KEY
+    unsigned = frame_of(heartbeat().pack(dialect.MAVLink(None, 1, 1)))
+    assert ours.judge(unsigned) is Verdict.UNSIGNED
     packed = bytearray(heartbeat().pack(signer()))
     packed[-1] ^= 1
-    assert not ours.accepts(frame_of(bytes(packed)))
+    assert ours.judge(frame_of(bytes(packed))) is Verdict.WRONG_KEY
+
+
+def test_a_forged_stamp_does_not_silence_the_true_sender():
+    ours = signing()
+    forged = frame_of(heartbeat().pack(signer(bytes(32), ticks=TICKS + 10**9)))
+    assert ours.judge(forged) is Verdict.WRONG_KEY
+    assert ours.judge(frame_of(heartbeat().pack(signer()))) is Verdict.GOOD
 
 
 def test_a_recording_of_an_old_flight_is_refused():
-    a_minute_and_a_bit = 61 * 100_000
-    assert not signing().accepts(
-        frame_of(heartbeat().pack(signer(ticks=TICKS - a_minute_and_a_bit)))
-    )
-    assert signing().accepts(frame_of(heartbeat().pack(signer(ticks=TICKS - 59 * 100_000))))
+    def played(seconds):
+        return signing().judge(frame_of(heartbeat().pack(signer(ticks=TICKS - seconds * 100_000))))
+
+    assert played(61) is Verdict.REPLAYED
+    assert played(59) is Verdict.GOOD
 
 
 def test_streams_are_kept_apart():
     ours = signing()
-    assert ours.accepts(frame_of(heartbeat().pack(signer(ticks=TICKS + 50, link_id=1))))
-    assert ours.accepts(frame_of(heartbeat().pack(signer(ticks=TICKS + 10, link_id=2))))
+    for ticks, link_id in ((TICKS + 50, 1), (TICKS + 10, 2)):
+        frame = frame_of(heartbeat().pack(signer(ticks=ticks, link_id=link_id)))
+        assert ours.judge(frame) is Verdict.GOOD
 
 
 def test_our_stamps_rise_even_when_the_clock_goes_back():
