@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint soak bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -25,6 +25,9 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+soak: $(VENV)/.test  ## half an hour in real time over a bad link
+	$(BIN)/python -m tests.soak --minutes 30
 
 bench: $(VENV)/.test  ## latency of our link against a bare echo and MAVSDK
 	$(BIN)/companion bench link

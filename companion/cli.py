@@ -18,6 +18,7 @@ from companion.commands.identify import SHIPPED
 from companion.config_sections import FlightConfig
 from companion.extras import MissingExtraError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
+from companion.realtime import RealtimeError
 from companion.recording.figure import FigureError
 from companion.study.names import STUDY_NAMES, TRACK
 from companion.yaml_file import ConfigError
@@ -32,6 +33,7 @@ _USAGE_ERRORS = (
     FigureError,
     LogError,
     MissingExtraError,
+    RealtimeError,
     SigningError,
 )
 _PROGRAMMES = get_args(get_args(FlightConfig.model_fields["programme"].annotation)[0])

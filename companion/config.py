@@ -25,6 +25,7 @@ from companion.config_sections import (
     LinkConfig,
     NmpcConfig,
     PlannerConfig,
+    RealtimeConfig,
     RecordingConfig,
     ThrustConfig,
     VehicleConfig,
@@ -53,6 +54,7 @@ class Config(Section):
     corners: CornersConfig = CornersConfig()
     circle: CircleConfig = CircleConfig()
     identify: IdentifyConfig = IdentifyConfig()
+    realtime: RealtimeConfig = RealtimeConfig()
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
     """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""

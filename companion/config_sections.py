@@ -21,6 +21,8 @@ Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 class LinkConfig(Section):
     """How to reach the autopilot."""
 
+    backend: Literal["direct", "mavsdk"] = "direct"
+    """direct, or mavsdk: MAVSDK holds the connection and sends the setpoints (extra `mavsdk`)."""
     endpoint: str = "udpin://0.0.0.0:14540"
     """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
@@ -50,8 +52,8 @@ class LinkConfig(Section):
             raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
         if self.min_position_rate_hz > self.position_rate_hz:
             raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
-        if self.lockstep and not self.endpoint.startswith("udp"):
-            raise ValueError("lockstep is for the bundled vehicle, over a udp endpoint")
+        if self.backend == "mavsdk" and (self.lockstep or self.signing_key_file is not None):
+            raise ValueError("backend: mavsdk can neither fly in lockstep nor sign; use direct")
         ours, theirs = self.source_component, self.target_component
         if (self.source_system, ours) == (self.target_system, theirs):
             raise ValueError("source_system and source_component are the autopilot's own")
@@ -166,7 +168,8 @@ class DeadmanConfig(Section):
     """Control that stood still this long is not taken up again: hand back. Keep it below the
     autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
     deadline_ms: Positive = 4.0
-    """An answer that takes longer inside this process counts as a missed deadline."""
+    """An answer that leaves later than this after its sample reached this computer (over TCP and
+    serial: after it was read) counts as a missed deadline."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "DeadmanConfig":
@@ -270,6 +273,23 @@ class FlightConfig(Section):
     """Wait this long to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
     """Wait this long for the autopilot to report that it has landed."""
+
+
+class RealtimeConfig(Section):
+    """What is asked of the operating system: each is granted or not, and the flight says which."""
+
+    scheduler: Literal["other", "fifo"] = "other"
+    """other: as every program. fifo: before all of them (SCHED_FIFO), while it has work."""
+    priority: Annotated[int, Field(ge=1, le=90)] = 50
+    """Of fifo; the kernel's own threads for interrupts have 50, and above 90 are watchdogs."""
+    cpu_affinity: tuple[Annotated[int, Field(ge=0, le=1023)], ...] = ()
+    """Run on these processors only, numbered from 0; none named: on any."""
+    lock_memory: StrictBool = False
+    """Keep all of the program's memory in RAM: no wait for the disk in the middle of a step."""
+    freeze_gc: StrictBool = False
+    """No garbage collection in flight; what it would have found is freed afterwards."""
+    required: StrictBool = False
+    """Refuse to fly unless all that is asked for is granted."""
 
 
 class RecordingConfig(Section):

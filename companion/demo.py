@@ -4,18 +4,36 @@ import socket
 import subprocess
 import sys
 import sysconfig
+import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
+from companion.mavlink.endpoint import SerialPort, TcpClient, TcpServer, parse_endpoint
 from companion.yaml_file import ConfigError
 
 _LOCAL_PORT_OFFSET = 40
 """The vehicle sends from this many ports above the one it sends to."""
 
+_READY = "ready on "
+"""The vehicle says this on its first line, once its ports are open."""
 
-_START = 0.7
-"""A vehicle that cannot start has said so by then, s."""
+_START = 20.0
+"""A vehicle that says neither that nor why it cannot start by then never will, s."""
+
+
+class Wire(NamedTuple):
+    """What joins us and the bundled vehicle.
+
+    Attributes:
+        endpoint: Our end, in our notation.
+        vehicle: Its end, as arguments of its command line.
+    """
+
+    endpoint: str
+    vehicle: tuple[str, ...]
 
 
 class VehicleStoppedError(Exception):
@@ -52,6 +70,39 @@ def free_port() -> int:
     raise ConfigError("no free pair of UDP ports on this machine")
 
 
+def udp_wire() -> Wire:
+    """Free UDP ports.
+
+    Raises:
+        ConfigError: there are none.
+    """
+    port = free_port()
+    return Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
+
+
+@contextmanager
+def wire_like(endpoint: str) -> Iterator[Wire]:
+    """A wire of the kind that an endpoint is, while the block runs: UDP, TCP or serial.
+
+    Over TCP the vehicle listens and we call, whichever way the endpoint says.
+
+    Raises:
+        EndpointError: the endpoint's notation is wrong.
+        ConfigError: there are no free ports.
+    """
+    match parse_endpoint(endpoint):
+        case TcpClient() | TcpServer():
+            with socket.create_server(("127.0.0.1", 0)) as probe:
+                port: int = probe.getsockname()[1]
+            yield Wire(f"tcp://127.0.0.1:{port}", ("--endpoint", f"tcpin://127.0.0.1:{port}"))
+        case SerialPort(_, baud):
+            with tempfile.TemporaryDirectory(prefix="companion-") as folder:
+                path = Path(folder, "vehicle")
+                yield Wire(f"serial://{path}:{baud}", ("--endpoint", f"serial://{path}"))
+        case _:
+            yield udp_wire()
+
+
 def check_mock(config: Path) -> None:
     """Let the vehicle itself check its section of a configuration.
 
@@ -68,8 +119,8 @@ def _run_check(command: list[str]) -> None:
 
 
 @contextmanager
-def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> Iterator[None]:
-    """Run the mock vehicle while the block runs; its own words go to `log`.
+def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> Iterator[None]:
+    """Run the mock vehicle on a wire while the block runs; its own words go to `log`.
 
     It has a session of its own, so that Ctrl-C reaches us alone and the vehicle can still be
     handed back to its autopilot.
@@ -79,14 +130,14 @@ def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> It
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     # No ground station's link: its port is a fixed one, and may be somebody else's.
-    command += ["--port", str(port), "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
+    command += [*wire.vehicle, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
     with log.open("wb") as words:
         process = subprocess.Popen(command, stdout=words, stderr=words, start_new_session=True)
         try:
-            _check_running(process, log, _START)
+            _await_ready(process, log)
             yield
         finally:
-            _check_running(process, log, 0.0)
+            _check_running(process, log)
             process.terminate()
             try:
                 process.wait(timeout=5.0)
@@ -95,8 +146,16 @@ def bundled_vehicle(config: Path, port: int, log: Path, *, lockstep: bool) -> It
                 process.wait()
 
 
-def _check_running(process: "subprocess.Popen[bytes]", log: Path, patience: float) -> None:
-    with suppress(subprocess.TimeoutExpired):
-        process.wait(timeout=patience)
+def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
+    deadline = time.monotonic() + _START
+    while not log.read_text(errors="replace").startswith(_READY):
+        _check_running(process, log)
+        if time.monotonic() > deadline:
+            raise VehicleStoppedError(f"the bundled vehicle does not start, see {log}")
+        time.sleep(0.02)
+
+
+def _check_running(process: "subprocess.Popen[bytes]", log: Path) -> None:
+    if process.poll() is not None:
         last = log.read_text(errors="replace").strip().rpartition("\n")[2]
         raise VehicleStoppedError(f"the bundled vehicle stopped, see {log}: {last}")

@@ -31,6 +31,9 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.write(f"sitl_mock: {error}\n")
         return EXIT_USAGE
     signal.signal(signal.SIGTERM, _interrupt)
+    for server in servers:
+        sys.stdout.write(f"ready on {server.where}\n")
+    sys.stdout.flush()
     try:
         if len(servers) == 1:
             servers[0].run()
@@ -45,10 +48,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m sitl_mock", description="A multirotor with an autopilot, on UDP."
+        prog="python -m sitl_mock",
+        description="A multirotor with its autopilot.",
     )
     parser.add_argument("--config", type=Path, help="YAML file; its `mock` section is read")
     parser.add_argument("--port", type=int, help="where the companion listens (default 14540)")
+    parser.add_argument("--endpoint", help="udp (default), tcpin://HOST:PORT or serial:///PATH")
     parser.add_argument("--gcs-port", type=int, help="where a ground station listens, 0 = none")
     parser.add_argument("--control-port", type=int, help="JSON control channel, 0 = none")
     parser.add_argument("--seed", type=int, help="of all noise and faults")
@@ -61,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, Any]:
-    keys = ("port", "gcs_port", "control_port", "seed", "speed")
+    keys = ("port", "endpoint", "gcs_port", "control_port", "seed", "speed")
     overrides = {key: getattr(options, key) for key in keys if getattr(options, key) is not None}
     if options.lockstep:
         overrides["lockstep"] = {"enabled": True}

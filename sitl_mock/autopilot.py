@@ -15,6 +15,7 @@ from sitl_mock.personalities import personality_of
 from sitl_mock.personality import Parts
 from sitl_mock.receiver import Receiver
 from sitl_mock.settings import MockSettings
+from sitl_mock.signing import link_signing
 from sitl_mock.state import State
 from sitl_mock.vehicle import Vehicle
 from sitl_mock.wire import Framer, Message
@@ -55,12 +56,18 @@ class Autopilot:
         self._rate_hz = settings.airframe.physics_rate_hz
         self._next_commander_us = 0
         self.stream = OffboardStream()
+        signed = settings.signing is not None
         self.companion, self.gcs = (
-            Link(name, Framer(system_id, 1), personality.streams(name, settings))
+            Link(
+                name,
+                Framer(system_id, 1, signed=signed),
+                personality.streams(name, settings),
+                link_signing(settings.signing, name),
+            )
             for name in ("companion", "gcs")
         )
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
-        self._beacon_framer = Framer(system_id, 1)
+        self._beacon_framer = Framer(system_id, 1, signed=signed)
         self._rules = personality.rules(
             Parts(
                 self.state,
@@ -130,7 +137,7 @@ class Autopilot:
         self._send_due(0)
 
     def beacon(self) -> bytes:
-        """Return the lockstep beacon of the present time; no fault touches it."""
+        """Return the lockstep beacon of the present time, unsigned; no fault touches it."""
         return self._beacon_framer.frame(
             dialect.MAVLink_system_time_message(0, self.state.time_us // 1000)
         )

@@ -4,6 +4,7 @@ The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; se
 """
 
 from math import radians
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -216,3 +217,14 @@ class SensorConfig(Section):
     """Age of the estimated attitude, body rates and specific force."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
+
+
+class SigningConfig(Section):
+    """MAVLink 2 signing, on every link of the vehicle."""
+
+    passphrase_file: Path
+    """Its first line is the passphrase; the key is its SHA-256, as ground stations make it."""
+    accept_unsigned: bool = False
+    """Obey frames without a signature, too; wrongly signed ones never."""
+    link_id: Annotated[int, Field(ge=0, le=254)] = 0
+    """Of the companion's link in our signatures; the ground station's has the next."""

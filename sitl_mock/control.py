@@ -60,10 +60,12 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
     ``aborted`` (the autopilot's process has ended: nothing moves or answers any more),
     ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
     ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
-    counted), ``last_setpoint`` (vehicle time in s, None if none).
+    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
+    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
     """
     state, stream = autopilot.state, autopilot.stream
     now = autopilot.vehicle.truth
+    signing = autopilot.companion.signing
     touched = now.touchdown_speed == now.touchdown_speed  # not NaN
     return {
         "time": state.time_s,
@@ -83,4 +85,5 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
         "battery": autopilot.vehicle.battery.remaining,
         "setpoints": stream.received,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
+        "signing": None if signing is None else signing.counts(),
     }

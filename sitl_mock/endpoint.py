@@ -1,78 +1,41 @@
-"""A UDP socket of the mock, with PX4's rule about whom it talks to."""
+"""One end of a wire, whatever it is made of: UDP, TCP or a serial line."""
 
-import contextlib
-import socket
+from typing import Protocol
 
-from sitl_mock.config_errors import ConfigError
-
-HOST = "127.0.0.1"
-_MAX_DATAGRAM = 2048
 MAX_BUNDLE = 1400
 """Bytes of frames joined in one datagram at most."""
 
 
-class Endpoint:
-    """Sends to ``remote_port`` on this machine until somebody speaks, then there for good.
+class Endpoint(Protocol):
+    """Bytes in and out, never blocking. What cannot leave at once is lost."""
 
-    A second sender is heard but gets nothing.
+    @property
+    def where(self) -> str:
+        """Where it is to be found, in words."""
 
-    Args:
-        local_port: to bind.
-        remote_port: to send to from the start; None = nobody until somebody speaks.
-        option: the command-line option that changes the port, for the error message.
+    @property
+    def heard(self) -> bool:
+        """Whether anybody has spoken yet."""
 
-    Raises:
-        ConfigError: the local port is in use.
-    """
+    @property
+    def connected(self) -> bool:
+        """Whether somebody is there to hear; a wire that cannot know says yes."""
 
-    def __init__(self, local_port: int, remote_port: int | None, option: str) -> None:
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self.socket.bind((HOST, local_port))
-        except OSError as error:
-            self.socket.close()
-            raise ConfigError(
-                f"UDP port {local_port} on {HOST} cannot be used ({error.strerror}): is another"
-                f" mock running? Choose a different {option}"
-            ) from error
-        self.socket.setblocking(False)
-        self.heard = False
-        self._partner = None if remote_port is None else (HOST, remote_port)
+    @property
+    def readable(self) -> list[int]:
+        """The file descriptors to wait on."""
 
     def receive(self) -> tuple[bytes, bool] | None:
-        """Return the next datagram and whether the partner sent it; None if there is none."""
-        try:
-            datagram, sender = self.socket.recvfrom(_MAX_DATAGRAM)
-        except OSError:
-            return None
-        if not self.heard:
-            self.heard = True
-            self._partner = sender
-        return datagram, sender == self._partner
+        """Return the next datagram (a wire of bytes: the next frame), None if there is none.
 
-    def receive_from(self) -> tuple[bytes, tuple[str, int]] | None:
-        """Return the next datagram and its sender, without taking anyone as partner."""
-        try:
-            return self.socket.recvfrom(_MAX_DATAGRAM)
-        except OSError:
-            return None
-
-    def send_to(self, datagram: bytes, address: tuple[str, int]) -> None:
-        """Send one datagram to an address."""
-        with contextlib.suppress(OSError):
-            self.socket.sendto(datagram, address)
+        With it comes whether the one who is also sent to has sent it.
+        """
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to the partner; what the network refuses is lost, as on any bad link."""
-        if self._partner is None:
-            return
-        for datagram in datagrams:
-            with contextlib.suppress(OSError):
-                self.socket.sendto(datagram, self._partner)
+        """Send; what the network refuses is lost, as on any bad link."""
 
     def close(self) -> None:
-        """Close the socket."""
-        self.socket.close()
+        """Let go of the wire."""
 
 
 def bundles(frames: list[bytes]) -> list[bytes]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sitl_mock.signing import Signing
 from sitl_mock.streams import StreamSchedule
 from sitl_mock.wire import Framer, Message
 
@@ -13,10 +14,14 @@ class Link:
         name: for logs and faults, e.g. ``companion`` or ``gcs``.
         framer: packs this link's frames.
         streams: this link's telemetry.
+        signing: signs and judges this link's frames; None = nothing is signed or asked to be.
     """
 
-    def __init__(self, name: str, framer: Framer, streams: StreamSchedule) -> None:
+    def __init__(
+        self, name: str, framer: Framer, streams: StreamSchedule, signing: Signing | None = None
+    ) -> None:
         self.name = name
+        self.signing = signing
         self.streams = streams
         self.outbox: list[bytes] = []
         self.gcs_heard = False
@@ -35,6 +40,14 @@ class Link:
         self.outbox.append(self._framer.frame_raw(message_id, crc_extra, payload))
 
     def take(self) -> list[bytes]:
-        """Return the frames that wait, in order, and forget them."""
+        """Return the frames that wait, in order, signed as they leave, and forget them."""
         frames, self.outbox = self.outbox, []
-        return frames
+        return [self.sign(frame) for frame in frames]
+
+    def sign(self, frame: bytes) -> bytes:
+        """Return a frame as it leaves on this link."""
+        return frame if self.signing is None else self.signing.sign(frame)
+
+    def admits(self, message: Message) -> bool:
+        """Whether a message that arrived here may be obeyed."""
+        return self.signing is None or self.signing.admits(message)

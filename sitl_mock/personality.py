@@ -45,8 +45,11 @@ class Occasion(Enum):
     DEFAULT_TAKEOFF_ALTITUDE = auto()
     TAKEOFF_DETECTED = auto()
     LANDING_DETECTED = auto()
-    OFFBOARD_LOST = auto()
-    OFFBOARD_REGAINED = auto()
+    DISARMED_BY_FAILSAFE = auto()
+    FAILSAFE = auto()
+    FAILSAFE_UNNAMED = auto()
+    FAILSAFE_HOLD = auto()
+    FAILSAFE_WARNING = auto()
     GCS_LOST = auto()
     GCS_REGAINED = auto()
     COMPANION_LOST = auto()
@@ -63,13 +66,15 @@ class Event(NamedTuple):
     """How an autopilot tells of an occasion: words for a ground station, an id for machines.
 
     ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = words
-    only; ``arguments`` are the event's bytes.
+    only; ``arguments`` are the event's bytes; ``internal`` is its severity in the vehicle's own
+    log, None = the same.
     """
 
     text: str
     severity: int
     event_id: int = 0
     arguments: bytes = b""
+    internal: int | None = None
 
 
 class Identity(NamedTuple):

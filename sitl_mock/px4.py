@@ -12,7 +12,9 @@ from sitl_mock.parameters import BytewiseEncoding
 from sitl_mock.personality import Event, Identity, Occasion, Parts, Rules
 from sitl_mock.px4_commander import Px4Commander
 from sitl_mock.px4_commands import Px4Commands
+from sitl_mock.px4_event_log import EventLog
 from sitl_mock.px4_events import PX4_EVENTS
+from sitl_mock.px4_health import HealthReport
 from sitl_mock.px4_mode_control import Px4ModeControl
 from sitl_mock.px4_modes import mode_of
 from sitl_mock.px4_streams import SLOT_US, Px4Streams
@@ -108,10 +110,17 @@ class Px4:
     def rules(self, parts: Parts) -> Rules:
         """Put PX4's rules together."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
-        announce = Announcer(state, self, parts.links)
+        events = EventLog(state, parts.links)
+        announce = Announcer(self, parts.links, events)
         control = Px4ModeControl(state, parameters, parts.stream)
         commander = Px4Commander(
-            state, parameters, control, parts.stream, announce, ready_us=parts.ready_us
+            state,
+            parameters,
+            control,
+            parts.stream,
+            announce,
+            HealthReport(state, events, parts.ready_us),
+            ready_us=parts.ready_us,
         )
         builders = {
             **MotionTelemetry(state, vehicle, parts.origin).builders(),
@@ -132,7 +141,10 @@ class Px4:
                 climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
             ),
             builders,
-            handlers={},
+            handlers={
+                "MANUAL_CONTROL": commander.manual_control,
+                "REQUEST_EVENT": events.requested,
+            },
             converged_us=CONVERGED_SHARE * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
         )

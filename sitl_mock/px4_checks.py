@@ -16,6 +16,7 @@ def arming_problem(
     crashed: bool,
     offboard_alive: bool,
     gcs_alive: bool,
+    pilot: bool,
     refusal: str | None,
 ) -> str | None:
     """Return why arming is refused now, None if it is not.
@@ -27,6 +28,7 @@ def arming_problem(
         crashed: whether the vehicle is broken.
         offboard_alive: whether setpoints stream in.
         gcs_alive: whether a ground station is heard.
+        pilot: whether somebody is at the sticks.
         refusal: a reason given from outside (fault injection).
     """
     problems = (
@@ -43,13 +45,13 @@ def arming_problem(
     for present, problem in problems:
         if present:
             return problem
-    return _mode_problem(state.mode, offboard_alive=offboard_alive)
+    return _mode_problem(state.mode, offboard_alive=offboard_alive, pilot=pilot)
 
 
-def _mode_problem(mode: Mode, *, offboard_alive: bool) -> str | None:
+def _mode_problem(mode: Mode, *, offboard_alive: bool, pilot: bool) -> str | None:
     if mode is Mode.OFFBOARD and not offboard_alive:
         return "no offboard signal"
-    if mode in PILOTED:
+    if mode in PILOTED and not pilot:
         return "no manual control input"
     if mode in _NEVER_ARMED_IN:
         return "mode is not suitable for arming"

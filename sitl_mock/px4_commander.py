@@ -1,15 +1,20 @@
 """PX4's rules of arming and modes, by its measured behaviour."""
 
-from sitl_mock.commander import ACCEPTED, TEMPORARILY_REJECTED, Announce
+import struct
+
+from sitl_mock.commander import ACCEPTED, TEMPORARILY_REJECTED
+from sitl_mock.link import Link
 from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
 from sitl_mock.px4_checks import arming_problem
-from sitl_mock.px4_failsafe import Failsafe
+from sitl_mock.px4_failsafe import Announce, Failsafe
+from sitl_mock.px4_health import HealthReport
 from sitl_mock.px4_mode_control import Px4ModeControl
-from sitl_mock.px4_modes import NEEDS_POSITION, PILOTED
+from sitl_mock.px4_modes import NEEDS_POSITION, PILOTED, custom_mode
 from sitl_mock.px4_setpoints import attitude_setpoint
+from sitl_mock.px4_sticks import Sticks
 from sitl_mock.quaternion import Vector
 from sitl_mock.setpoints import position_setpoint
 from sitl_mock.state import State
@@ -28,6 +33,7 @@ class Px4Commander:
         control: told of every mode entered.
         stream: the offboard setpoints.
         announce: tells the outside of an occasion, with a detail.
+        health: tells which checks fail.
         ready_us: vehicle time from which arming is possible.
     """
 
@@ -38,12 +44,17 @@ class Px4Commander:
         control: Px4ModeControl,
         stream: OffboardStream,
         announce: Announce,
+        health: HealthReport,
         *,
         ready_us: int,
     ) -> None:
         self.refusal: str | None = None
         self.pilot = False
-        self.failsafe = Failsafe(state, parameters, stream, announce, self._enter)
+        self.failsafe = Failsafe(
+            state, parameters, stream, announce, self._enter, self._stop_motors
+        )
+        self._sticks = Sticks(parameters)
+        self._health = health
         self._state = state
         self._parameters = parameters
         self._control = control
@@ -99,7 +110,8 @@ class Px4Commander:
         """
         state = self._state
         if state.armed and not self._can_run(mode):
-            self._announce(Occasion.MODE_DENIED, mode.name.capitalize())
+            asked = struct.pack("<I", custom_mode(mode))
+            self._announce(Occasion.MODE_DENIED, mode.name.capitalize(), asked)
             return TEMPORARILY_REJECTED
         state.intended_mode = mode
         self.failsafe.clear()
@@ -117,6 +129,10 @@ class Px4Commander:
     def heard(self, heartbeat: Message) -> None:
         """Note a heartbeat: the links that failsafes watch are told apart by its type."""
         self.failsafe.heard(heartbeat.type)
+
+    def manual_control(self, message: Message, _: Link) -> None:
+        """Take a pilot's sticks."""
+        self._sticks.heard(message, self._state.time_us)
 
     def setpoint(self, message: Message) -> None:
         """Take a setpoint if PX4 would count it, whatever the mode."""
@@ -148,6 +164,7 @@ class Px4Commander:
             crashed=self._crashed,
             offboard_alive=self.offboard_alive,
             gcs_alive=self.failsafe.gcs_alive,
+            pilot=self._at_sticks,
             refusal=self.refusal,
         )
         state.prearm_problem = problem
@@ -165,15 +182,35 @@ class Px4Commander:
         if state.armed and crashed:
             self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
         self.check()
-        if state.armed and state.mode in PILOTED and not self.pilot:
-            self.failsafe.pilot_lost()
-        self.failsafe.step()
+        self._health.step(
+            offboard_alive=self.offboard_alive,
+            pilot=self._at_sticks,
+            gcs_alive=self.failsafe.gcs_alive,
+            gcs_required=self._parameters["NAV_DLL_ACT"] > 0,
+        )
+        self._watch_sticks()
+        self.failsafe.step(pilot=self._at_sticks)
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
                     state.intended_mode = Mode.LOITER
                 self._enter(Mode.LOITER)
             self._disarm_on_ground()
+
+    @property
+    def _at_sticks(self) -> bool:
+        """Whether a pilot is there, by fault injection or by MANUAL_CONTROL."""
+        return self.pilot or self._sticks.present(self._state.time_us)
+
+    def _watch_sticks(self) -> None:
+        """A pilot who moves the sticks takes over, in the air and from any automatic mode."""
+        state = self._state
+        flies_itself = state.armed and not state.landed and state.mode not in PILOTED
+        if not flies_itself or self.failsafe.holds_before_acting:
+            return
+        if self._sticks.override(state.time_us):
+            self._announce(Occasion.PILOT_TOOK_OVER, "")
+            self.request_mode(Mode.POSCTL)
 
     def _disarm_on_ground(self) -> None:
         state, parameters = self._state, self._parameters
@@ -203,7 +240,7 @@ class Px4Commander:
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
             return self.offboard_alive
-        if mode in PILOTED and not self.pilot:
+        if mode in PILOTED and not self._at_sticks:
             return False
         return self._state.position_valid or mode not in NEEDS_POSITION
 
@@ -219,5 +256,6 @@ class Px4Commander:
             return self._asked_takeoff_z
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
-            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}")
+            packed = struct.pack("<f", altitude)
+            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
         return self._state.home_ned[2] - altitude

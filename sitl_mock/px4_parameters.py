@@ -30,9 +30,10 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("COM_OBC_LOSS_T", 5.0),  # *
         ("COM_OBL_RC_ACT", 0),  # *
         ("COM_OF_LOSS_T", 1.0),  # *
-        ("COM_RCL_EXCEPT", 0),
-        ("COM_RC_IN_MODE", 1),
-        ("COM_RC_LOSS_T", 0.5),
+        ("COM_DLL_EXCEPT", 0),  # *
+        ("COM_RCL_EXCEPT", 0),  # *
+        ("COM_RC_IN_MODE", 1),  # *
+        ("COM_RC_LOSS_T", 0.5),  # *
         ("COM_SPOOLUP_TIME", 1.0),  # *
         ("EKF2_NOAID_TOUT", 5000000),  # *
         ("FD_FAIL_P", 60),
@@ -42,7 +43,7 @@ PX4_PARAMETERS: tuple[Parameter, ...] = tuple(
         ("GF_MAX_VER_DIST", 0.0),
         ("IMU_GYRO_RATEMAX", 400),
         ("IMU_INTEG_RATE", 250),
-        ("MAN_OVERRIDE_SPD", 30.0),
+        ("MAN_OVERRIDE_SPD", 1.0),  # *
         ("MAV_0_MODE", 0),
         ("MAV_COMP_ID", 1),
         ("MAV_FWDEXTSP", 1),  # *

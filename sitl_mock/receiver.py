@@ -59,7 +59,12 @@ class Receiver:
         }
 
     def handle(self, message: Message, link: Link) -> None:
-        """Handle one message; what is not for this autopilot, or unknown, is ignored in silence."""
+        """Handle one message.
+
+        What is not for this autopilot, unknown, or not signed as it must be, is ignored in silence.
+        """
+        if not link.admits(message):
+            return
         link.heard = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._for_us(message):

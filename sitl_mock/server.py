@@ -1,17 +1,14 @@
-"""One vehicle on its sockets: the only place with sockets and wall time."""
+"""One vehicle in time: paced by the wall clock, or step by step with its companion."""
 
 import os
-import select
 import time
 
 from sitl_mock.autopilot import Autopilot
-from sitl_mock.control import reply
-from sitl_mock.endpoint import Endpoint, bundles
-from sitl_mock.link import Link
-from sitl_mock.pipe import DatagramPipe
-from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
+from sitl_mock.endpoint import Endpoint
+from sitl_mock.settings import MockSettings
 from sitl_mock.status import StatusLine
 from sitl_mock.wire import Message, decode
+from sitl_mock.wires import Arrived, Wires
 
 BEACON_FIRST_S = 0.05
 """The first beacon is sent again after this much wall time without an answer."""
@@ -44,39 +41,30 @@ class Server:
         self._settings = settings
         self._status = status
         self._autopilot = Autopilot(settings, system_id)
-        self._companion = Endpoint(settings.port + PORT_OFFSET, settings.port, "--port")
-        self._endpoints: dict[Endpoint, Link] = {self._companion: self._autopilot.companion}
-        if settings.gcs_port:
-            gcs = Endpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port, "--gcs-port")
-            self._endpoints[gcs] = self._autopilot.gcs
-        self._control = (
-            Endpoint(settings.control_port, None, "--control-port")
-            if settings.control_port
-            else None
-        )
-        self._sockets = {endpoint.socket: endpoint for endpoint in self._endpoints}
-        self._readable = list(self._sockets)
-        if self._control is not None:
-            self._readable.append(self._control.socket)
-        self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
-        self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
+        self._wires = Wires(settings, self._autopilot)
+        self._companion = self._wires.companion
         self._lockstep = settings.lockstep.enabled
-        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
         self._beacon = b""
         self._answered = False
-        self._collected: list[tuple[bytes, list[Message]]] = []
+        self._collected: list[Arrived] = []
         self._base_wall = 0.0
         self._base_us = 0
         self._autopilot.set_clock(self._clock_ns)
+
+    @property
+    def where(self) -> str:
+        """Where a companion finds the vehicle, in words."""
+        return self._companion.where
 
     def run(self) -> None:
         """Run for ever; a signal's exception ends it."""
         try:
             if self._settings.lockstep.enabled:
-                self._await_client()
+                self._await_answer_to_first_beacon()
             else:
+                self._await_client()
                 self._autopilot.boot()
-                self._flush()
+                self._wires.flush()
             self._rebase()
             while True:
                 self._step()
@@ -85,10 +73,7 @@ class Server:
 
     def close(self) -> None:
         """Close the sockets."""
-        for endpoint in self._endpoints:
-            endpoint.close()
-        if self._control is not None:
-            self._control.close()
+        self._wires.close()
 
     def _step(self) -> None:
         """Fly one slot: in lockstep after the answer to the latest beacon, else when it is time."""
@@ -97,11 +82,11 @@ class Server:
         self._handle_collected()
         self._autopilot.tick()
         if self._settings.lockstep.enabled:
-            self._flush(self._new_beacon())
+            self._wires.flush(self._new_beacon())
             if self._lockstep:
                 self._await_answer()
         else:
-            self._flush()
+            self._wires.flush()
         if self._status is not None:
             self._status.show(self._autopilot)
 
@@ -112,16 +97,16 @@ class Server:
         self._answered = False
         return self._beacon
 
-    def _await_client(self) -> None:
+    def _await_answer_to_first_beacon(self) -> None:
         """Before the time 0 nothing flies: send the beacon until somebody answers.
 
         A client that speaks but does not answer has ``patience_s``.
         """
-        self._companion.send([self._new_beacon()])
+        self._wires.send_beacon(self._new_beacon())
         heard_at: float | None = None
         while not self._answered:
             self._collect(BEACON_FIRST_S)
-            self._companion.send([self._beacon])
+            self._wires.send_beacon(self._beacon)
             now = time.monotonic()
             if heard_at is None and self._companion.heard:
                 heard_at = now
@@ -136,7 +121,7 @@ class Server:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_AGAIN_S
         while not self._answered and time.monotonic() < deadline:
-            self._companion.send([self._beacon])
+            self._wires.send_beacon(self._beacon)
             self._collect(BEACON_AGAIN_S)
         if not self._answered:
             self._lockstep = False
@@ -148,6 +133,7 @@ class Server:
         Spinning a little before sleeping saves two wake-ups a step, most of a round trip's cost.
         """
         began = time.monotonic()
+        self._collect_companion()  # what a wire of bytes already holds wakes nobody
         self._poll(0.0)
         while not self._answered and time.monotonic() - began < SPIN_S:
             self._collect_companion()
@@ -160,15 +146,11 @@ class Server:
 
     def _poll(self, timeout_s: float) -> None:
         """Collect from the companion and serve the others, once something came or in time."""
-        readable, _, _ = select.select(self._readable, (), (), timeout_s)
-        for ready in readable:
-            endpoint = self._sockets.get(ready)
+        for endpoint in self._wires.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()
-            elif endpoint is not None:
-                self._serve(endpoint)
             else:
-                self._serve_control()
+                self._serve(endpoint)
 
     def _collect_companion(self) -> None:
         """Read the companion's datagrams up to and including the answer, never beyond."""
@@ -190,20 +172,16 @@ class Server:
         )
 
     def _handle_collected(self) -> None:
-        """Handle what was collected while waiting, in its order, after the faults of the link."""
+        """Handle what was collected while waiting, in its order."""
         collected, self._collected = self._collected, []
-        autopilot, link = self._autopilot, self._autopilot.companion
-        if self._pipe_in.is_clear(autopilot.faults.link):
-            for _, messages in collected:
-                for message in messages:
-                    autopilot.handle(message, link)
-            return
-        datagrams = [datagram for datagram, _ in collected]
-        for datagram in self._pipe_in.push(datagrams, autopilot.faults.link, autopilot.time_us):
-            for message in decode(datagram):
-                autopilot.handle(message, link)
+        self._wires.deliver(collected, self._companion)
 
     # Paced time
+
+    def _await_client(self) -> None:
+        """Where the wire knows whether somebody is there, nothing boots before."""
+        while not self._companion.connected:
+            self._wires.ready(BEACON_AGAIN_S)
 
     def _rebase(self) -> None:
         self._base_wall = time.monotonic()
@@ -219,13 +197,8 @@ class Server:
         if left < -MAX_LAG_S:
             self._rebase()
         while True:
-            readable, _, _ = select.select(self._readable, (), (), max(0.0, left))
-            for ready in readable:
-                endpoint = self._sockets.get(ready)
-                if endpoint is None:
-                    self._serve_control()
-                else:
-                    self._serve(endpoint)
+            for endpoint in self._wires.ready(max(0.0, left)):
+                self._serve(endpoint)
             left = due - time.monotonic()
             if left <= 0.0 or self._lockstep:
                 return
@@ -234,28 +207,16 @@ class Server:
         return (vehicle_us - self._base_us) / self._settings.speed
 
     def _serve(self, endpoint: Endpoint) -> None:
-        """Read what waits on a socket, handle it now and answer now."""
-        link = self._endpoints[endpoint]
-        autopilot = self._autopilot
-        while True:
-            received = endpoint.receive()
-            if received is None:
-                break
+        """Read what waits on an endpoint, handle it now and answer now."""
+        while (received := endpoint.receive()) is not None:
             datagram, from_partner = received
-            datagrams = [datagram]
-            if endpoint is self._companion and not self._pipe_in.is_clear(autopilot.faults.link):
-                datagrams = self._pipe_in.push(datagrams, autopilot.faults.link, autopilot.time_us)
-            for one in datagrams:
-                for message in decode(one):
-                    autopilot.handle(message, link)
-            if endpoint is self._companion and self._settings.lockstep.enabled:
-                self._resume_lockstep(datagram, from_partner=from_partner)
-        self._flush()
-
-    def _resume_lockstep(self, datagram: bytes, *, from_partner: bool) -> None:
-        """Go back to lockstep when the latest beacon is answered after all."""
-        if from_partner and self._is_answer(decode(datagram)):
-            self._answered = self._lockstep = True
+            messages = decode(datagram)
+            self._wires.deliver([(datagram, messages)], endpoint)
+            in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
+            if in_lockstep and from_partner and self._is_answer(messages):
+                # The latest beacon is answered after all.
+                self._answered = self._lockstep = True
+        self._wires.flush()
 
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC: between slots it goes with the wall clock."""
@@ -265,27 +226,3 @@ class Server:
         wall_us = (time.monotonic() - self._base_wall) * 1e6 * self._settings.speed
         now_us = min(self._base_us + wall_us, autopilot.next_us)
         return round(max(now_us, autopilot.time_us) * 1000)
-
-    # Both
-
-    def _serve_control(self) -> None:
-        control = self._control
-        if control is None:
-            return
-        while True:
-            request = control.receive_from()
-            if request is None:
-                return
-            datagram, sender = request
-            control.send_to(reply(self._autopilot, datagram), sender)
-
-    def _flush(self, beacon: bytes | None = None) -> None:
-        """Send what waits on every link, the companion's through the faults; a beacon last."""
-        autopilot = self._autopilot
-        for endpoint, link in self._endpoints.items():
-            frames = link.take()
-            if endpoint is self._companion and not self._pipe_out.is_clear(autopilot.faults.link):
-                frames = self._pipe_out.push(frames, autopilot.faults.link, autopilot.time_us)
-            if endpoint is self._companion and beacon is not None:
-                frames.append(beacon)
-            endpoint.send(bundles(frames) if self._bundle else frames)

@@ -17,12 +17,14 @@ from sitl_mock.config import (
     RateLoopConfig,
     Section,
     SensorConfig,
+    SigningConfig,
     WindConfig,
 )
 from sitl_mock.config_errors import ConfigError, explain, suggestion
 from sitl_mock.fault_config import Fault
 from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
 from sitl_mock.px4_parameters import PX4_PARAMETERS
+from sitl_mock.wiring import for_vehicle, parse_wiring
 
 PORT_OFFSET = 40
 """The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
@@ -61,6 +63,9 @@ class MockSettings(Section):
     autopilot: Literal["px4", "ardupilot"] = "px4"
     """Whose rules it follows; ArduPilot's brings its own airframe, battery and rate loop along."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
+    endpoint: str = "udp"
+    """The companion's wire: udp (by ``port``), tcpin://HOST:PORT (for one client, and nothing boots
+    before it is there) or serial:///PATH (a pseudo-terminal, PATH a link to it)."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
     """0 = no ground station link."""
     control_port: Port = 0
@@ -75,6 +80,8 @@ class MockSettings(Section):
     prearm_delay_s: NonNegative = 4.5
     """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""
     lockstep: LockstepConfig = LockstepConfig()
+    signing: SigningConfig | None = None
+    """None: nothing is signed, and signatures are not looked at."""
     home: HomeConfig = HomeConfig()
     parameters: dict[str, Finite] = Field(default_factory=dict)
     """Autopilot parameters that differ from their defaults."""
@@ -84,6 +91,12 @@ class MockSettings(Section):
     battery: BatteryConfig = BatteryConfig()
     sensors: SensorConfig = SensorConfig()
     faults: tuple[Fault, ...] = ()
+
+    @field_validator("endpoint")
+    @classmethod
+    def _known_endpoint(cls, endpoint: str) -> str:
+        parse_wiring(endpoint)
+        return endpoint
 
     @model_validator(mode="before")
     @classmethod
@@ -118,6 +131,7 @@ class MockSettings(Section):
         return self.model_copy(
             update={
                 "port": self.port + index,
+                "endpoint": for_vehicle(self.endpoint, index),
                 "gcs_port": self.gcs_port + index if self.gcs_port else 0,
                 "control_port": self.control_port + index if self.control_port else 0,
                 "seed": self.seed + index,

@@ -13,15 +13,20 @@ from typing import Any
 from fastcrc import crc16
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.event_messages import event_request
+
 Message = Any
 """A pymavlink message object; the generated classes carry no usable types."""
 
 _MAGIC_V1 = 0xFE
 _MAGIC_V2 = 0xFD
-_SIGNED = 0x01
+SIGNED = 0x01
+"""Incompatibility flag of a signed frame."""
+SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
 _OVERHEAD_V2 = 12
-_SIGNATURE = 13
+_FLAGS_AT = 2
+_UNTOLD = -1
 
 _HEADER = struct.Struct("<BBBBBBHB")
 _CRC = struct.Struct("<H")
@@ -33,14 +38,14 @@ _decoder = dialect.MAVLink(None)
 def decode(datagram: bytes) -> list[Message]:
     """Return the valid messages of a datagram in their order; whatever else is in it is skipped.
 
-    MAVLink 1 and 2 frames are taken, signed ones without checking the signature (as PX4 does when
-    signing is off). A frame may not span datagrams.
+    MAVLink 1 and 2 frames are taken, signed ones without checking the signature (`Link.admits`
+    does that). A frame may not span datagrams.
     """
     messages: list[Message] = []
     start = 0
     while start < len(datagram):
-        length = _frame_length(datagram, start)
-        if length == 0:
+        length = _announced_length(datagram, start)
+        if not 0 < length <= len(datagram) - start:
             start += 1
             continue
         try:
@@ -49,32 +54,61 @@ def decode(datagram: bytes) -> list[Message]:
             start += 1
             continue
         start += length
-        if not isinstance(message, dialect.MAVLink_unknown):
+        if isinstance(message, dialect.MAVLink_unknown):
+            message = event_request(message)
+        if message is not None:
             messages.append(message)
     return messages
 
 
-def _frame_length(datagram: bytes, start: int) -> int:
-    """Return the length of the frame that seems to begin at ``start``, or 0 if none can."""
-    left = len(datagram) - start
-    if datagram[start] == _MAGIC_V2 and left >= _OVERHEAD_V2:
-        flags = datagram[start + 2]
-        if flags & ~_SIGNED:
+def split(data: bytes) -> tuple[list[bytes], bytes]:
+    """Return what seem to be the whole frames in a stream of bytes, and the rest that waits.
+
+    What cannot begin a frame is skipped; whether a frame is intact, `decode` finds out.
+    """
+    frames: list[bytes] = []
+    start = 0
+    while start < len(data):
+        length = _announced_length(data, start)
+        if length == _UNTOLD or length > len(data) - start:
+            break
+        if length:
+            frames.append(data[start : start + length])
+        start += length or 1
+    return frames, data[start:]
+
+
+def _announced_length(data: bytes, start: int) -> int:
+    """Return the length of the frame whose header is at ``start``.
+
+    0 if no frame begins there, `_UNTOLD` if the data ends before the header tells.
+    """
+    left = len(data) - start
+    if data[start] == _MAGIC_V2:
+        if left < _FLAGS_AT + 1:
+            return _UNTOLD
+        flags = data[start + _FLAGS_AT]
+        if flags & ~SIGNED:
             return 0
-        length = _OVERHEAD_V2 + datagram[start + 1] + (_SIGNATURE if flags & _SIGNED else 0)
-    elif datagram[start] == _MAGIC_V1 and left >= _OVERHEAD_V1:
-        length = _OVERHEAD_V1 + datagram[start + 1]
-    else:
-        return 0
-    return length if length <= left else 0
+        return _OVERHEAD_V2 + data[start + 1] + (SIGNATURE_BYTES if flags & SIGNED else 0)
+    if data[start] == _MAGIC_V1:
+        return _UNTOLD if left < _FLAGS_AT else _OVERHEAD_V1 + data[start + 1]
+    return 0
 
 
 class Framer:
-    """Packs messages of one component on one link, as MAVLink 2, counting the sequence number."""
+    """Packs messages of one component on one link, as MAVLink 2, counting the sequence number.
 
-    def __init__(self, system_id: int, component_id: int) -> None:
+    Args:
+        system_id: of the sender.
+        component_id: of the sender.
+        signed: leave each frame to be signed; see `Signing.sign`.
+    """
+
+    def __init__(self, system_id: int, component_id: int, *, signed: bool = False) -> None:
         self._system_id = system_id
         self._component_id = component_id
+        self._flags = SIGNED if signed else 0
         self._sequence = 0
 
     def frame(self, message: Message) -> bytes:
@@ -91,7 +125,7 @@ class Framer:
         payload = payload.rstrip(b"\0") or b"\0"
         body = _HEADER.pack(
             len(payload),
-            0,
+            self._flags,
             0,
             self._sequence,
             self._system_id,

@@ -2,11 +2,12 @@
 
 import asyncio
 import sys
+from typing import NoReturn
 
 from companion.attitude import Target
 from companion.config import Config
 from companion.flight.assembly import hover_thrust, planner, rate_limits
-from companion.flight.control_loop import Command, ControlLoop, Deadlines
+from companion.flight.control_loop import Command, ControlLoop, Deadlines, SendSetpoint
 from companion.mavlink import Link, LinkSettings
 from companion.mavlink import loop as link_loop
 from companion.recording.trace import FlightTrace
@@ -15,23 +16,28 @@ _GUIDANCE_PERIOD_S = 0.02
 
 
 async def fly(port: int) -> None:
-    """Answer each sample until killed; guidance leaves a fresh target 50 times a second."""
+    """Answer each sample until killed."""
+    async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
+        await answer(link, link.send_setpoint)
+
+
+async def answer(link: Link, send: SendSetpoint) -> NoReturn:
+    """Have the control loop answer; guidance leaves a fresh target 50 times a second."""
     config = Config()
     now = asyncio.get_running_loop().time
-    async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
-        loop = ControlLoop(
-            planner(config),
-            hover_thrust(config),
-            link.send_setpoint,
-            Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
-            FlightTrace(),
-            rate_limits(config),
-        )
-        loop.on = True
-        link.on_attitude = loop.on_sample
-        while True:
-            loop.command = Command(Target(0.1, 0.0, 0.0), 0.0, now())
-            await asyncio.sleep(_GUIDANCE_PERIOD_S)
+    loop = ControlLoop(
+        planner(config),
+        hover_thrust(config),
+        send,
+        Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
+        FlightTrace(),
+        rate_limits(config),
+    )
+    loop.on = True
+    link.on_attitude = loop.on_sample
+    while True:
+        loop.command = Command(Target(0.1, 0.0, 0.0), 0.0, now())
+        await asyncio.sleep(_GUIDANCE_PERIOD_S)
 
 
 if __name__ == "__main__":

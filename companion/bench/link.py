@@ -1,8 +1,8 @@
 """`companion bench link`: how long a sample takes to become a setpoint, ours and others'.
 
-One sender plays the vehicle to four programs in turn, in short rounds, so that all of them meet
+One sender plays the vehicle to five programs in turn, in short rounds, so that all of them meet
 the same state of the machine: a bare echo in Python (the floor), this program, what one writes
-oneself on pymavlink, and MAVSDK.
+oneself on pymavlink, this program by way of MAVSDK, and MAVSDK as its users write it.
 """
 
 import gc
@@ -22,6 +22,7 @@ _ROUND_S = 1.0
 _NO_WRAP = 2**32
 _YAW_RATE_WRAP = 8192
 _OWN_LOOP = "companion.bench.pymavlink_program"
+_BACKEND = "companion.bench.backend_program"
 
 
 class _Entry(NamedTuple):
@@ -36,6 +37,9 @@ _ENTRIES = (
     _Entry("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
     _Entry("companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP),
     _Entry("pymavlink", "blocking pymavlink", _OWN_LOOP, stamp_by_time, _NO_WRAP),
+    _Entry(
+        "companion_mavsdk", "companion, backend mavsdk", _BACKEND, stamp_by_yaw_rate, _YAW_RATE_WRAP
+    ),
     _Entry("mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 
@@ -49,9 +53,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         as_json: Print nothing; the caller prints what is returned.
 
     Returns:
-        For `echo`, `companion`, `pymavlink` and `mavsdk`: `p50_us`, `p99_us`, `max_us`,
-        `cpu_percent` (of one core), `samples` and `unanswered`; and `ratio` of the p50s,
-        `companion_to_…` each of the others.
+        For `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`, `p99_us`,
+        `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`; and `ratio` of the p50s,
+        `companion_to_…` those that are not ours.
 
     Raises:
         MissingExtraError: MAVSDK is not installed.

@@ -21,9 +21,11 @@ from companion.doctor.gathering import identify
 from companion.doctor.repair import Answer, Outcome, mend, require_disarmed, restore
 from companion.doctor.report import as_dict, outcome_as_dict, outcome_line, tables
 from companion.doctor.undo import Undo, UndoFile
-from companion.flight.assembly import link_settings
+from companion.flight.assembly import open_link
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.inbox import Notice
+from companion.mavlink.link import Link
 from companion.mavlink.parameter_survey import survey
 from companion.terminal import read_line
 from companion.yaml_file import ConfigError
@@ -75,7 +77,7 @@ class _Visit:
     async def examine(self, wait: float, *, fix: bool, unasked: bool) -> int:
         """Look, tell, and mend if asked to; what is found after that decides the exit code."""
         config = self._config
-        async with patient(config, link_settings(config)) as vehicle:
+        async with patient(config, self._link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
             findings = await vehicle.met()
             if findings:
@@ -87,9 +89,12 @@ class _Visit:
                 code = await self._mend(vehicle, evidence, findings, unasked=unasked)
         return code
 
+    def _link(self, notice: Notice) -> Link:
+        return open_link(self._config, None, notice)
+
     async def restore(self, undo: Undo, path: Path) -> int:
         """Set the parameters back to what an undo file says."""
-        async with patient(self._config, link_settings(self._config)) as vehicle:
+        async with patient(self._config, self._link) as vehicle:
             findings = await vehicle.met()
             if findings:
                 return self._told(findings)

@@ -13,6 +13,7 @@ from typing import Any
 from companion import demo
 from companion.config import Config
 from companion.config_file import changed, load
+from companion.extras import require
 from companion.flight.outer_loop import predictive_settings
 from companion.flight.programmes import programme
 from companion.flight.session import Session
@@ -20,6 +21,7 @@ from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.nmpc.solvers import compile_ahead
+from companion.realtime import RealtimeError
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
 from companion.terminal import FlightConsole, TerminalObserver
@@ -53,6 +55,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     programme(told)
     if told.guidance.kind == "nmpc":
         compile_ahead(predictive_settings(told), told.nmpc.python)
+    if told.link.backend == "mavsdk":
+        require("mavsdk", "mavsdk", "link.backend: mavsdk")
     return told
 
 
@@ -83,6 +87,7 @@ def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
     Raises:
         LinkError: the link could not be opened; nothing was sent.
         OSError: the folder cannot be written; nothing was sent.
+        RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
     session = Session(config, folder, observer, observer.ask_landing)
@@ -91,7 +96,7 @@ def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
         stack.callback(observer.close)
         try:
             summary = run(_interruptible(session))
-        except (EndpointError, SigningError):
+        except (EndpointError, RealtimeError, SigningError):
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
     # From here on the vehicle is in other hands, and all is on the disk.
@@ -109,18 +114,21 @@ def fly_bundled(
 ) -> Summary:
     """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
 
+    They are joined as `link.endpoint` says, by UDP, TCP or a serial line, on free ports.
+
     Raises:
         ConfigError: the configuration, or the vehicle's own section of it, is wrong.
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
-    port = demo.free_port()
-    options.endpoint, options.arm = f"udpin://127.0.0.1:{port}", True
-    config = as_told(load(path), options, planner)
-    demo.check_mock(path)
-    folder = flight_folder(config)
-    with demo.bundled_vehicle(path, port, folder / "mock.log", lockstep=config.link.lockstep):
-        return fly(config, folder, console)
+    config = load(path)
+    with demo.wire_like(config.link.endpoint) as wire:
+        options.endpoint, options.arm = wire.endpoint, True
+        config = as_told(config, options, planner)
+        demo.check_mock(path)
+        folder = flight_folder(config)
+        with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
+            return fly(config, folder, console)
 
 
 async def _interruptible(session: Session) -> Summary:

@@ -1,7 +1,7 @@
 """One visit to the doctor: connect, wait a little for the vehicle to be ready, listen, judge."""
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 
 from companion.config import Config
@@ -10,9 +10,9 @@ from companion.doctor.finding import Finding, Key
 from companion.doctor.gathering import gather, wanted_rates
 from companion.doctor.link_checks import signing_findings
 from companion.mavlink.errors import LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import Verdict
-from companion.mavlink.settings import LinkSettings
 
 _LISTENING = 3.0
 """s; enough to count what comes at 2 Hz."""
@@ -64,15 +64,19 @@ class Patient:
 
 
 @asynccontextmanager
-async def patient(config: Config, settings: LinkSettings) -> AsyncIterator[Patient]:
+async def patient(config: Config, link_to: Callable[[Notice], Link]) -> AsyncIterator[Patient]:
     """Open the link; nothing but heartbeats and clock requests leaves before something is asked.
+
+    Args:
+        config: What the vehicle is to be flown with.
+        link_to: Makes the link, which tells of itself to what it is given.
 
     Raises:
         EndpointError: the endpoint cannot be opened.
         LinkTimeout: lockstep is asked for, and the vehicle is not in lockstep.
     """
     notices: list[str] = []
-    async with Link(settings, notice=notices.append) as link:
+    async with link_to(notices.append) as link:
         yield Patient(config, link, notices)
 
 

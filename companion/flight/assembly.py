@@ -21,9 +21,12 @@ from companion.flight.rig import Rig
 from companion.flight.safety import Fence, SafetyMonitors
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, ThrustSettings
+from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
+from companion.mavlink.transport import Tap
+from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 
@@ -45,6 +48,33 @@ def link_settings(config: Config) -> LinkSettings:
         source_component=link.source_component,
         signing=_signing(link.signing_key_file),
         lockstep=link.lockstep,
+    )
+
+
+def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
+    """The link that `link.backend` names, not open yet; `tap` and `notice` as of `Link`.
+
+    Raises:
+        SigningError: the key cannot be used.
+        EndpointError: the endpoint's notation is wrong.
+    """
+    settings = link_settings(config)
+    if config.link.backend == "mavsdk":
+        from companion.mavsdk_link.link import MavsdkLink  # noqa: PLC0415  needs the extra
+
+        return MavsdkLink(settings, tap, notice)
+    return Link(settings, tap, notice=notice)
+
+
+def realtime_wishes(config: Config) -> Wishes:
+    """What to ask of the operating system."""
+    section = config.realtime
+    return Wishes(
+        fifo_priority=section.priority if section.scheduler == "fifo" else None,
+        processors=section.cpu_affinity,
+        lock_memory=section.lock_memory,
+        freeze_gc=section.freeze_gc,
+        required=section.required,
     )
 
 
@@ -161,10 +191,12 @@ class Assembled:
         )
 
 
-def assemble(config: Config, link: Link, observer: Observer, ask_landing: AskLanding) -> Assembled:
-    """Wire the rooms together over an open link."""
+def assemble(
+    config: Config, link: Link, observer: Observer, ask_landing: AskLanding, folder: Path
+) -> Assembled:
+    """Wire the rooms together over an open link; what is noted in flight waits in `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
-    trace = FlightTrace()
+    trace = FlightTrace(folder)
     thrust = hover_thrust(config)
     deadman = config.deadman
     loop = ControlLoop(

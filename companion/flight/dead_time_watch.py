@@ -20,6 +20,8 @@ _UNSURE = 1.5
 """So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
 _LONGEST = 75_000
 """The measurement at the end is over so many rows at most, the newest: 5 min at 250 Hz."""
+_AGES = 150
+"""Sample ages are kept for so many looks: of the newest 5 min, too."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED = 2, 6
 """Columns of `FlightTrace.rates` at which roll, pitch and yaw begin."""
@@ -67,7 +69,7 @@ class DeadTimeWatch:
         self._due = -inf
         self._looks = 0
         self._row_counts = deque([0], maxlen=_LOOKS + 1)  # at the last looks
-        self._ages: list[NDArray[np.float64]] = []
+        self._ages: deque[NDArray[np.float32]] = deque(maxlen=_AGES)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -93,7 +95,7 @@ class DeadTimeWatch:
 
     def over_the_flight(self) -> DeadTimes:
         """Measure over all that was flown, and warn if that is still to be done."""
-        rows = self._trace.rates_rows(max(0, self._trace.rates_count - _LONGEST))
+        rows = self._trace.rates_rows(max(0, len(self._trace.rates) - _LONGEST))
         ages = np.concatenate(self._ages) if self._ages else np.empty(0)
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
@@ -106,10 +108,10 @@ class DeadTimeWatch:
     def _note_ages(self) -> None:
         """How old the samples since the last look were when they arrived."""
         rows = self._trace.rates_rows(self._row_counts[-1])
-        self._row_counts.append(self._trace.rates_count)
+        self._row_counts.append(len(self._trace.rates))
         offset = self._clock_offset()
         if offset is not None:
-            self._ages.append(rows[:, 1] + offset - rows[:, 0])
+            self._ages.append((rows[:, 1] + offset - rows[:, 0]).astype(np.float32))
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """What the rows say of one axis."""

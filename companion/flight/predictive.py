@@ -1,5 +1,6 @@
 """Predictive control beside linear guidance: what it does not answer in time, linear flies."""
 
+from array import array
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -44,7 +45,7 @@ class PredictiveRecord:
 
     flown: int = 0
     troubles: Counter[Trouble] = field(default_factory=Counter)
-    seconds: list[float] = field(default_factory=list)
+    seconds: "array[float]" = field(default_factory=lambda: array("d"))
 
 
 class Predictive:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import yaml
 
+from companion import realtime
 from companion.config import Config
-from companion.flight.assembly import Assembled, assemble, link_settings
+from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.chronicle import Chronicle
 from companion.flight.ending import FlightEnded
 from companion.flight.flight import AskLanding
@@ -56,27 +57,32 @@ class Session:
         Raises:
             LinkError: the link could not be opened; nothing was sent.
             OSError: the folder cannot be written; nothing was sent.
+            RealtimeError: what `realtime` requires is not granted; nothing was sent.
         """
-        settings = link_settings(self._config)
         flown = yaml.safe_dump(self._config.model_dump(mode="json"), sort_keys=False)
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         loop = asyncio.get_running_loop()
-        epoch = 0.0 if settings.lockstep else time.time() - loop.time()
+        epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 
         def on_failure(text: str) -> None:  # called in the writing thread
             loop.call_soon_threadsafe(self._note, text)
 
-        with TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog:
-            async with Link(settings, tap=tlog, notice=self._note) as link:
-                self._assembled = assemble(self._config, link, self._observer, self._ask_landing)
-                for text in self._early_notes:
-                    self._note(text)
+        with (
+            realtime.asked_for(realtime_wishes(self._config)) as grants,
+            TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
+        ):
+            async with open_link(self._config, tlog, self._note) as link:
+                self._assembled = assemble(
+                    self._config, link, self._observer, self._ask_landing, self._folder
+                )
+                for text in (*self._early_notes, *map(str, grants)):
+                    self._assembled.flight.note(text)
                 try:
                     result = await self._run(link, self._assembled)
                 finally:
                     self._assembled.close()
         await asyncio.sleep(0)  # a last word of the writing thread
-        return self._finish(link, self._assembled, result, tlog.dropped)
+        return self._finish(link, self._assembled, result, tlog.dropped, grants)
 
     def _note(self, text: str) -> None:
         if self._assembled is None:
@@ -114,14 +120,26 @@ class Session:
             link.on_attitude = None
             chronicle.look()
 
-    def _finish(self, link: Link, assembled: Assembled, result: str, tlog_dropped: int) -> Summary:
+    def _finish(
+        self,
+        link: Link,
+        assembled: Assembled,
+        result: str,
+        tlog_dropped: int,
+        grants: tuple[realtime.Grant, ...],
+    ) -> Summary:
         counts = {
             name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
         }
         flight = assembled.flight
         dead_times = assembled.dead_time_watch.over_the_flight()
         guide = assembled.rig.guide
-        for surprise in (guide.learning.surprise(), guide.estimate.surprise()):
+        trace = assembled.trace
+        for surprise in (
+            guide.learning.surprise(),
+            guide.estimate.surprise(),
+            trace.surprise(),
+        ):
             if surprise is not None:
                 flight.note(surprise)
         summary = Summary(
@@ -131,15 +149,16 @@ class Session:
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
             link={**counts, "not_recorded": tlog_dropped},
-            trace=assembled.trace,
+            trace=trace,
             events=flight.events,
             log=self._folder,
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
+            realtime={grant.name: grant.refusal or "granted" for grant in grants},
         )
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            assembled.trace.save(self._folder)
+            trace.save(self._folder)
         except OSError as error:
             flight.note(f"{self._folder}: not everything was written: {error.strerror}")
         return summary

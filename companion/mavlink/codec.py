@@ -29,6 +29,10 @@ CRC_EXTRA: dict[int, bytes] = {
 }
 MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in dialect.mavlink_map.items()}
 
+UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
+"""Messages of MAVLink common that pymavlink's dialects lack: only their payloads can be had."""
+CRC_EXTRA |= {410: bytes([160]), 411: bytes([106])}
+
 IGNORE_ATTITUDE = 128
 """ATTITUDE_TARGET_TYPEMASK: obey all three rates and the thrust, ignore the quaternion. The only
 mask this program ever sends: any other leaves some field to the autopilot's fancy."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from companion.mavlink.endpoint import Endpoint, UdpIn, UdpOut
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.inbox import Inbox
-from companion.mavlink.opening import open_transport
+from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.stats import LinkStats
 
@@ -28,6 +28,7 @@ class Connection:
         outbox: Sends over the transport that is open, or drops what it is given.
         stats: Counts the reconnects.
         dropped: Called with the reason of each drop.
+        opener: Opens the transport.
     """
 
     def __init__(
@@ -37,9 +38,10 @@ class Connection:
         outbox: Outbox,
         stats: LinkStats,
         dropped: Callable[[str], None],
+        opener: OpenTransport = open_transport,
     ) -> None:
         self._endpoint, self._inbox, self._outbox = endpoint, inbox, outbox
-        self._stats, self._dropped = stats, dropped
+        self._stats, self._dropped, self._opener = stats, dropped, opener
         self._reopening: asyncio.Task[None] | None = None
         self._lost_early: str | None = None
 
@@ -57,7 +59,7 @@ class Connection:
         # Before the transport is there: its first bytes may come before we run again.
         self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
         self._lost_early = None
-        transport = await open_transport(self._endpoint, self._inbox.receive, self._on_lost)
+        transport = await self._opener(self._endpoint, self._inbox.receive, self._on_lost)
         if self._lost_early is not None:
             transport.close()
             raise EndpointError(f"the connection was dropped at once: {self._lost_early}")

@@ -16,10 +16,12 @@ from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.framing import Frame
 from companion.mavlink.inbox import Inbox, Notice
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.presence import send_heartbeat, send_heartbeats, synchronise
+from companion.mavlink.px4_events import EventReader
 from companion.mavlink.records import Heartbeat
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.samples import AttitudeSample
@@ -43,6 +45,7 @@ class Link:
     Args:
         settings: Where the vehicle is and who we are.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+        opener: Opens the transport.
         notice: Told, once each, of what keeps the two sides from understanding each other; by
             default the log.
 
@@ -57,7 +60,11 @@ class Link:
     """
 
     def __init__(
-        self, settings: LinkSettings, tap: Tap | None = None, notice: Notice = _LOG.warning
+        self,
+        settings: LinkSettings,
+        tap: Tap | None = None,
+        opener: OpenTransport = open_transport,
+        notice: Notice = _LOG.warning,
     ) -> None:
         endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
@@ -70,10 +77,13 @@ class Link:
         self._inbox = Inbox(settings, self.stats, router, tap, notice)
         self._outbox = outbox = Outbox(settings, self.stats, tap)
         self.state = VehicleState(router, self.stats, texts, self._loop.time)
+        router.subscribe_raw("EVENT", EventReader(texts, self._loop.time).take)
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(settings, outbox, router, self._registry)
-        self._connection = Connection(endpoint, self._inbox, outbox, self.stats, self._on_dropped)
+        self._connection = Connection(
+            endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
+        )
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):

@@ -1,5 +1,7 @@
 """From an endpoint's notation to an open transport."""
 
+from collections.abc import Awaitable, Callable
+
 from companion.mavlink.endpoint import (
     Endpoint,
     SerialPort,
@@ -13,6 +15,9 @@ from companion.mavlink.serial_port import SerialTransport
 from companion.mavlink.tcp import open_tcp_client, open_tcp_server
 from companion.mavlink.transport import Lost, Receive, Transport
 from companion.mavlink.udp import open_udp
+
+OpenTransport = Callable[[Endpoint, Receive, Lost], Awaitable[Transport]]
+"""As `open_transport`, for a parsed endpoint."""
 
 
 async def open_transport(endpoint: str | Endpoint, receive: Receive, lost: Lost) -> Transport:

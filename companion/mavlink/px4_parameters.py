@@ -116,7 +116,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("MAN_OVERRIDE_SPD",),
         "how quickly the sticks must be moved to take over (1.18 on)",
-        positive(INEFFECTIVE, _STICKS_DO_NOTHING, 30.0),
+        positive(INEFFECTIVE, _STICKS_DO_NOTHING, 1.0),
         _REFERENCE,
     ),
     ParameterRule(

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
-from companion.mavlink.codec import Message, decode, message_id
+from companion.mavlink.codec import UNDECODED, Message, decode, message_id
 from companion.mavlink.stats import LinkStats
 
 _LOG = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ class Router:
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
         """Call `callback` with each payload of that message, trailing zeros cut."""
-        return _add(self._raw, message_id(name), callback)
+        return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 
     def route(self, number: int, payload: bytes) -> None:
         """Pass one message on."""

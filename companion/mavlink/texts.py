@@ -7,6 +7,7 @@ from companion.mavlink.codec import Message
 
 _CHUNK_CHARACTERS = 50
 _KEPT = 100
+_SAME_WITHIN_S = 1.0
 
 
 class StatusText(NamedTuple):
@@ -27,7 +28,7 @@ class TextAssembler:
     """Joins the pieces of long texts. The newest 100 texts are kept in `texts`.
 
     A text whose end or middle never comes is given as far as it is known when the next one
-    begins.
+    begins. What is told as a text and as an event as well is kept once.
     """
 
     def __init__(self) -> None:
@@ -35,6 +36,14 @@ class TextAssembler:
         self._id = 0
         self._parts: list[str] = []
         self._severity = 6
+        self._events: deque[StatusText] = deque(maxlen=_KEPT)
+
+    def take_event(self, severity: int, words: str, now: float) -> None:
+        """Take the words of an event."""
+        if not _told(self.texts, words, now):
+            event = StatusText(now, severity, words)
+            self.texts.append(event)
+            self._events.append(event)
 
     def take(self, message: Message, now: float) -> None:
         """Take one STATUSTEXT."""
@@ -62,5 +71,10 @@ class TextAssembler:
 
     def _keep(self, now: float, severity: int, text: str) -> None:
         words = text.rstrip("\t ").strip()
-        if words:
+        if words and not _told(self._events, words, now):
             self.texts.append(StatusText(now, severity, words))
+
+
+def _told(told: deque[StatusText], words: str, now: float) -> bool:
+    """Whether these words are among those of the last second."""
+    return any(one.text == words for one in told if one.time >= now - _SAME_WITHIN_S)

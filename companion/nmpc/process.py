@@ -23,6 +23,7 @@ from companion.attitude.kinematics import tilt_products
 from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
 from companion.nmpc.settings import Settings
 from companion.nmpc.solvers import check
+from companion.realtime import schedule_as_usual
 from companion.trajectory.sample import Trajectory
 
 _LARGEST_MESSAGE = 4096
@@ -108,6 +109,7 @@ class Solver:
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
+        schedule_as_usual(self.pid)  # it computes all the time, and must not have our priority
         self.alive = True
 
     @property

@@ -72,6 +72,7 @@ class Summary:
         log: the flight's folder.
         dead_times: how long the vehicle took to answer.
         predictive: what came of predictive control; None where it did not fly.
+        realtime: what was asked of the operating system: "granted", or why not.
     """
 
     result: str
@@ -85,6 +86,7 @@ class Summary:
     log: Path | None = None
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
+    realtime: dict[str, str] = field(default_factory=dict)
 
     def response(self) -> StepResponse | None:
         """The measured step response, or None where no step was flown."""
@@ -96,7 +98,7 @@ class Summary:
 
     def latency_us(self) -> dict[str, float]:
         """p50, p99 and max of sample in → setpoint out inside this process, µs."""
-        latencies = np.array(self.trace.latencies_ns, dtype=np.float64) / 1e3
+        latencies = self.trace.latencies_ns.rows()[:, 0] / 1e3
         if len(latencies) == 0:
             return {"p50": math.nan, "p99": math.nan, "max": math.nan}
         p50, p99 = np.percentile(latencies, (50, 99))
@@ -133,6 +135,7 @@ class Summary:
             "dead_time_s": _dead_times_as_dict(self.dead_times),
             "tracking": _without_nan(self.tracking()),
             "nmpc": None if self.predictive is None else self.predictive.as_dict(),
+            "realtime": self.realtime,
             "link": self.link,
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
             "log": None if self.log is None else str(self.log),

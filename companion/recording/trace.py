@@ -1,16 +1,15 @@
-"""What control did, sample by sample, kept in memory for the measurements after the flight."""
+"""What control did, sample by sample, kept for the measurements after the flight."""
 
-from array import array
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import BodyRates, Quaternion, Target
+from companion.recording.series import Series, Spool
 
-_MAX_SAMPLES = 500_000
-"""Half an hour at 250 Hz; later samples are not measured, only recorded in the tlog."""
+_LOOKED_AT = 10_240
+"""So many of the newest rates are looked at in flight: 10 s at 1000 Hz."""
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (
@@ -27,30 +26,32 @@ _RATES = (
 )
 
 
-@dataclass(slots=True)
 class FlightTrace:
-    """Rows of plain numbers, appended in flight; `fromlist` takes half the time that `extend` does.
+    """All rows of one flight.
+
+    Args:
+        folder: where rows wait that are too many for the memory; None: where the system has its
+            temporary files. They are gone with the trace; `save` writes what is to stay.
 
     Attributes:
-        response: rows (vehicle time s, w, x, y, z, target north, target east), of steps only.
-        tracking: rows (vehicle time s, reference north, east, down, measured north, east, down).
-        rates: rows (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
+        response: (vehicle time s, w, x, y, z, target north, target east), of steps only.
+        tracking: (vehicle time s, reference north, east, down, measured north, east, down).
+        rates: (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
             rad/s, thrust 0..1, measured roll, pitch, yaw rad/s), while the autopilot obeys us,
-            for all that its heartbeats tell. Once full, a new row takes the oldest one's place.
-        rates_count: rows of `rates` that were ever noted.
+            for all that its heartbeats tell.
         latencies_ns: sample in → setpoint out inside this process, ns.
     """
 
-    response: "array[float]" = field(default_factory=lambda: array("d"))
-    tracking: "array[float]" = field(default_factory=lambda: array("d"))
-    rates: "array[float]" = field(default_factory=lambda: array("d"))
-    rates_count: int = 0
-    latencies_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    def __init__(self, folder: Path | None = None) -> None:
+        self._spool = Spool(folder)
+        self.response = Series(_RESPONSE, self._spool)
+        self.tracking = Series(_TRACKING, self._spool)
+        self.rates = Series(_RATES, self._spool, kept=_LOOKED_AT)
+        self.latencies_ns = Series(("latency_ns",), self._spool)
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
         """Note an attitude sample that was answered during a step."""
-        if len(self.response) < len(_RESPONSE) * _MAX_SAMPLES:
-            self.response.fromlist([vehicle_time, *q, target.north, target.east])
+        self.response.add([vehicle_time, *q, target.north, target.east])
 
     def add_tracking(
         self,
@@ -59,8 +60,7 @@ class FlightTrace:
         measured: tuple[float, float, float],
     ) -> None:
         """Note where the vehicle ought to be and where it is (NED, m)."""
-        if len(self.tracking) < len(_TRACKING) * _MAX_SAMPLES:
-            self.tracking.fromlist([vehicle_time, *reference, *measured])
+        self.tracking.add([vehicle_time, *reference, *measured])
 
     def add_rates(
         self,
@@ -71,18 +71,11 @@ class FlightTrace:
         measured: BodyRates,
     ) -> None:
         """Note what was answered to a sample, and the rates that the sample told."""
-        row = [vehicle_time, received, *commanded, thrust, *measured]
-        if self.rates_count < _MAX_SAMPLES:
-            self.rates.fromlist(row)
-        else:
-            start = self.rates_count % _MAX_SAMPLES * len(_RATES)
-            self.rates[start : start + len(_RATES)] = array("d", row)
-        self.rates_count += 1
+        self.rates.add([vehicle_time, received, *commanded, thrust, *measured])
 
     def add_latency(self, nanoseconds: int) -> None:
         """Note how long one answer took."""
-        if len(self.latencies_ns) < _MAX_SAMPLES:
-            self.latencies_ns.append(nanoseconds)
+        self.latencies_ns.add([nanoseconds])
 
     def save(self, folder: Path) -> None:
         """Write `response.csv`, `tracking.csv` and `rates.csv`, those that have rows.
@@ -90,30 +83,31 @@ class FlightTrace:
         Raises:
             OSError: a file cannot be written.
         """
-        for name, columns, rows in (
-            ("response.csv", _RESPONSE, self.response_rows()),
-            ("tracking.csv", _TRACKING, self.tracking_rows()),
-            ("rates.csv", _RATES, self.rates_rows()),
+        for name, series in (
+            ("response.csv", self.response),
+            ("tracking.csv", self.tracking),
+            ("rates.csv", self.rates),
         ):
-            if len(rows):
-                header = ",".join(columns)
-                np.savetxt(folder / name, rows, "%.9g", ",", header=header, comments="")
+            if len(series):
+                header = ",".join(series.columns)
+                np.savetxt(folder / name, series.rows(), "%.9g", ",", header=header, comments="")
+
+    def surprise(self) -> str | None:
+        """What the user is told if rows were lost."""
+        lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
+        if lost == 0:
+            return None
+        why = self._spool.failure or "the disk was too slow"
+        return f"{lost} rows of the flight's figures were lost: {why}"
 
     def response_rows(self) -> NDArray[np.float64]:
         """(N, 7), as `response`."""
-        return np.array(self.response).reshape(-1, len(_RESPONSE))
+        return self.response.rows()
 
     def tracking_rows(self) -> NDArray[np.float64]:
         """(N, 7), as `tracking`."""
-        return np.array(self.tracking).reshape(-1, len(_TRACKING))
+        return self.tracking.rows()
 
     def rates_rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, 9), as `rates`, from row `since` of all that were noted on; older ones are gone."""
-        width, count = len(_RATES), self.rates_count
-        first = max(since, count - _MAX_SAMPLES)
-        begin, end = first % _MAX_SAMPLES * width, count % _MAX_SAMPLES * width
-        if first < count and begin >= end:  # the newest stand before the oldest
-            rows = self.rates[begin:] + self.rates[:end]
-        else:
-            rows = self.rates[begin:end]
-        return np.array(rows).reshape(-1, width)
+        """(N, 9), as `rates`, from row `since` of all that were noted on."""
+        return self.rates.rows(since)

@@ -67,7 +67,7 @@ def test_senseless_arguments_are_refused(seconds, rate):
 def test_all_of_them_in_one_go(capsys):
     pytest.importorskip("mavsdk")
     figures = link.run(1.0, 100.0, as_json=False)
-    for key in ("echo", "companion", "pymavlink", "mavsdk"):
+    for key in ("echo", "companion", "pymavlink", "companion_mavsdk", "mavsdk"):
         row = figures[key]
         assert 0.0 < row["p50_us"] <= row["p99_us"] <= row["max_us"]
         assert row["cpu_percent"] > 0.0

@@ -63,7 +63,9 @@ def config(tmp_path, text):
         ),
         ("a: [", "not valid YAML"),
         ("flight: {arm: 'yes'}", "`flight.arm`"),
-        ("link: {lockstep: true, endpoint: 'serial:///dev/ttyS0:57600'}", "over a udp endpoint"),
+        ("link: {backend: mavsdk, lockstep: true}", "neither fly in lockstep nor sign"),
+        ("link: {backend: mavsdk, signing_key_file: key}", "neither fly in lockstep nor sign"),
+        ("realtime: {scheduler: fifo, priority: 95}", "`realtime.priority`"),
         ("limits: {max_tilt_deg: 30, max_tilt_deg: 40}", "stands there twice"),
         ("link: 3", "`link`"),
         ("vehicle: {dead_time_ms: true}", "`vehicle.dead_time_ms`: must not be true or false"),
@@ -160,6 +162,29 @@ def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arg
     code, _, err = run(capsys, *arguments)
     assert code == 2
     assert f"needs {module}; install it with: pip install 'mavlink-companion[{extra}]'" in err
+
+
+def test_a_backend_that_is_not_installed_is_named(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda *_: None)
+    code, _, err = run(capsys, "fly", "--config", config(tmp_path, "link: {backend: mavsdk}"))
+    assert code == 2
+    assert "link.backend: mavsdk needs mavsdk; install it with: pip install" in err
+
+
+def test_lockstep_on_the_command_line_does_not_go_with_mavsdk(capsys, tmp_path):
+    path = config(tmp_path, "link: {backend: mavsdk}")
+    code, _, err = run(capsys, "fly", "--config", path, "--lockstep")
+    assert code == 2
+    assert "neither fly in lockstep nor sign" in err
+
+
+def test_what_realtime_requires_and_is_refused_is_named_and_nothing_is_flown(capsys, tmp_path):
+    path = config(tmp_path, "realtime: {cpu_affinity: [1023], required: true}")
+    endpoint = f"udpin://127.0.0.1:{free_port()}"
+    code, _, err = run(capsys, "fly", "--config", path, "--endpoint", endpoint)
+    assert code == 2
+    assert "processor 1023: not granted: no processor 1023 for this program, which has 0" in err
+    assert list((tmp_path / "flights").iterdir()) == []
 
 
 def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):

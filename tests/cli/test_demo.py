@@ -47,15 +47,16 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
     port = demo.free_port()
     monkeypatch.setattr(demo, "free_port", lambda: port)
     (folder / "log").mkdir()
-    with demo.bundled_vehicle(demo.default_config(), port, folder / "log" / "a", lockstep=True):
+    wire = demo.udp_wire()
+    with demo.bundled_vehicle(demo.default_config(), wire, folder / "log" / "a", lockstep=True):
         assert main(["demo", "--lockstep"]) == 1
     assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
 
 
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
-    port = demo.free_port()
-    (folder / "mine.yaml").write_text(f"link: {{endpoint: 'udpin://127.0.0.1:{port}'}}")
-    with demo.bundled_vehicle(demo.default_config(), port, folder / "log", lockstep=False):
+    wire = demo.udp_wire()
+    (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
+    with demo.bundled_vehicle(demo.default_config(), wire, folder / "log", lockstep=False):
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())

@@ -7,7 +7,7 @@ import yaml
 
 from companion.config_file import load
 from companion.doctor.consultation import patient
-from companion.flight.assembly import link_settings
+from companion.flight.assembly import open_link
 from companion.mavlink.parameter_rules import Verdict
 from tests.flight.fly import CONFIGS, merged, mock_vehicle
 
@@ -40,7 +40,7 @@ def config_file(folder, mock, **changes):
 @asynccontextmanager
 async def met(config):
     """A vehicle that was heard."""
-    async with patient(config, link_settings(config)) as vehicle:
+    async with patient(config, lambda notice: open_link(config, None, notice)) as vehicle:
         assert await vehicle.met() == []
         yield vehicle
 

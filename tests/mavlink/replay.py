@@ -62,7 +62,8 @@ class Replayed:
 
     `story` has (time, mode, armed) at each change, `samples` ours and `attitudes` pymavlink's;
     `told` counts the vehicle's frames by message id. `setpoints` and `requests` are pairs of
-    frames, (recorded, ours). `answers` are (time, what was asked for, what came of it).
+    frames, (recorded, ours). `answers` are (time, what was asked for, what came of it),
+    `notices` what the link says of keys and ids that do not fit.
     """
 
     story: list = field(default_factory=list)
@@ -72,6 +73,7 @@ class Replayed:
     setpoints: list = field(default_factory=list)
     requests: list = field(default_factory=list)
     answers: list = field(default_factory=list)
+    notices: list = field(default_factory=list)
     stats: LinkStats | None = None
     state: VehicleState | None = None
 
@@ -143,7 +145,7 @@ class _Player:
         settings = LinkSettings("udpout://nowhere:1", 1, 1, *ours)
         stats, texts, registry = LinkStats(), TextAssembler(), PendingRegistry()
         router = Router(stats)
-        self._inbox = Inbox(settings, stats, router, None)
+        self._inbox = Inbox(settings, stats, router, None, self.out.notices.append)
         self._inbox.on_attitude = self.out.samples.append
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()

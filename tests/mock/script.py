@@ -88,6 +88,9 @@ class Script:
         self.rig.say(message_type(**filled))
 
     def _take(self) -> None:
-        for frame in self.rig.autopilot.companion.take():
+        frames = self.rig.autopilot.companion.take()
+        if self.rig.time < self.here(self.recording["from_s"]):
+            return  # nobody recorded it
+        for frame in frames:
             number = int.from_bytes(frame[7:10], "little")
             self.came[NAMES.get(number, f"#{number}")].append(self.rig.time)

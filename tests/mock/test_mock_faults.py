@@ -184,6 +184,8 @@ def test_when_the_pilots_sticks_are_gone_it_returns():
     rig.fly_offboard()
     strike(rig, "pilot_takeover", mode="ALTCTL", duration_s=1.0)
     rig.run(1.2)
+    assert rig.state.mode.name == "LOITER"
+    rig.run(5.0)
     assert rig.state.mode.name == "RTL"
     assert rig.state.failsafe
 

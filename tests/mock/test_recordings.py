@@ -94,7 +94,7 @@ CASES = {
     "ardupilot-flight": Case(
         set(), boot_s=22.0, pauses=((21.0, 40.5), (59.0, 69.0), (78.0, 98.0))
     ),
-    "px4-idle": Case(PX4_LACKS, booted_s=26.5, shift=-20.0),
+    "px4-idle": Case(PX4_LACKS, booted_s=26.5, shift=-17.0),
     "px4-offboard-entry": Case(
         PX4_LACKS, no_rate=frozenset(OFFBOARD_TARGETS), booted_s=210.7, shift=-200.0
     ),

@@ -3,7 +3,6 @@
 import numpy as np
 
 from companion.attitude import BodyRates
-from companion.recording import trace as room
 from companion.recording.trace import FlightTrace
 
 ROWS = [(1.0, 8.0, 0.1, 0.2, 0.3, 0.5, -0.1, -0.2, -0.3), (1.1, 8.2, 1.0, 2.0, 3.0, 0.6, 4, 5, 6)]
@@ -31,15 +30,3 @@ def test_rows_can_be_had_from_one_on():
     assert noted().rates_rows().tolist() == [list(map(float, row)) for row in ROWS]
     assert noted().rates_rows(1).tolist() == [list(map(float, ROWS[1]))]
     assert noted().rates_rows(2).shape == (0, 9)
-
-
-def test_a_flight_without_end_does_not_fill_the_memory(monkeypatch):
-    monkeypatch.setattr(room, "_MAX_SAMPLES", 3)
-    numbered = [(float(n), *ROWS[0][1:]) for n in range(8)]
-    trace = noted(numbered)
-    assert trace.rates_rows()[:, 0].tolist() == [5.0, 6.0, 7.0]
-    assert trace.rates_rows(6)[:, 0].tolist() == [6.0, 7.0]
-    assert trace.rates_rows(8).shape == (0, 9)
-    assert len(trace.rates) == 27
-    full = noted(numbered[:6])
-    assert full.rates_rows()[:, 0].tolist() == [3.0, 4.0, 5.0]

@@ -83,15 +83,15 @@ def fly(task: Task) -> Tracked:
     """
     with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
         folder = Path(name)
-        port, watch_port = demo.free_port(), demo.free_port()
+        wire, watch_port = demo.udp_wire(), demo.free_port()
         shipped = load(demo.default_config())
         vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
         vehicle.write_text(yaml.safe_dump({"mock": _vehicle(shipped, task, watch_port)}))
         course.write_text(yaml.safe_dump(task.course.file))
-        config = _configured(shipped, task, course, port)
+        config = _configured(shipped, task, course, wire.endpoint)
         watch = TruthWatch(watch_port)
         session = Session(config, folder, watch, _never)
-        with demo.bundled_vehicle(vehicle, port, folder / "vehicle.log", lockstep=True):
+        with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
             summary = lockstep.run(session.fly())
     if summary.result != "ok":
         return Tracked(summary.result, _NOT_FLOWN, _NOT_FLOWN, np.empty((0, 4)))
@@ -104,11 +104,11 @@ def _vehicle(shipped: Config, task: Task, watch_port: int) -> dict[str, Any]:
     return {**(shipped.mock or {}), **_BRISK, "control_port": watch_port, "wind": wind}
 
 
-def _configured(shipped: Config, task: Task, course: Path, port: int) -> Config:
+def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
     """The companion as it ships, but for what the task asks."""
     changes: dict[str, dict[str, Any]] = {
         "link": {
-            "endpoint": f"udpin://127.0.0.1:{port}",
+            "endpoint": endpoint,
             "lockstep": True,
             "position_rate_hz": POSITION_RATE_HZ,
         },

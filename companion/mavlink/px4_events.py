@@ -1,0 +1,208 @@
+"""PX4's events (EVENT, 410) in words, for a link on which it sends no STATUSTEXT.
+
+PX4 numbers an event by a hash of its name; the words are in metadata that a companion in the air
+does not have. So here are those that matter to a flight, with PX4's own words (source: PX4 main,
+2026; the numbers of those that were recorded agree). Any other is named by its number, once.
+"""
+
+import struct
+from collections.abc import Callable
+from typing import NamedTuple
+
+from companion.mavlink.texts import TextAssembler
+
+_EVENT = struct.Struct("<IIHBBB40s")  # id, time, sequence, destination, log levels, arguments
+_AUTOPILOT = 1 << 24
+_FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
+_WARNING, _FOR_PROGRAMS = 4, 8
+
+_REASONS = {
+    1: "stick gesture",
+    2: "RC switch",
+    3: "internal command",
+    4: "external command",
+    5: "mission start",
+    6: "landing",
+    7: "auto preflight disarming",
+    8: "kill switch",
+    9: "lockdown",
+    10: "failure detector",
+    11: "shutdown request",
+    13: "RC button",
+    14: "failsafe",
+}
+_ACTIONS = {
+    1: "warning",
+    2: "fallback to position control",
+    3: "fallback to altitude control",
+    4: "fallback to stabilized",
+    5: "hold",
+    6: "RTL",
+    7: "land",
+    8: "descend",
+    9: "disarm",
+    10: "terminate",
+}
+_CAUSES = {
+    1: "manual control loss",
+    2: "GCS connection loss",
+    3: "low battery level",
+    4: "critical battery level",
+    5: "emergency battery level",
+    6: "low remaining flight time",
+}
+
+
+class _Words(NamedTuple):
+    """Words with ``{}`` for the values; how those are packed, and what their numbers mean."""
+
+    text: str
+    layout: str = ""
+    meanings: tuple[dict[int, str] | None, ...] = ()
+
+
+_EVENTS = {
+    "commander_armed_by": _Words("Armed by {}", "<B", (_REASONS,)),
+    "commander_disarmed_by": _Words("Disarmed by {}", "<B", (_REASONS,)),
+    "commander_arm_denied_resolve_failures": _Words(
+        "Arming denied: Resolve system health failures first"
+    ),
+    "commander_disarm_denied_not_landed": _Words("Disarming denied: not landed"),
+    "commander_modeswitch_not_avail": _Words("Switching to that mode is currently not possible"),
+    "commander_takeoff_detected": _Words("Takeoff detected"),
+    "commander_landing_detected": _Words("Landing detected"),
+    "navigator_takeoff_default_alt": _Words(
+        "Using default takeoff altitude: {:.1f} m", "<f", (None,)
+    ),
+    "commander_failsafe_enter": _Words(
+        "Failsafe activated due to {1}, triggering {0}", "<4xBB", (_ACTIONS, _CAUSES)
+    ),
+    "commander_failsafe_enter_generic": _Words(
+        "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
+    ),
+    "commander_failsafe_enter_hold": _Words(
+        "Failsafe activated due to {2}, triggering {0} in {1} seconds",
+        "<4xBHB",
+        (_ACTIONS, None, _CAUSES),
+    ),
+    "commander_failsafe_enter_generic_hold": _Words(
+        "Failsafe activated, triggering {} in {} seconds", "<4xBH", (_ACTIONS, None)
+    ),
+    "commander_failsafe_enter_warn": _Words(
+        "Failsafe warning triggered due to {}", "<4xB", (_CAUSES,)
+    ),
+    "commander_failsafe_enter_generic_warn": _Words("Failsafe warning triggered"),
+    "commander_failsafe_enter_low_bat": _Words("Low battery level, return advised"),
+    "commander_failsafe_enter_crit_bat_warn": _Words("Critical battery level, land now"),
+    "commander_failsafe_enter_crit_low_bat_warn": _Words(
+        "Emergency battery level, land immediately"
+    ),
+    "commander_rc_lost": _Words("Manual control lost"),
+    "commander_rc_regained": _Words("Manual control regained"),
+    "commander_rc_override": _Words("Pilot took over using sticks"),
+    "failsafe_rc_override": _Words("Pilot took over using sticks"),
+    "commander_gcs_lost": _Words("Connection to ground control station lost"),
+    "commander_dl_regained": _Words("GCS connection regained"),
+    "commander_mission_comp_lost": _Words("Connection to mission computer lost"),
+    "commander_onboard_ctrl_regained": _Words("Onboard controller regained"),
+}
+
+_CHECKS = {
+    "check_modes_attitude": "No valid attitude estimate",
+    "check_modes_angular_velocity": "Angular velocity not valid",
+    "check_modes_local_pos": "Navigation error: No valid position estimate",
+    "check_modes_global_pos": "Navigation error: No valid global position estimate",
+    "check_modes_local_alt": "Navigation error: No valid altitude estimate",
+    "check_modes_home_position": "Home position not set",
+    "check_modes_manual_control": "No manual control input",
+    "check_modes_mission": "No valid mission available",
+    "check_modes_cannot_takeoff": "Mode not suitable for arming",
+    "check_rc_dl_no_dllink": "No connection to the ground control station",
+}
+"""What a health report names as failing."""
+
+_OUR_STREAM = (
+    "check_modes_offboard_signal",
+    "check_modes_offboard_no_signal",
+    "check_modes_offboard_signal_lost",
+)
+"""Fails whenever we do not stream, which we know."""
+
+
+def event_id(name: str) -> int:
+    """The number of an event: its component in the top byte, 24 bits of FNV-1a of its name."""
+    value = _FNV_OFFSET
+    for byte in name.encode():
+        value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
+    return _AUTOPILOT | value & 0xFFFFFF
+
+
+# Two whose names are not known; recorded together with the STATUSTEXT that says the same.
+_WORDS_BY_ID = {event_id(name): words for name, words in _EVENTS.items()} | {
+    17980399: _Words("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
+}
+_CHECKS_BY_ID = {event_id(name): words for name, words in _CHECKS.items()} | {
+    30203637: "No heading reference",
+}
+_OUR_STREAM_IDS = {event_id(name) for name in _OUR_STREAM}
+_REPORT_BEGINS = event_id("commander_arming_check_summary")
+_REPORT_ENDS = event_id("commander_health_summary")
+
+
+class EventReader:
+    """Puts events into words, beside the autopilot's texts.
+
+    A health report names all that fails each time that anything changes; what it named the time
+    before is not said again, nor what is no more than a remark, nor that our stream is missing.
+
+    Args:
+        texts: takes the words.
+        clock: event-loop time, s.
+    """
+
+    def __init__(self, texts: TextAssembler, clock: Callable[[], float]) -> None:
+        self._texts, self._clock = texts, clock
+        self._failing: set[int] = set()
+        self._failed_before: set[int] = set()
+        self._in_report = False
+        self._last_sequence: int | None = None
+        self._unknown: set[int] = set()
+
+    def take(self, payload: bytes) -> None:
+        """Take the payload of one EVENT."""
+        number, _, sequence, _, _, levels, arguments = _EVENT.unpack(
+            payload[: _EVENT.size].ljust(_EVENT.size, b"\0")
+        )
+        if sequence == self._last_sequence:
+            return  # sent again for somebody who had missed it
+        self._last_sequence = sequence
+        severity = levels & 0x0F
+        if number == _REPORT_BEGINS:
+            self._failing, self._in_report = set(), True
+        elif number == _REPORT_ENDS:
+            self._failed_before, self._in_report = self._failing, False
+        elif self._in_report:
+            self._failing.add(number)
+            known = self._failed_before | _OUR_STREAM_IDS
+            if number not in known and severity <= _WARNING:
+                self._say(severity, number, _CHECKS_BY_ID.get(number))
+        elif severity < _FOR_PROGRAMS:
+            words = _WORDS_BY_ID.get(number)
+            self._say(severity, number, words and _put(words, arguments))
+
+    def _say(self, severity: int, number: int, words: str | None) -> None:
+        if words is not None:
+            self._texts.take_event(severity, words, self._clock())
+        elif number not in self._unknown:
+            self._unknown.add(number)
+            self._texts.take_event(severity, f"event {number}", self._clock())
+
+
+def _put(words: _Words, arguments: bytes) -> str:
+    """The words with an event's values in them."""
+    values = struct.unpack_from(words.layout, arguments)
+    named = (
+        value if meaning is None else meaning.get(value, str(value))
+        for value, meaning in zip(values, words.meanings, strict=True)
+    )
+    return words.text.format(*named)

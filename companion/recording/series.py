@@ -1,0 +1,169 @@
+"""Rows of numbers noted in flight: the newest in memory, all of them on the disk.
+
+Memory does not grow with the flight. A file is written by a thread of its own, in large pieces:
+the control loop only hands over what is full, and never waits for the disk.
+"""
+
+import errno
+import os
+import tempfile
+import threading
+import weakref
+from array import array
+from collections import deque
+from pathlib import Path
+from queue import SimpleQueue
+from typing import IO
+
+import numpy as np
+from numpy.typing import NDArray
+
+_CHUNK_ROWS = 1024
+_MOST_WAITING = 64
+"""Chunks that may wait for a slow disk; what comes then is lost, and counted."""
+
+
+class SpooledFile:
+    """A nameless file of doubles, made when the first are written; it ends with its owner.
+
+    Args:
+        folder: where it is; None: where the system has its temporary files.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self._file: IO[bytes] | None = None
+
+    def append(self, chunk: bytes) -> None:
+        """Write at the end.
+
+        Raises:
+            OSError: not all of it could be written.
+        """
+        if self._file is None:
+            # Closed when this object goes.
+            self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115
+        if self._file.write(chunk) != len(chunk):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def read(self, width: int) -> NDArray[np.float64]:
+        """All whole rows of `width` doubles, one after the other."""
+        if self._file is None:
+            return np.empty(0)
+        self._file.seek(0)
+        data = self._file.read()
+        return np.frombuffer(data, count=len(data) // (8 * width) * width)
+
+
+_Work = tuple[SpooledFile, bytes] | threading.Event | None
+
+
+class Spool:
+    """Writes chunks to their files, in a thread that begins with the first and ends with this.
+
+    Args:
+        folder: where the files are; None: where the system has its temporary files.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder
+        self._queue: SimpleQueue[_Work] = SimpleQueue()
+        self._failures: list[str] = []
+        self._begun = False
+
+    @property
+    def failure(self) -> str | None:
+        """Why something could not be written; from then on nothing is."""
+        return self._failures[0] if self._failures else None
+
+    def put(self, file: SpooledFile, chunk: bytes) -> bool:
+        """Take a chunk; false if it cannot be kept."""
+        if self._failures or self._queue.qsize() >= _MOST_WAITING:
+            return False
+        if not self._begun:
+            self._begun = True
+            work = (self._queue, self._failures)  # not self, which the thread would keep alive
+            threading.Thread(target=_write, args=work, name="spool", daemon=True).start()
+            weakref.finalize(self, self._queue.put, None)
+        self._queue.put((file, chunk))
+        return True
+
+    def flush(self) -> None:
+        """Wait until all that was put is written."""
+        if self._begun:
+            written = threading.Event()
+            self._queue.put(written)
+            written.wait()
+
+
+def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
+    while (work := queue.get()) is not None:
+        if isinstance(work, threading.Event):
+            work.set()
+        elif not failures:
+            file, chunk = work
+            try:
+                file.append(chunk)
+            except OSError as error:
+                failures.append(error.strerror or str(error))
+
+
+class Series:
+    """Rows of one kind, appended in flight; `fromlist` takes half the time that `extend` does.
+
+    Args:
+        columns: their names.
+        spool: writes what is not kept in memory.
+        kept: so many of the newest rows are in memory in any case.
+
+    Attributes:
+        columns: their names.
+        lost: rows that were not kept, for the disk was full or too slow.
+    """
+
+    def __init__(self, columns: tuple[str, ...], spool: Spool, kept: int = 0) -> None:
+        self.columns = columns
+        self.lost = 0
+        self._spool = spool
+        self._file = SpooledFile(spool.folder)
+        self._full = _CHUNK_ROWS * len(columns)
+        self._chunk = array("d")
+        self._recent: deque[array[float]] = deque(maxlen=-(-kept // _CHUNK_ROWS))
+        self._put_count = 0
+
+    def __len__(self) -> int:
+        """How many rows were ever noted."""
+        return self._put_count + len(self._chunk) // len(self.columns)
+
+    def add(self, row: list[float]) -> None:
+        """Note one row; its length is not checked."""
+        self._chunk.fromlist(row)
+        if len(self._chunk) == self._full:
+            self._put_away()
+
+    def rows(self, since: int = 0) -> NDArray[np.float64]:
+        """(N, columns), from row `since` of all that were noted on; lost ones are left out.
+
+        In flight only for as many of the newest as are in memory: else the disk is waited for.
+        """
+        wanted = max(0, len(self) - since) * len(self.columns)
+        parts: list[array[float]] = [self._chunk]
+        have = len(self._chunk)
+        for chunk in reversed(self._recent):
+            if have >= wanted:
+                break
+            parts.insert(0, chunk)
+            have += len(chunk)
+        if have < wanted:
+            self._spool.flush()
+            numbers = np.concatenate([self._file.read(len(self.columns)), self._chunk])
+        else:
+            numbers = np.concatenate(parts)
+        return numbers[max(0, len(numbers) - wanted) :].reshape(-1, len(self.columns))
+
+    def _put_away(self) -> None:
+        chunk, self._chunk = self._chunk, array("d")
+        self._put_count += _CHUNK_ROWS
+        self._recent.append(chunk)
+        if not self._spool.put(self._file, chunk.tobytes()):
+            self.lost += _CHUNK_ROWS

@@ -1,0 +1,73 @@
+"""The four messages of PX4's events interface, which pymavlink's dialects leave out.
+
+Source: MAVLink common, messages 410 to 413; the layouts and CRC_EXTRA follow from its XML, and 410
+and 411 agree with recorded frames.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from fastcrc import crc16
+
+
+class Layout(NamedTuple):
+    """How one message looks on the wire."""
+
+    message_id: int
+    crc_extra: int
+    payload: struct.Struct
+
+
+EVENT = Layout(410, 160, struct.Struct("<IIHBBB40s"))
+"""id, event_time_boot_ms, sequence, destination component and system, log_levels, arguments."""
+CURRENT_EVENT_SEQUENCE = Layout(411, 106, struct.Struct("<HB"))
+"""sequence, flags."""
+REQUEST_EVENT = Layout(412, 33, struct.Struct("<HHBB"))
+"""first_sequence, last_sequence, target system and component."""
+RESPONSE_EVENT_ERROR = Layout(413, 77, struct.Struct("<HHBBB"))
+"""sequence, sequence_oldest_available, target system and component, reason."""
+
+_HEADER_BYTES = 10
+_CRC_BYTES = 2
+
+
+@dataclass(frozen=True)
+class EventRequest:
+    """A REQUEST_EVENT that arrived; the methods are those of pymavlink's messages."""
+
+    frame: bytes
+    first_sequence: int
+    last_sequence: int
+    target_system: int
+    target_component: int
+
+    def get_type(self) -> str:
+        """Return the message's name."""
+        return "REQUEST_EVENT"
+
+    def get_msgbuf(self) -> bytes:
+        """Return the whole frame."""
+        return self.frame
+
+    def get_srcSystem(self) -> int:  # noqa: N802 - pymavlink's name
+        """Return the sender's system id."""
+        return self.frame[5]
+
+    def get_srcComponent(self) -> int:  # noqa: N802
+        """Return the sender's component id."""
+        return self.frame[6]
+
+
+def event_request(unknown: Any) -> EventRequest | None:
+    """Return the REQUEST_EVENT that pymavlink did not know, None if it is another or damaged."""
+    frame = bytes(unknown.get_msgbuf())
+    if frame[0] != 0xFD or int.from_bytes(frame[7:10], "little") != REQUEST_EVENT.message_id:
+        return None
+    end = _HEADER_BYTES + frame[1]
+    body = frame[1:end] + bytes([REQUEST_EVENT.crc_extra])
+    if crc16.mcrf4xx(body) != int.from_bytes(frame[end : end + _CRC_BYTES], "little"):
+        return None
+    size = REQUEST_EVENT.payload.size
+    payload = frame[_HEADER_BYTES:end][:size].ljust(size, b"\0")
+    return EventRequest(frame, *REQUEST_EVENT.payload.unpack(payload))

@@ -1,0 +1,108 @@
+"""All that one vehicle is connected to: the companion, a ground station, the control channel."""
+
+import select
+
+from sitl_mock.autopilot import Autopilot
+from sitl_mock.control import reply
+from sitl_mock.endpoint import Endpoint, bundles
+from sitl_mock.link import Link
+from sitl_mock.pipe import DatagramPipe
+from sitl_mock.serial_endpoint import SerialEndpoint
+from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
+from sitl_mock.tcp_endpoint import TcpEndpoint
+from sitl_mock.udp_endpoint import UdpEndpoint
+from sitl_mock.wire import Message, decode
+from sitl_mock.wiring import SerialLine, TcpIn, parse_wiring
+
+Arrived = tuple[bytes, list[Message]]
+"""A datagram and the messages in it."""
+
+
+class Wires:
+    """The endpoints with their links, and the faults of the companion's.
+
+    Attributes:
+        companion: the companion's endpoint.
+
+    Args:
+        settings: this vehicle's own.
+        autopilot: hears what arrives, and whose links are emptied.
+
+    Raises:
+        ConfigError: a port is in use.
+    """
+
+    def __init__(self, settings: MockSettings, autopilot: Autopilot) -> None:
+        self.companion = _companion_endpoint(settings)
+        self._autopilot = autopilot
+        self._links: dict[Endpoint, Link] = {self.companion: autopilot.companion}
+        if settings.gcs_port:
+            gcs = UdpEndpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port, "--gcs-port")
+            self._links[gcs] = autopilot.gcs
+        self._control = (
+            UdpEndpoint(settings.control_port, None, "--control-port")
+            if settings.control_port
+            else None
+        )
+        self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
+        self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
+        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
+
+    def close(self) -> None:
+        """Let go of everything."""
+        for endpoint in self._links:
+            endpoint.close()
+        if self._control is not None:
+            self._control.close()
+
+    def ready(self, timeout_s: float) -> list[Endpoint]:
+        """Wait, and return the endpoints on which something came; the control channel is served."""
+        by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.readable}
+        control = self._control
+        asking = [] if control is None else control.readable
+        readable, _, _ = select.select([*by_descriptor, *asking], (), (), timeout_s)
+        if control is not None and asking[0] in readable:
+            self._serve(control)
+        return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
+
+    def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
+        """Let the autopilot hear what came on an endpoint, after the faults of its link."""
+        autopilot, link = self._autopilot, self._links[endpoint]
+        faults = autopilot.faults.link
+        if endpoint is self.companion and not self._pipe_in.is_clear(faults):
+            datagrams = [datagram for datagram, _ in arrived]
+            passed = self._pipe_in.push(datagrams, faults, autopilot.time_us)
+            arrived = [(datagram, decode(datagram)) for datagram in passed]
+        for _, messages in arrived:
+            for message in messages:
+                autopilot.handle(message, link)
+
+    def send_beacon(self, beacon: bytes) -> None:
+        """Send the companion a lockstep beacon, and nothing else."""
+        self.companion.send([self._autopilot.companion.sign(beacon)])
+
+    def flush(self, beacon: bytes | None = None) -> None:
+        """Send what waits on every link, the companion's through the faults; a beacon last."""
+        autopilot = self._autopilot
+        for endpoint, link in self._links.items():
+            frames = link.take()
+            if endpoint is self.companion and not self._pipe_out.is_clear(autopilot.faults.link):
+                frames = self._pipe_out.push(frames, autopilot.faults.link, autopilot.time_us)
+            if endpoint is self.companion and beacon is not None:
+                frames.append(link.sign(beacon))
+            endpoint.send(bundles(frames) if self._bundle else frames)
+
+    def _serve(self, control: UdpEndpoint) -> None:
+        while (request := control.receive_from()) is not None:
+            datagram, sender = request
+            control.send_to(reply(self._autopilot, datagram), sender)
+
+
+def _companion_endpoint(settings: MockSettings) -> Endpoint:
+    match parse_wiring(settings.endpoint):
+        case TcpIn(host, port):
+            return TcpEndpoint(host, port)
+        case SerialLine(path):
+            return SerialEndpoint(path)
+        case _:
+            return UdpEndpoint(settings.port + PORT_OFFSET, settings.port, "--port")

@@ -1,0 +1,62 @@
+"""What the companion's wire is made of, as the configuration says it."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+_TCP = re.compile(r"tcpin://([^:/]*):(\d+)/?")
+_HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
+
+
+@dataclass(frozen=True)
+class Udp:
+    """UDP on the ports that ``port`` names."""
+
+
+@dataclass(frozen=True)
+class TcpIn:
+    """A TCP port that waits for one client."""
+
+    host: str
+    port: int
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """A pseudo-terminal, with a symbolic link to it; None = no link."""
+
+    path: Path | None
+
+
+Wiring = Udp | TcpIn | SerialLine
+
+
+def parse_wiring(text: str) -> Wiring:
+    """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    if text == "udp":
+        return Udp()
+    if text.startswith("serial://"):
+        path = text.removeprefix("serial://")
+        if not path or path.startswith("/"):
+            return SerialLine(Path(path) if path else None)
+    found = _TCP.fullmatch(text)
+    if found is not None and 1 <= int(found[2]) <= 65535:
+        return TcpIn(found[1] or "127.0.0.1", int(found[2]))
+    raise ValueError(f"this is no endpoint: {_HELP}")
+
+
+def for_vehicle(text: str, index: int) -> str:
+    """Return the endpoint of the vehicle with this index: the next port, a path with its number."""
+    if index == 0:
+        return text
+    match parse_wiring(text):
+        case TcpIn(host, port):
+            return f"tcpin://{host}:{port + index}"
+        case SerialLine(Path() as path):
+            return f"serial://{path}-{index + 1}"
+        case _:
+            return text

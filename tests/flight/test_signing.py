@@ -1,0 +1,92 @@
+"""Keys that fit and keys that do not, both ways, over the real socket; wrong system ids too."""
+
+import pytest
+
+from companion.demo import wire_like
+from companion.mavlink import Link, LinkSettings, LinkTimeout, Signing, lockstep
+from companion.mavlink import loop as link_loop
+from tests.flight.fly import fly, mock_vehicle, session_for
+
+HOVER = {"hover": {"duration_s": 1.0}}
+
+
+@pytest.fixture
+def keys(tmp_path):
+    for name in ("right", "wrong"):
+        (tmp_path / name).write_text(f"{name} passphrase\n")
+    return {name: str(tmp_path / name) for name in ("right", "wrong")} | {None: None}
+
+
+def signed(key):
+    return {"signing": {"passphrase_file": key}} if key else {}
+
+
+def test_a_signed_flight(keys, tmp_path):
+    with mock_vehicle(tmp_path, **signed(keys["right"])) as mock:
+        summary = fly(mock, tmp_path / "flight", link={"signing_key_file": keys["right"]}, **HOVER)
+        truth = mock.state()
+    assert (summary.result, summary.phase) == ("ok", "disarm")
+    assert truth["signing"]["accepted"] > 250
+    assert truth["signing"]["unsigned"] == truth["signing"]["refused"] == 0
+    assert "autopilot: Armed by external command" in [text for _, text in summary.events]
+    assert not any("its frames" in text for _, text in summary.events)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours", "said"),
+    [
+        ("right", "wrong", "signs its frames with another key"),
+        (None, "right", "does not sign its frames"),
+        ("right", None, "signs its frames and we do not"),
+    ],
+)
+def test_keys_that_do_not_fit(theirs, ours, said, keys, tmp_path):
+    """Nothing is obeyed, and why is said once. By TCP, where both sides speak from the start."""
+    with (
+        wire_like("tcp://127.0.0.1:1") as wire,
+        mock_vehicle(
+            tmp_path, in_lockstep=False, endpoint=wire.vehicle[1], **signed(keys[theirs])
+        ) as mock,
+    ):
+        mock.state()  # it is there
+        summary = flown(mock, tmp_path, endpoint=wire.endpoint, signing_key_file=keys[ours])
+        truth = mock.state()
+    assert sum(said in text for _, text in summary.events) == 1
+    assert (truth["armed"], truth["setpoints"], truth["mode"]) == (False, 0, "LOITER")
+    if theirs is None:
+        assert "frames not signed with our key" in summary.result
+    else:
+        assert truth["signing"]["accepted"] == 0
+        assert truth["signing"]["unsigned" if ours is None else "refused"] > 0
+
+
+def test_another_system_id_is_not_heard(tmp_path):
+    with mock_vehicle(tmp_path, in_lockstep=False) as mock:
+        mock.state()
+        summary = flown(mock, tmp_path, target_system=2)
+        truth = mock.state()
+    assert "no heartbeat from system 2" in summary.result
+    assert "such as system/component 1/1; is link.target_system right?" in summary.result
+    assert (truth["armed"], truth["setpoints"]) == (False, 0)
+
+
+def flown(mock, folder, **link):
+    """The summary of a flight in real time that gives up after a second without a heartbeat."""
+    session = session_for(mock, folder / "flight", link=link, flight={"connect_timeout_s": 1.0})
+    return link_loop.run(session.fly())
+
+
+def test_without_a_beacon_that_is_signed_lockstep_says_why(keys, tmp_path):
+    async def connect(settings):
+        async with Link(settings):
+            pass
+
+    with mock_vehicle(tmp_path, **signed(keys["right"])) as mock:
+        settings = LinkSettings(
+            f"udpin://127.0.0.1:{mock.port}",
+            signing=Signing(bytes(32)),
+            lockstep=True,
+            first_beacon_timeout_s=2.0,
+        )
+        with pytest.raises(LinkTimeout, match="frames not signed with our key"):
+            lockstep.run(connect(settings))

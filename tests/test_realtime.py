@@ -1,0 +1,119 @@
+"""What is asked of the operating system: granted, refused, required, and given back."""
+
+import ctypes
+import errno
+import gc
+import os
+import resource
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from companion import realtime
+from companion.realtime import RealtimeError, Wishes, asked_for
+
+
+def refusals(wishes):
+    with asked_for(wishes) as grants:
+        return [grant.refusal for grant in grants]
+
+
+def policies_elsewhere():
+    """Of a thread that begins now, and of a process that is to be as every other."""
+    with ThreadPoolExecutor(1) as pool:
+        in_a_thread = pool.submit(os.sched_getscheduler, 0).result()
+    process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    with process:
+        realtime.schedule_as_usual(process.pid)
+        in_a_process = os.sched_getscheduler(process.pid)
+        process.communicate(b"\n")
+    return in_a_thread, in_a_process
+
+
+def test_who_asks_for_nothing_gets_nothing():
+    assert refusals(Wishes(required=True)) == []
+
+
+def test_what_this_computer_surely_grants_is_granted_and_given_back():
+    before = os.sched_getaffinity(0)
+    one = (min(before),)
+    with asked_for(Wishes(processors=one, freeze_gc=True, required=True)) as grants:
+        assert [str(grant) for grant in grants] == [
+            f"realtime: processor {one[0]}: granted",
+            "realtime: no garbage collection in flight: granted",
+        ]
+        assert os.sched_getaffinity(0) == set(one)
+        assert not gc.isenabled()
+        assert gc.get_freeze_count() > 0
+    assert os.sched_getaffinity(0) == before
+    assert gc.isenabled()
+
+
+def test_the_truth_is_told_of_the_scheduler_and_of_memory():
+    """Whatever this computer allows: what is told is what then is so."""
+    before = os.sched_getscheduler(0)
+    with asked_for(Wishes(fifo_priority=7, lock_memory=True)) as grants:
+        memory, scheduler = grants
+        assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
+        if scheduler.refusal is None:
+            assert os.sched_getparam(0).sched_priority == 7
+        with open("/proc/self/status") as status:  # noqa: PTH123
+            (locked,) = (int(line.split()[1]) for line in status if line.startswith("VmLck"))
+        assert (locked > 0) == (memory.refusal is None)
+        in_a_thread, in_a_process = policies_elsewhere()
+        assert in_a_thread == os.sched_getscheduler(0)
+        assert in_a_process == os.SCHED_OTHER
+    assert os.sched_getscheduler(0) == before
+
+
+def test_a_user_who_may_not_is_told_how_he_may(monkeypatch):
+    def refuse(*_):
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    (why,) = refusals(Wishes(fifo_priority=50))
+    assert "this user may not" in why
+    assert "docs/companion.service" in why
+    assert "rtprio" in why
+
+
+def test_a_limit_that_only_just_suffices_is_refused_for_it_would_end_a_flight(monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (8 << 20, 8 << 20))
+    (why,) = refusals(Wishes(lock_memory=True))
+    assert "may lock 8192 KiB only" in why
+    assert "memlock unlimited" in why
+
+
+@pytest.mark.parametrize("number", [errno.ENOMEM, errno.EPERM])
+def test_a_kernel_that_does_not_lock_is_believed(monkeypatch, number):
+    class Libc:
+        def mlockall(self, flags):
+            ctypes.set_errno(number)
+            return -1
+
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Libc())
+    (why,) = refusals(Wishes(lock_memory=True))
+    assert why.startswith(os.strerror(number))
+
+
+def test_a_processor_that_is_not_there_is_named():
+    (why,) = refusals(Wishes(processors=(1023,)))
+    assert why.startswith("no processor 1023 for this program, which has ")
+
+
+def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
+    with (
+        pytest.raises(RealtimeError, match=r"processor 1023: not granted.*realtime\.required"),
+        asked_for(Wishes(processors=(1023,), freeze_gc=True, required=True)),
+    ):
+        raise AssertionError("nothing may fly")
+    assert gc.isenabled()
+
+
+def test_the_priority_is_taken_last():
+    """Else what takes long (the collection before the freeze) would be done at that priority."""
+    taken = [name for name, *_ in realtime._steps(Wishes(1, (0,), True, True))]
+    assert taken[-1] == "scheduler"
