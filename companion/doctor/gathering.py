@@ -92,7 +92,7 @@ async def identify(link: Link) -> Identity:
     return Identity(
         version=version + _RELEASES.get(number & 0xFF, ""),
         capabilities=told.capabilities,
-        uid=f"{told.uid:016x}",
+        uid=bytes(told.uid2).hex() if any(told.uid2) else f"{told.uid:016x}" if told.uid else None,
     )
 
 

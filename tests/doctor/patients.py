@@ -1,6 +1,5 @@
 """Mock vehicles at the doctor's, set up as the shipped configurations of the two say."""
 
-import asyncio
 from contextlib import asynccontextmanager, contextmanager
 
 import yaml
@@ -56,9 +55,3 @@ def amiss(findings):
         for finding in findings
         if finding.verdict is not Verdict.SAFE
     }
-
-
-async def until(condition, seconds=10.0):
-    async with asyncio.timeout(seconds):
-        while not condition():  # noqa: ASYNC110 - of either side
-            await asyncio.sleep(0.02)

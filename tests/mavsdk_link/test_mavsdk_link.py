@@ -90,7 +90,7 @@ def test_it_flies_the_same_programme(tmp_path):
                 "telemetry_stale_ms": 400.0,
                 "target_stale_ms": 400.0,
                 "position_stale_ms": 800.0,
-                "silence_limit_ms": 1000.0,
+                "silence_limit_ms": 950.0,
             },
         }
         config = tmp_path / "fly.yaml"
