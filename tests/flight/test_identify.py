@@ -57,10 +57,13 @@ CHANGED = {
 }
 
 
+IDENTIFY = {"flight": {"programme": ["identify"]}, "identify": {"settle_s": 1.0}}
+
+
 def identified(folder, **mock_settings):
     """The summary of a flight of the programme, and the vehicle found in its log."""
     with mock_vehicle(folder, seed=5, **mock_settings) as mock:
-        summary = fly(mock, folder / "log", flight={"programme": ["identify"]})
+        summary = fly(mock, folder / "log", **IDENTIFY)
         assert not mock.state()["crashed"]
     log = read_flight_log(folder / "log" / "flight.tlog")
     return summary, identify_vehicle(log.setpoints, log.rates, log.specific_thrust)
@@ -162,6 +165,7 @@ def test_a_first_order_rate_loop_gives_back_its_configured_numbers(tmp_path):
     assert vehicle.faults() == {}
 
 
+@pytest.mark.slow
 def test_another_vehicle_is_found_as_the_judge_finds_it(tmp_path):
     summary, vehicle = identified(tmp_path, **CHANGED)
     assert summary.result == "ok", summary.events

@@ -13,7 +13,7 @@ import yaml
 from rich.console import Console
 
 from companion.cli import main
-from companion.study import fig2, fig4, fig5, runner
+from companion.study import fig2, fig3, fig4, fig5, runner
 from companion.study.case import Case
 from companion.study.names import PAPER_STUDIES
 from companion.yaml_file import ConfigError
@@ -40,6 +40,7 @@ def results(tmp_path_factory):
         patch.setattr(runner, "_tick", counting)
         patch.setattr(runner, "_STUDIES", PAPER)
         patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT))
+        patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=1.0))
         patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
         patch.setattr(fig5, "STEP", replace(fig5.STEP, headings=EIGHT[3:6:2], seconds=1.5))
         page, _ = runner.run("all", None, out, Console(quiet=True))
