@@ -73,9 +73,7 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
 
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
     wire = demo.udp_wire()
-    (folder / "mine.yaml").write_text(
-        f"link: {{endpoint: '{wire.endpoint}'}}\nflight: {{connect_timeout_s: 2.0}}\n"
-    )
+    (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
     with demo.bundled_vehicle(demo.default_config(), wire, folder / "log", lockstep=False):
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1

@@ -86,6 +86,7 @@ def test_each_flight_is_told_as_it_begins(flown):
     ]
 
 
+@pytest.mark.slow
 def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
     alone, company = flight.fly(TASKS[0]), flown[0][TASKS[0]]
     assert (alone.told, alone.true) == (company.told, company.true)
@@ -220,8 +221,8 @@ SHORT = """
 import sys
 from companion.cli import main
 from companion.study.track import study, task
-eights = [task.Task(task.Course(task.EIGHT, 4.0, 1.0), name) for name in task.PLANNER_NAMES]
-study.tasks = lambda: eights
+arcs = [task.Task(task.Course(task.CIRCLE, 2.0, 0.1), name) for name in task.PLANNER_NAMES]
+study.tasks = lambda: arcs
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))
 """
