@@ -1,10 +1,7 @@
 """Whole flights for the tests: a mock vehicle in its own process, the companion in this one."""
 
 import json
-import os
 import socket
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +14,9 @@ from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.yaml_file import parse
+from tests.flight import mock_start
+
+lockstep._SPIN_S = 0.0  # the cores are busy with other flights
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -48,8 +48,8 @@ QUICK_PARAMETERS = {
     },
 }
 QUICK_FLIGHT = {
-    "flight": {"arm": True, "takeoff_height_m": 3.0, "programme": ["hover"]},
-    "hover": {"duration_s": 6.0},
+    "flight": {"arm": True, "takeoff_height_m": 2.0, "programme": ["hover"]},
+    "hover": {"duration_s": 5.0},
     "guidance": {"drag_per_s": 1.0},
     "thrust": {"hover_thrust": 0.49},
 }
@@ -81,7 +81,7 @@ class Mock:
                     channel.sendto(json.dumps(request).encode(), self._address)
                     return json.loads(channel.recv(65536))
                 except (TimeoutError, ConnectionRefusedError):
-                    assert self.process.poll() is None, "the mock vehicle stopped"
+                    assert self.process.is_alive(), "the mock vehicle stopped"
         raise AssertionError("the mock vehicle does not answer")
 
     def state(self):
@@ -98,22 +98,20 @@ class Mock:
 
 @contextmanager
 def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings):
-    """Start `python -m sitl_mock` on free ports; its words go to `folder`/mock.log."""
+    """Start a mock on free ports; its words go to `folder`/mock.log."""
     port, control_port = free_port(), free_port()
-    config = folder / "mock.yaml"
+    config, words = folder / "mock.yaml", folder / "mock.log"
     quick = {**QUICK_MOCK, "autopilot": autopilot, "parameters": QUICK_PARAMETERS[autopilot]}
     config.write_text(yaml.safe_dump({"mock": merged(quick, settings)}))
-    command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
-    command += ["--port", str(port), "--control-port", str(control_port)]
-    with (folder / "mock.log").open("wb") as log:
-        process = subprocess.Popen(
-            command + ["--lockstep"] * in_lockstep, stdout=log, stderr=log, env=os.environ
-        )
-        try:
-            yield Mock(process, port, control_port, config, in_lockstep, autopilot)
-        finally:
-            process.terminate()
-            assert process.wait(timeout=10) == 0, (folder / "mock.log").read_text()
+    arguments = ["--headless", "--config", str(config)]
+    arguments += ["--port", str(port), "--control-port", str(control_port)]
+    process = mock_start.start(arguments + ["--lockstep"] * in_lockstep, words)
+    try:
+        yield Mock(process, port, control_port, config, in_lockstep, autopilot)
+    finally:
+        process.terminate()
+        process.join(10.0)
+        assert process.exitcode == 0, words.read_text()
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
