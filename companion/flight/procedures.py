@@ -47,7 +47,7 @@ async def takeoff(rig: Rig) -> None:
 async def offboard(rig: Rig) -> None:
     """Hand control over to our stream, and settle."""
     rig.guide.hold_here()
-    rig.monitors.begin()
+    rig.lookout.begin(asyncio.get_running_loop().time())
     # The mode we know may be a second old; never take the vehicle from a pilot who took it.
     await rig.fresh_heartbeat()
     require_role(rig.link, {Role.TAKEOFF, Role.HOLD})

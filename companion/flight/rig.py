@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
-from companion.flight.safety import SafetyMonitors
+from companion.flight.safety import Lookout
 from companion.guidance import Sequence
 from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
@@ -35,7 +35,7 @@ class Rig:
     link: Link
     loop: ControlLoop
     guide: Guide
-    monitors: SafetyMonitors
+    lookout: Lookout
     programme: Sequence
     detail: str = ""
     rate_hz: float = 0.0

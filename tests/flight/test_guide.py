@@ -7,6 +7,7 @@ import pytest
 
 from companion.attitude import BodyRates
 from companion.config import Config
+from companion.flight.estimator_resets import EstimatorResets
 from companion.flight.guide import Guide
 from companion.flight.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
@@ -42,7 +43,7 @@ class Bench:
     def __init__(self):
         self.now = 10.0
         self.hover = HoverSpy()
-        self.loop = SimpleNamespace(command=None, guarded=True)
+        self.loop = SimpleNamespace(command=None, guarded=True, resets=EstimatorResets())
         self.state = SimpleNamespace(position=None, landed=False, battery=None)
         self.guide = Guide(
             self.loop,
