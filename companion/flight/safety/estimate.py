@@ -32,6 +32,17 @@ def flags(snapshot: Snapshot, _: bool) -> str | None:
     return f"the estimator is not sure any more (ESTIMATOR_STATUS lost flags 0x{missing:x})"
 
 
+def reset(snapshot: Snapshot, _: bool) -> str | None:
+    """The estimator was reset; what is flown has moved along, so this is but told."""
+    found = snapshot.resets
+    if found.recent == 0:
+        return None
+    return (
+        f"the estimator was reset: {found.shift:.1f} m and {degrees(found.turn):.0f}° of heading "
+        "in sum; what is flown moved along"
+    )
+
+
 def resets(most: int, shift: float, turn: float) -> Judge:
     """The estimator was reset too often, or by too much: m, rad."""
 

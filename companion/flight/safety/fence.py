@@ -84,12 +84,12 @@ def outside(fence: Fence) -> Judge:
 
 
 def braking(fence: Fence) -> Judge:
-    """The vehicle would leave the fence if it began to brake now."""
+    """The vehicle is inside, and would not be any more if it began to brake now."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion
         offset, velocity, height = motion.offset, motion.velocity, motion.height
-        if offset is None:
+        if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
         fast = hypot(velocity[0], velocity[1])
         share = fence.stop(fast) / fast if fast > 0.0 else 0.0

@@ -44,6 +44,7 @@ def _vehicle(config: Config) -> tuple[Monitor, ...]:
         Monitor("battery", resources.battery(least), Action(safety.battery_action), calm=5.0),
         Monitor("gps", estimate.gps, position),
         Monitor("estimator", estimate.flags, position, lasts=0.5),
+        Monitor("reset", estimate.reset, Action.WARN, lasts=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
     )
 
