@@ -1,9 +1,9 @@
 """Whole flights for the tests: a mock vehicle in its own process, the companion in this one."""
 
 import json
+import multiprocessing
 import os
 import socket
-import subprocess
 import sys
 import time
 from contextlib import contextmanager
@@ -17,6 +17,7 @@ from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.yaml_file import parse
+from sitl_mock import __main__ as sitl_mock
 
 QUICK_MOCK = {
     "gcs_port": 0,
@@ -66,7 +67,7 @@ class Mock:
                     channel.sendto(json.dumps(request).encode(), self._address)
                     return json.loads(channel.recv(65536))
                 except (TimeoutError, ConnectionRefusedError):
-                    assert self.process.poll() is None, "the mock vehicle stopped"
+                    assert self.process.is_alive(), "the mock vehicle stopped"
         raise AssertionError("the mock vehicle does not answer")
 
     def state(self):
@@ -83,21 +84,33 @@ class Mock:
 
 @contextmanager
 def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
-    """Start `python -m sitl_mock` on free ports; its words go to `folder`/mock.log."""
+    """Start the mock on free ports; its words go to `folder`/mock.log.
+
+    It is forked from the test, which has imported it: a new interpreter would take as much time as
+    the half of a flight.
+    """
     port, control_port = free_port(), free_port()
     config = folder / "mock.yaml"
     config.write_text(yaml.safe_dump({"mock": merged(QUICK_MOCK, settings)}))
-    command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
-    command += ["--port", str(port), "--control-port", str(control_port)]
-    with (folder / "mock.log").open("wb") as log:
-        process = subprocess.Popen(
-            command + ["--lockstep"] * in_lockstep, stdout=log, stderr=log, env=os.environ
-        )
-        try:
-            yield Mock(process, port, control_port, config, in_lockstep)
-        finally:
-            process.terminate()
-            assert process.wait(timeout=10) == 0, (folder / "mock.log").read_text()
+    arguments = ["--headless", "--config", str(config), "--port", str(port)]
+    arguments += ["--control-port", str(control_port)] + ["--lockstep"] * in_lockstep
+    process = multiprocessing.get_context("fork").Process(
+        target=_serve, args=(arguments, folder / "mock.log")
+    )
+    process.start()
+    try:
+        yield Mock(process, port, control_port, config, in_lockstep)
+    finally:
+        process.terminate()
+        process.join(10)
+        assert process.exitcode == 0, (folder / "mock.log").read_text()
+
+
+def _serve(arguments, log):
+    with log.open("wb") as words:
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(words.fileno(), stream.fileno())
+    sys.exit(sitl_mock.main(arguments))
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
