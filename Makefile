@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test lint soak bench clean
+.PHONY: demo test matrix lint soak bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -19,6 +19,9 @@ demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 
 test: lint  ## style, types, import rules, then every test
 	$(BIN)/python -m pytest -n 2 --dist loadscope
+
+matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about two minutes
+	$(BIN)/python -m pytest -n 2 -m "matrix or not matrix" tests/flight/test_fault_matrix.py
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

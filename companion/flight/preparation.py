@@ -53,6 +53,8 @@ async def stream(rig: Rig) -> None:
 async def arm(rig: Rig) -> None:
     """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
     if rig.config.flight.arm:
+        _check_battery(rig)  # what was good at the checks may not be so any more
+        rig.require_position()
         rig.detail = "the autopilot to accept arming"
         rig.arm_sent = True
         await rig.link.command(*rig.link.family.arm())
@@ -81,15 +83,19 @@ def _ready(rig: Rig) -> bool:
     state = rig.link.state
     if state.armed:
         raise FlightEnded("the vehicle is already armed; land and disarm it first")
-    battery = state.battery_remaining
+    _check_battery(rig)
+    missing = rig.link.family.not_ready(state.readiness)
+    rig.detail = missing or ""
+    return missing is None
+
+
+def _check_battery(rig: Rig) -> None:
+    battery = rig.link.state.battery_remaining
     least = rig.config.limits.min_battery_percent / 100.0
     if battery is not None and battery < least:
         raise FlightEnded(
             f"battery at {100 * battery:.0f} %, below limits.min_battery_percent; charge it"
         )
-    missing = rig.link.family.not_ready(state.readiness)
-    rig.detail = missing or ""
-    return missing is None
 
 
 def _check_delay(rig: Rig) -> None:

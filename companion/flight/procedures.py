@@ -26,13 +26,14 @@ async def takeoff(rig: Rig) -> None:
     require_role(rig.link, {Role.HOLD, Role.TAKEOFF})
     if not (state.landed and state.armed):
         raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
+    rig.require_position()
     rig.detail = "the autopilot to accept the take-off"
     await rig.link.command(*rig.link.family.take_off(_home_altitude(rig) + height))
     climbing = False
 
     def reached() -> bool:
         nonlocal climbing
-        now, position = state.height, state.position
+        now, position = state.height, rig.fresh_position()
         if now is None or position is None:
             return False
         rig.detail = f"{height:g} m, now {now:.1f} m"

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop
+from companion.flight.ending import FlightEnded
 from companion.flight.guide import Guide
 from companion.flight.safety import Lookout
 from companion.guidance import Sequence
 from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
+from companion.mavlink.records import LocalPosition
 
 _POLL = 0.02
 """How often a condition is looked at, s; telemetry that changes it is slower."""
@@ -66,6 +68,21 @@ class Rig:
             return heartbeat is not None and heartbeat.received >= began
 
         await self.until(newer)
+
+    def fresh_position(self) -> LocalPosition | None:
+        """The newest position, unless it is stale."""
+        position, now = self.link.state.position, asyncio.get_running_loop().time()
+        limit = self.config.deadman.position_stale_ms / 1e3
+        return None if position is None or now - position.received > limit else position
+
+    def require_position(self) -> None:
+        """Go no further without a fresh position.
+
+        Raises:
+            FlightEnded: there is none.
+        """
+        if self.fresh_position() is None:
+            raise FlightEnded("no position from the vehicle any more")
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

@@ -73,13 +73,13 @@ class Lookout:
         self._origin = self._geodetic(self._start)
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
-        self._had_gps = state.gps is not None and state.gps.fix_type >= GPS_FIX_3D
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._counted.clear()
 
     def listen(self, now: float) -> None:
         """Note what is heard, and count; at every look, whatever the phase."""
-        stats, loop = self._link.stats, self._loop
+        stats, loop, gps = self._link.stats, self._loop, self._link.state.gps
+        self._had_gps = self._had_gps or (gps is not None and gps.fix_type >= GPS_FIX_3D)
         if stats.frames != self._frames:
             self._frames, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)

@@ -108,7 +108,7 @@ class Snapshot(NamedTuple):
     """One look at everything; `now` in s on our clock.
 
     Attributes:
-        had_gps: whether GPS had a 3D fix when control began.
+        had_gps: whether GPS has had a 3D fix.
         good_flags: ESTIMATOR_STATUS flags that were set when control began.
     """
 
