@@ -81,6 +81,11 @@ async def programme(rig: Rig) -> None:
 async def hand_back(rig: Rig) -> None:
     """Stop moving, and stream until the autopilot holds by itself."""
     _stop_moving(rig)
+    if not rig.loop.guarded:
+        # Control stood still, and what was heard since may be old: who has the vehicle now?
+        rig.detail = "the autopilot's mode"
+        await rig.fresh_heartbeat()
+        require_role(rig.link, {Role.TAKEOFF, Role.HOLD, Role.OFFBOARD})
     rig.detail = "the autopilot to hold"
     await _enter(rig, Role.HOLD)
     await rig.until(lambda: _in(rig, Role.HOLD))

@@ -1,7 +1,7 @@
 """Makes the snapshots: newest telemetry, our own counters, and shares over the last second."""
 
 from collections import deque
-from math import cos, degrees, dist, radians
+from math import cos, degrees, dist, inf, radians
 from typing import NamedTuple
 
 from companion.flight.control_loop import ControlLoop
@@ -111,7 +111,8 @@ class Lookout:
                 loop.last_sample,
                 loop.last_newer,
                 loop.last_fresh,
-                -1.0 if command is None else command.made_at,
+                -inf if command is None else command.made_at,
+                -inf if state.position is None else state.position.received,
                 self._heard_at,
                 loop.held_back,
             ),

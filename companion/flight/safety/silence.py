@@ -27,7 +27,8 @@ def _why(now: float, control: Control, limit: float) -> str:
     if now - control.fresh > limit:
         return "attitude arrives later than deadman.telemetry_stale_ms"
     if now - control.commanded > limit:
-        return "no position from the vehicle"
+        stale = now - control.placed > limit
+        return "no position from the vehicle" if stale else "guidance makes no commands any more"
     if control.held_back:
         return "after a gap in telemetry the autopilot did not confirm offboard"
     return "attitude from the vehicle cannot be used, or setpoints cannot leave"

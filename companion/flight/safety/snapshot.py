@@ -59,6 +59,7 @@ class Control(NamedTuple):
         newer: one came that was newer than those before.
         fresh: one came that was not late.
         commanded: guidance made a command.
+        placed: a position came.
         heard: anything at all came from the vehicle.
         held_back: after a gap the mode was not confirmed yet.
     """
@@ -68,6 +69,7 @@ class Control(NamedTuple):
     newer: float = inf
     fresh: float = inf
     commanded: float = inf
+    placed: float = inf
     heard: float = inf
     held_back: bool = False
 
