@@ -57,7 +57,7 @@ class SafetyConfig(Section):
     speed_action: Any = "hold"
     """Faster than that for 0.3 s."""
     max_tracking_error_m: Positive = 5.0
-    """Largest distance from the reference that is followed."""
+    """Largest distance from the reference; after open-loop steps, once it is back there."""
     tracking_action: Any = "hold"
     """Farther than that for 1 s."""
     thrust_action: Any = "hold"

@@ -26,6 +26,9 @@ from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.state import VehicleState
 from companion.recording.trace import FlightTrace
 
+_REJOINED = 1.0
+"""Nearer than this to its reference a vehicle is back from open-loop commands, m."""
+
 _LEVEL = Target(0.0, 0.0, 0.0)
 
 
@@ -43,7 +46,8 @@ class Guide:
         given_up: why the programme was given up, or None.
         bound_to_hold: no programme is flown any more; set by `give_up`.
         motion: of the vehicle at the last step, without the jumps of the estimate, or None.
-        off_course: distance from the reference at the last step, m; None where none is followed.
+        off_course: distance from the reference at the last step, m; None where none is followed,
+            and on the way back to it after open-loop commands.
         predictive: flies trajectories instead of linear guidance, or None.
         estimate: of the motion.
         learning: of the hover thrust.
@@ -69,6 +73,7 @@ class Guide:
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
         self.off_course: float | None = None
+        self._astray = False
         self.predictive: Predictive | None = None
         self._loop = loop
         self._guidance = guidance
@@ -183,9 +188,9 @@ class Guide:
         return target._replace(heading=target.heading - turn), down
 
     def _distance(self, reference: Reference, motion: VehicleMotion) -> float | None:
-        if self.pose is None or not reference.closed_loop:
-            return None
-        return dist(reference.position_ned, motion.position_ned)
+        distance = dist(reference.position_ned, motion.position_ned)
+        self._astray = not reference.closed_loop or (self._astray and distance > _REJOINED)
+        return None if self.pose is None or self._astray else distance
 
     def _situation(self, now: float) -> Situation:
         return self.estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)

@@ -61,7 +61,8 @@ class MotionEstimate:
         """The estimate's jumps in heading come to `turn`, rad; attitudes before are not counted."""
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
-            self._turn, self._north, self._east, self._samples = turn, 0.0, 0.0, 0
+            self._slopes.forget()
+            self._turn = turn
 
     def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
         """Take a measured position and velocity; the same one twice counts once.

@@ -53,8 +53,9 @@ async def stream(rig: Rig) -> None:
 async def arm(rig: Rig) -> None:
     """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
     if rig.config.flight.arm:
-        _check_battery(rig)  # what was good at the checks may not be so any more
-        rig.require_position()
+        # What was good at the checks may not be so any more.
+        await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
+        _check_battery(rig)
         rig.detail = "the autopilot to accept arming"
         rig.arm_sent = True
         await rig.link.command(*rig.link.family.arm())

@@ -22,11 +22,11 @@ _SELF_DISARM = 8.0
 async def takeoff(rig: Rig) -> None:
     """Let the autopilot take off, and wait for the height."""
     state, height = rig.link.state, rig.config.flight.takeoff_height_m
+    await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
     await rig.fresh_heartbeat()
     require_role(rig.link, {Role.HOLD, Role.TAKEOFF})
     if not (state.landed and state.armed):
         raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
-    rig.require_position()
     rig.detail = "the autopilot to accept the take-off"
     await rig.link.command(*rig.link.family.take_off(_home_altitude(rig) + height))
     climbing = False

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop
-from companion.flight.ending import FlightEnded
 from companion.flight.guide import Guide
 from companion.flight.safety import Lookout
 from companion.guidance import Sequence
@@ -74,15 +73,6 @@ class Rig:
         position, now = self.link.state.position, asyncio.get_running_loop().time()
         limit = self.config.deadman.position_stale_ms / 1e3
         return None if position is None or now - position.received > limit else position
-
-    def require_position(self) -> None:
-        """Go no further without a fresh position.
-
-        Raises:
-            FlightEnded: there is none.
-        """
-        if self.fresh_position() is None:
-            raise FlightEnded("no position from the vehicle any more")
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

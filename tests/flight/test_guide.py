@@ -96,6 +96,17 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     assert not bench.guide.finished
 
 
+def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
+    bench = Bench()
+    bench.fly(IN_FIRST_DOUBLET, position=(9.0, 4.0, -5.0))
+    assert bench.guide.off_course is None
+    bench.fly(IN_HOLD, position=(9.0, 4.0, -5.0))
+    assert bench.guide.off_course is None
+    for step in range(1, 101):  # the estimate follows what is measured in its own time
+        bench.fly(IN_HOLD + 0.004 * step)
+    assert bench.guide.off_course < 1.0
+
+
 def test_position_hold_may_tilt_as_it_must():
     bench = Bench()
     bench.fly(IN_HOLD, tilt=31.0)
