@@ -41,6 +41,7 @@ async def checks(rig: Rig) -> None:
         limit = _HEARTBEATS_MISSED / achieved["HEARTBEAT"]
         rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, limit)
     _check_delay(rig)
+    rig.mode_at_checks = link.state.mode
 
 
 async def stream(rig: Rig) -> None:
@@ -56,6 +57,11 @@ async def arm(rig: Rig) -> None:
         # What was good at the checks may not be so any more.
         await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
         _check_battery(rig)
+        await rig.fresh_heartbeat()
+        if rig.link.state.mode != rig.mode_at_checks:
+            raise FlightEnded(
+                f"the pilot or another station took over before arming: mode {rig.link.state.mode}"
+            )
         rig.detail = "the autopilot to accept arming"
         rig.arm_sent = True
         await rig.link.command(*rig.link.family.arm())

@@ -29,6 +29,7 @@ class Rig:
         rate_hz: setpoints a second while the programme was flown.
         heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
             from the rate at which heartbeats really come.
+        mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
     """
 
@@ -41,6 +42,7 @@ class Rig:
     detail: str = ""
     rate_hz: float = 0.0
     heartbeat_limit: float = _SLOWEST_HEARTBEAT
+    mode_at_checks: str | None = None
     arm_sent: bool = False
 
     def release(self) -> None:
