@@ -68,7 +68,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="companion",
-        description="Fly a PX4 multirotor by body rates, with a linear acceleration response.",
+        description=(
+            "Fly a PX4 or ArduPilot multirotor by body rates, with a linear acceleration response."
+        ),
     )
     parser.add_argument(
         "--debug", action="store_true", help="show where an internal error happened"

@@ -166,9 +166,10 @@ class DeadmanConfig(Section):
     """Position older than this stops guidance, and so the setpoints."""
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
     """Control that stood still this long is not taken up again: hand back. Keep it below the
-    autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s)."""
+    autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
     deadline_ms: Positive = 4.0
-    """An answer that takes longer inside this process counts as a missed deadline."""
+    """An answer that leaves later than this after its sample reached this computer (over TCP and
+    serial: after it was read) counts as a missed deadline."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "DeadmanConfig":
@@ -219,7 +220,8 @@ class ThrustConfig(Section):
     """From specific thrust in m/s² to the 0..1 that MAVLink carries."""
 
     hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
-    """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER)."""
+    """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER, ArduPilot:
+    MOT_THST_HOVER)."""
     correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
     """By which share flight may correct hover_thrust at most: up to 1.8 times, down to 1/1.8."""
     correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5

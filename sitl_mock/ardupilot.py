@@ -1,6 +1,6 @@
 """ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
@@ -17,19 +17,23 @@ from sitl_mock.ardupilot_parameters import ARDUPILOT_TYPES
 from sitl_mock.ardupilot_streams import ArduPilotStreams
 from sitl_mock.ardupilot_telemetry import ArduPilotSystemTelemetry
 from sitl_mock.ardupilot_texts import ARDUPILOT_EVENTS
+from sitl_mock.commands import Commands
 from sitl_mock.land_detector import LandDetector
+from sitl_mock.link import Link
 from sitl_mock.modes import Mode
 from sitl_mock.parameter_protocol import ParameterProtocol
 from sitl_mock.parameters import FloatEncoding
 from sitl_mock.personality import Event, Identity, Occasion, Parts, Rules
 from sitl_mock.settings import MockSettings
 from sitl_mock.streams import StreamSchedule
+from sitl_mock.telemetry import Builder
 
 LANDED_AFTER_US = 1_000_000
 """Contact with little thrust for this long is a landing."""
 POSITION_TIMEOUT_US = 10_000_000
 """How long the position stays valid without GPS; not measured."""
 DEFAULT_LOOP_HZ = 400.0
+_HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 _SUPPORTED = frozenset(
     {
@@ -97,51 +101,21 @@ class ArduPilot:
 
     def rules(self, parts: Parts) -> Rules:
         """Put ArduCopter's rules together."""
-        state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
-        announce = ArduPilotAnnouncer(parts.links)
+        state, parameters, links = parts.state, parts.parameters, parts.links
+        announce = ArduPilotAnnouncer(links)
         protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
         guided = Guided()
-        control = ArduPilotModeControl(state, parameters, guided, vehicle.throttle)
-
-        def tell_home() -> None:
-            for link in parts.links:
-                commands.send(dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, link)
-                commands.send(dialect.MAVLINK_MSG_ID_HOME_POSITION, link)
-
-        def tell_parameter(name: str) -> None:
-            for link in parts.links:
-                if link.heard:
-                    protocol.send(name, link)
-
-        boot = Boot(
-            state,
-            Voice(announce, tell_home, tell_parameter),
-            ready_us=parts.ready_us,
-            elevation=parts.origin.altitude_m,
-        )
-        commander = ArduPilotCommander(
-            state,
-            parameters,
-            vehicle,
-            control,
-            guided,
-            parts.stream,
+        control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
+        voice = Voice(
             announce,
-            boot,
-            system_id=int(parameters["MAV_SYSID"]),
-            tell_home=tell_home,
+            tell_home=lambda: _tell(commands, _HOME, links),
+            tell_parameter=lambda name: protocol.tell(name, [x for x in links if x.heard]),
         )
-        builders = {
-            **ArduPilotMotionTelemetry(state, vehicle, parts.origin).builders(),
-            **ArduPilotSystemTelemetry(
-                state,
-                parts.origin,
-                self.identity,
-                vehicle,
-                initialised=lambda: boot.initialised,
-                origin_set=lambda: boot.origin_set,
-            ).builders(),
-        }
+        boot = Boot(state, voice, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
+        commander = ArduPilotCommander(
+            state, parameters, parts.vehicle, control, guided, parts.stream, voice, boot
+        )
+        builders = self._builders(parts, boot)
         commands = ArduPilotCommands(state, commander, builders, announce)
         return Rules(
             control,
@@ -161,7 +135,26 @@ class ArduPilot:
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )
 
+    def _builders(self, parts: Parts, boot: Boot) -> dict[int, Builder]:
+        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin)
+        system = ArduPilotSystemTelemetry(
+            parts.state,
+            parts.origin,
+            self.identity,
+            parts.vehicle,
+            initialised=lambda: boot.initialised,
+            origin_set=lambda: boot.origin_set,
+        )
+        return motion.builders() | system.builders()
+
     @staticmethod
     def _loop_us(settings: MockSettings) -> int:
         rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
         return round(1e6 / rate)
+
+
+def _tell(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
+    """Send messages once on every link."""
+    for link in links:
+        for message_id in messages:
+            commands.send(message_id, link)

@@ -4,21 +4,25 @@ from math import sqrt
 
 
 class Climb:
-    """The height and the climb rate that are followed now, m and m/s, up positive."""
+    """The height, climb rate and acceleration that are followed now; SI, up positive."""
 
     def __init__(self) -> None:
         self.height = 0.0
         self.rate = 0.0
+        self.acceleration = 0.0
 
     def begin(self, height: float, rate: float) -> None:
         """Begin where the vehicle is, as fast as it climbs."""
         self.height = height
         self.rate = rate
+        self.acceleration = 0.0
 
     def step(self, asked: float, acceleration: float, dt: float) -> None:
         """Move on by ``dt`` s towards the climb rate ``asked``."""
         most = acceleration * dt
-        self.rate += max(-most, min(most, asked - self.rate))
+        change = max(-most, min(most, asked - self.rate))
+        self.acceleration = change / dt
+        self.rate += change
         self.height += self.rate * dt
 
 

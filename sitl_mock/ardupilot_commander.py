@@ -1,10 +1,8 @@
 """ArduCopter's rules of arming, modes and GUIDED, by its measured behaviour."""
 
-from collections.abc import Callable
 from math import isfinite, isnan
 
-from sitl_mock.ardupilot_announcer import ArduPilotAnnouncer
-from sitl_mock.ardupilot_boot import Boot
+from sitl_mock.ardupilot_boot import Boot, Voice
 from sitl_mock.ardupilot_checks import arming_problem
 from sitl_mock.ardupilot_failsafe import ArduPilotFailsafe
 from sitl_mock.ardupilot_guided import Guided, Task
@@ -37,10 +35,8 @@ class ArduPilotCommander:
         control: told of every mode entered.
         guided: told what GUIDED shall do.
         stream: counts the setpoints that are obeyed.
-        announce: tells the outside.
+        voice: tells the outside.
         boot: how far the autopilot has come up.
-        system_id: this vehicle's.
-        tell_home: sends where home and the origin are.
     """
 
     def __init__(
@@ -51,24 +47,20 @@ class ArduPilotCommander:
         control: ArduPilotModeControl,
         guided: Guided,
         stream: OffboardStream,
-        announce: ArduPilotAnnouncer,
+        voice: Voice,
         boot: Boot,
-        *,
-        system_id: int,
-        tell_home: Callable[[], None],
     ) -> None:
         self.refusal: str | None = None
         self.pilot = False
-        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, announce, self._act)
+        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, voice.announce, self._act)
         self._state = state
         self._parameters = parameters
         self._control = control
         self._guided = guided
         self._stream = stream
-        self._announce = announce
+        self._announce = voice.announce
+        self._voice = voice
         self._boot = boot
-        self._system_id = system_id
-        self._tell_home = tell_home
         self._landed_since_us = 0
         self._crashed = False
         self._internal_error = False
@@ -95,7 +87,7 @@ class ArduPilotCommander:
         state.home_ned = state.estimate.position_ned
         state.home_set_at_us = state.time_us
         self._announce(Occasion.ARMED, "")
-        self._tell_home()
+        self._voice.tell_home()
         self._control.enter(state.mode)
         return ACCEPTED
 
@@ -140,7 +132,7 @@ class ArduPilotCommander:
     def setpoint(self, message: Message) -> None:
         """Take a setpoint in GUIDED; one that comes from this very autopilot is ignored."""
         state = self._state
-        own = (self._system_id, _OWN_COMPONENT)
+        own = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
         if state.mode is not Mode.GUIDED:
             return
         if (message.get_srcSystem(), message.get_srcComponent()) == own:
@@ -214,6 +206,7 @@ class ArduPilotCommander:
     def _stop_motors(self, occasion: Occasion) -> None:
         self._state.armed = False
         self._announce(occasion, "")
+        self._voice.tell_parameter("MOT_THST_HOVER")  # what was learned is saved
         if self._state.mode is Mode.GUIDED:
             self._guided.hold()
 

@@ -11,13 +11,12 @@ from sitl_mock.position_control import (
     PositionOutput,
 )
 from sitl_mock.quaternion import Vector, yaw
-from sitl_mock.state import NAN, NAN_VECTOR, PositionTargetEcho, State
+from sitl_mock.state import NAN, PositionTargetEcho, State
 
 STOPPING_S = 0.65
 """The point to hold lies this many seconds of velocity ahead (recorded on entering LAND)."""
 _HEIGHT_INTEGRAL = 1.0
 """Acceleration per height speed error and second; the mock's own, steady in a hover."""
-_LEVEL: Vector = (0.0, 0.0, NAN)
 _STEEP_CLIMB = 10.0
 """Bounds what the height loop may ask, m/s; the climb rate has its limits already."""
 
@@ -71,7 +70,7 @@ class PositionHold:
         demand = PositionDemand(
             (north, east, -climb.height),
             (NAN, NAN, -climb.rate),
-            _LEVEL if level else NAN_VECTOR,
+            (*((0.0, 0.0) if level else (NAN, NAN)), -climb.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
             _STEEP_CLIMB,

@@ -25,7 +25,7 @@ ARRIVAL_ACCELERATION = 0.55
 """A take-off slows down by this, m/s^2 (recorded)."""
 ARRIVED_M = 0.1
 _SLOWEST_ARRIVAL = 0.1
-TOUCHDOWN_THRUST_RATE = 0.6
+TOUCHDOWN_THRUST_RATE = 0.43
 """After contact in LAND the thrust falls by this per second (landed 1.6 s after, recorded)."""
 LEARNING_S = 10.0
 """MOT_THST_HOVER follows the thrust of a quiet hover with this time constant."""

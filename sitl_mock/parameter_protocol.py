@@ -1,6 +1,7 @@
 """The PARAM protocol on one vehicle: list, read, set, and PX4's hash."""
 
 import struct
+from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -46,7 +47,7 @@ class ParameterProtocol:
             if name == HASH_NAME and self._encoding.hashed:
                 self._send_hash(link)
             elif name in self._parameters:
-                self.send(name, link)
+                self._send_alone(name, link)
             else:
                 self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
@@ -70,7 +71,12 @@ class ParameterProtocol:
         except ParameterRefusedError:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             return
-        self.send(name, link)
+        self._send_alone(name, link)
+
+    def tell(self, name: str, links: Iterable[Link]) -> None:
+        """Send a parameter that the autopilot has changed by itself."""
+        for link in links:
+            self._send_alone(name, link)
 
     def step(self) -> None:
         """Send the next few parameters of every list asked for."""
@@ -83,7 +89,7 @@ class ParameterProtocol:
             else:
                 self._listing[key] = (link, end)
 
-    def send(self, name: str, link: Link) -> None:
+    def _send_alone(self, name: str, link: Link) -> None:
         """Send a parameter outside of a list."""
         indexed = self._encoding.indexed
         self._send(name, self._parameters.index_of(name) if indexed else _NO_INDEX_UNSIGNED, link)

@@ -2,7 +2,7 @@
 
 from math import hypot, isnan, radians, tan
 
-from sitl_mock.attitude_control import AttitudeGains, attitude_rates, is_usable
+from sitl_mock.attitude_control import attitude_rates, is_usable
 from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
@@ -10,8 +10,9 @@ from sitl_mock.position_control import (
     GRAVITY,
     PositionController,
     PositionDemand,
-    PositionGains,
 )
+from sitl_mock.px4_gains import attitude_gains, position_gains
+from sitl_mock.px4_modes import PILOTED
 from sitl_mock.quaternion import Quaternion, Vector, along_heading, from_yaw, yaw
 from sitl_mock.setpoints import PositionSetpoint
 from sitl_mock.state import NAN, NAN_VECTOR, PositionTargetEcho, State
@@ -26,6 +27,8 @@ CRAWL_HEIGHT_M = 0.65
 BRAKING_S = 0.7
 """Entering a hold, the point to hold lies this many seconds of velocity ahead."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
+PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
+"""Disarmed, PX4's own modes ask this acceleration, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -42,7 +45,7 @@ class Px4ModeControl:
         self._state = state
         self._parameters = parameters
         self._stream = stream
-        self._position = PositionController(self._position_gains)
+        self._position = PositionController(lambda: position_gains(parameters))
         self._hold: Vector = (0.0, 0.0, 0.0)
         self._yaw = 0.0
         self._takeoff_z = 0.0
@@ -95,6 +98,11 @@ class Px4ModeControl:
         state.position_target.active = False
         fresh = self._stream.take_fresh()
         if not state.armed:
+            if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED:
+                yaw_now = yaw(state.estimate.q)
+                state.position_target = PositionTargetEcho(
+                    True, NAN_VECTOR, NAN_VECTOR, PRESSED_DOWN, yaw_now
+                )
             command = _STILL
         elif state.mode is Mode.OFFBOARD:
             command = self._offboard(dt, fresh=fresh)
@@ -263,34 +271,7 @@ class Px4ModeControl:
         if self._attitude_dead or self._nan_since_us is not None:
             return self._rates(NAN_VECTOR, thrust)
         self._state.attitude_target.q = target
-        rates = attitude_rates(self._state.estimate.q, target, yaw_rate, self._gains())
+        rates = attitude_rates(
+            self._state.estimate.q, target, yaw_rate, attitude_gains(self._parameters)
+        )
         return self._rates(rates, thrust)
-
-    def _position_gains(self) -> PositionGains:
-        parameters = self._parameters
-        return PositionGains(
-            parameters["MPC_XY_P"],
-            parameters["MPC_Z_P"],
-            parameters["MPC_XY_VEL_P_ACC"],
-            parameters["MPC_Z_VEL_P_ACC"],
-            parameters["MPC_XY_VEL_I_ACC"],
-            parameters["MPC_Z_VEL_I_ACC"],
-            radians(parameters["MPC_TILTMAX_AIR"]),
-            parameters["MPC_THR_HOVER"],
-            parameters["MPC_THR_MIN"],
-            parameters["MPC_THR_MAX"],
-        )
-
-    def _gains(self) -> AttitudeGains:
-        parameters = self._parameters
-        return AttitudeGains(
-            parameters["MC_ROLL_P"],
-            parameters["MC_PITCH_P"],
-            parameters["MC_YAW_P"],
-            parameters["MC_YAW_WEIGHT"],
-            (
-                radians(parameters["MC_ROLLRATE_MAX"]),
-                radians(parameters["MC_PITCHRATE_MAX"]),
-                radians(parameters["MC_YAWRATE_MAX"]),
-            ),
-        )

@@ -7,7 +7,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.geodesy import Geodetic, Origin, to_geodetic
 from sitl_mock.quaternion import Quaternion, yaw
-from sitl_mock.state import NAN, State
+from sitl_mock.setpoints import ACCELERATION_BITS, POSITION_BITS, VELOCITY_BITS, YAW_IGNORED
+from sitl_mock.state import NAN, PositionTargetEcho, State
 from sitl_mock.vehicle import Vehicle
 from sitl_mock.wire import Message
 
@@ -138,7 +139,7 @@ class MotionTelemetry:
         return dialect.MAVLink_position_target_local_ned_message(
             self._boot_ms,
             dialect.MAV_FRAME_LOCAL_NED,
-            0,
+            _ignored(target),
             *target.position,
             *target.velocity,
             *target.acceleration,
@@ -202,6 +203,22 @@ class MotionTelemetry:
 
     def _heading_deg(self) -> float:
         return degrees(yaw(self._state.estimate.q)) % 360.0
+
+
+def _ignored(target: PositionTargetEcho) -> int:
+    """Return the POSITION_TARGET_TYPEMASK that leaves out what is not followed."""
+    parts = (
+        (POSITION_BITS, target.position),
+        (VELOCITY_BITS, target.velocity),
+        (ACCELERATION_BITS, target.acceleration),
+        ((YAW_IGNORED,), (target.yaw,)),
+    )
+    return sum(
+        bit
+        for bits, values in parts
+        for bit, value in zip(bits, values, strict=True)
+        if isnan(value)
+    )
 
 
 def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:

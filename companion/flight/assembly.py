@@ -231,7 +231,7 @@ def assemble(
     watch = Watch(rig, ladder, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = flight.note
+    ladder.note = rig.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:

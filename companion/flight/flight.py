@@ -1,12 +1,12 @@
 """One flight from the first heartbeat to the last: runs the phases, and sees to every ending."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from typing import Any
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.observer import Observer
-from companion.flight.phases import Phase, exit_phases, flight_phases
+from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
 from companion.flight.rig import Rig
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
@@ -33,8 +33,8 @@ class Flight:
     """
 
     def __init__(self, rig: Rig, watch: Watch, observer: Observer, ask_landing: AskLanding) -> None:
-        self._phases = flight_phases(rig.config.flight, rig.programme.duration)
-        self.phase = self._phases[0]
+        self._ground = ground_phases(rig.config.flight)
+        self.phase = self._ground[0]
         self.failed_in: Phase | None = None
         self.events: list[tuple[float, str]] = []
         self._rig = rig
@@ -54,7 +54,7 @@ class Flight:
             for work in (self._rig.guide.run, self._judge, self._tell)
         ]
         try:
-            for phase in self._phases:
+            for phase in self._phases():
                 await self._fly(phase)
         except FlightEnded as ended:
             self.failed_in = self.phase
@@ -96,6 +96,12 @@ class Flight:
         time = self._clock() - self._began
         self.events.append((time, text))
         self._observer.event(time, text)
+
+    def _phases(self) -> Iterator[Phase]:
+        """All phases, in order; what follows the ground's depends on the autopilot met there."""
+        yield from self._ground
+        rig = self._rig
+        yield from flight_phases(rig.config.flight, rig.programme.duration, rig.link.family)
 
     async def _fly(self, phase: Phase) -> None:
         """Run one phase to its end; whatever goes wrong becomes a `FlightEnded`."""

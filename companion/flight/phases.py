@@ -8,7 +8,8 @@ from companion.config_sections import FlightConfig
 from companion.flight import preparation, procedures
 from companion.flight.ending import Exit
 from companion.flight.rig import Rig
-from companion.flight.roles import Role
+from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.roles import Role
 
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.HOLD})
 _SHORT = 10.0
@@ -42,13 +43,22 @@ class Phase:
     monitored: bool = False
 
 
-def flight_phases(config: FlightConfig, programme_duration: float) -> tuple[Phase, ...]:
-    """The phases of a flight, in order; `programme_duration` in s."""
+def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
+    """The phases before anything is asked of the vehicle but its telemetry, in order."""
     return (
         # A second more than the link waits: its own words on why nothing came are the better ones.
         Phase("connect", "a heartbeat", preparation.connect, config.connect_timeout_s + 1.0),
         Phase("checks", "the vehicle to be ready", preparation.checks, config.ready_timeout_s),
-        Phase("stream", "setpoints to flow", preparation.stream, _SHORT),
+    )
+
+
+def flight_phases(
+    config: FlightConfig, programme_duration: float, family: AutopilotFamily
+) -> tuple[Phase, ...]:
+    """The phases from there on, in the family's order; `programme_duration` in s."""
+    stream = Phase("stream", "setpoints to flow", preparation.stream, _SHORT)
+    return (
+        *(() if family.take_over() is None else (stream,)),
         Phase("arm", "the vehicle to arm", preparation.arm, config.arming_timeout_s, Exit.DISARM),
         Phase(
             "takeoff",

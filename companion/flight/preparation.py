@@ -1,8 +1,10 @@
 """What is done on the ground, one coroutine a phase, and how arming is undone."""
 
+from companion.flight.autopilot_setup import autopilot_setup
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.rig import Rig
-from companion.flight.roles import Role, mode_name, role_of
+from companion.mavlink.parameter_rules import Verdict, judge
+from companion.mavlink.parameter_survey import survey
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -23,8 +25,11 @@ async def checks(rig: Rig) -> None:
         "ATTITUDE_QUATERNION": config.link.attitude_rate_hz,
         "LOCAL_POSITION_NED": config.link.position_rate_hz,
     }
-    await link.set_rates(wanted, window_s=0.1)
+    for message, rate in (await link.set_rates(wanted, window_s=0.1)).items():
+        if rate.granted < rate.asked:
+            rig.note(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
     await rig.until(lambda: _ready(rig))
+    await _check_vital_parameters(rig)
     # Measured only now: a position is not sent before the estimator has one.
     rig.detail = "measuring the telemetry that arrives"
     achieved = await link.measure_rates(wanted, 1.0)
@@ -64,13 +69,14 @@ async def arm(rig: Rig) -> None:
             )
         rig.detail = "the autopilot to accept arming"
         rig.arm_sent = True
-        await rig.link.command(*rig.link.family.arm())
+        for command in rig.link.family.arm():
+            await rig.link.command(*command)
         await rig.until(rig.armed, "the vehicle to be armed")
         return
     await rig.until(rig.armed, "the pilot to arm (flight.arm is false, --arm was not given)")
-    hold = mode_name(rig.link.family, Role.HOLD)
+    ready = rig.link.family.ready_mode
     await rig.until(
-        lambda: _handed_over(rig), f"the pilot to hand over, by switching to {hold} on the ground"
+        lambda: _handed_over(rig), f"the pilot to hand over, by switching to {ready} on the ground"
     )
 
 
@@ -105,6 +111,33 @@ def _check_battery(rig: Rig) -> None:
         )
 
 
+async def _check_vital_parameters(rig: Rig) -> None:
+    """Refuse an autopilot that would take our setpoints for something else.
+
+    And tell what it would do without them.
+    """
+    rig.detail = "reading the autopilot's parameters"
+    family = rig.link.family
+    dead_man = family.dead_man
+    vital = [rule for rule in family.parameters if rule.vital]
+    held = [rule for rule in family.parameters if rule.name == dead_man.parameter]
+    values = await survey(rig.link, [*vital, *held])
+    for rule in vital:
+        if rule.name not in values:
+            raise FlightEnded(
+                f"the autopilot has no parameter {rule.name}, so that it cannot be known "
+                f"{rule.meaning}; this needs a newer version of {family.name}"
+            )
+    for finding in judge(vital, values, autopilot_setup(rig.config)):
+        if finding.verdict is not Verdict.SAFE:
+            raise FlightEnded(finding.sentence())
+    seconds = values.get(dead_man.parameter, dead_man.default)
+    rig.note(
+        f"should our setpoints stop, {family.name} holds the last rates for {seconds:g} s "
+        f"({dead_man.parameter}); then {dead_man.then}"
+    )
+
+
 def _check_delay(rig: Rig) -> None:
     """A delay that is always there cannot be seen from the samples, but from TIMESYNC."""
     round_trip, limit = rig.link.timesync.round_trip_s, rig.config.deadman.telemetry_stale_ms / 1e3
@@ -120,4 +153,4 @@ def _handed_over(rig: Rig) -> bool:
         raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
     if not rig.link.state.landed:
         raise FlightEnded("the pilot took off", Exit.LET_GO)
-    return role_of(rig.link.family, rig.link.state.mode) is Role.HOLD
+    return rig.link.state.mode == rig.link.family.ready_mode

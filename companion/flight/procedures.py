@@ -4,7 +4,8 @@ import asyncio
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.rig import Rig
-from companion.flight.roles import Role, mode_name, require_role, role_of
+from companion.flight.roles import require_role, roles_of
+from companion.mavlink.roles import Role
 
 _SETTLING = 1.0
 """Hold in offboard before the programme begins, s: the take-over is not part of it."""
@@ -28,7 +29,7 @@ async def takeoff(rig: Rig) -> None:
     if not (state.landed and state.armed):
         raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
     rig.detail = "the autopilot to accept the take-off"
-    await rig.link.command(*rig.link.family.take_off(_home_altitude(rig) + height))
+    await rig.link.command(*rig.link.family.take_off(height, _home_altitude(rig)))
     climbing = False
 
     def reached() -> bool:
@@ -37,10 +38,12 @@ async def takeoff(rig: Rig) -> None:
         if now is None or position is None:
             return False
         rig.detail = f"{height:g} m, now {now:.1f} m"
-        climbing = climbing or _in(rig, Role.TAKEOFF)
-        if climbing and _in(rig, Role.HOLD) and now < height - _STOPPED:
+        climbs = _in(rig, Role.TAKEOFF)
+        climbing = climbing or climbs
+        if climbing and not climbs and _in(rig, Role.HOLD) and now < height - _STOPPED:
             raise FlightEnded(f"the climb was stopped at {now:.1f} m, not by us", Exit.LET_GO)
-        return now > height - _REACHED and abs(position.velocity_ned[2]) < 0.3
+        there = now > height - _REACHED and abs(position.velocity_ned[2]) < 0.3
+        return there and not state.taking_off
 
     await rig.until(reached)
 
@@ -52,8 +55,8 @@ async def offboard(rig: Rig) -> None:
     # The mode we know may be a second old; never take the vehicle from a pilot who took it.
     await rig.fresh_heartbeat()
     require_role(rig.link, {Role.TAKEOFF, Role.HOLD})
-    rig.detail = "the autopilot to enter offboard"
-    await _enter(rig, Role.OFFBOARD)
+    await _take_over(rig)
+    rig.detail = "the autopilot to obey our rates"
     await rig.until(lambda: _in(rig, Role.OFFBOARD))
     rig.guide.hold_here()
     rig.loop.guarded = True
@@ -87,7 +90,7 @@ async def hand_back(rig: Rig) -> None:
         await rig.fresh_heartbeat()
         require_role(rig.link, {Role.TAKEOFF, Role.HOLD, Role.OFFBOARD})
     rig.detail = "the autopilot to hold"
-    await _enter(rig, Role.HOLD)
+    await rig.link.command(*rig.link.family.hold())
     await rig.until(lambda: _in(rig, Role.HOLD))
     rig.release()
 
@@ -126,13 +129,24 @@ def _stop_moving(rig: Rig) -> None:
         rig.guide.hold_here()
 
 
-async def _enter(rig: Rig, role: Role) -> None:
-    family = rig.link.family
-    await rig.link.command(*family.set_mode(mode_name(family, role)))
+async def _take_over(rig: Rig) -> None:
+    """Have our setpoints obeyed: by a command, or by the first of them."""
+    command = rig.link.family.take_over()
+    if command is not None:
+        rig.detail = "the autopilot to enter offboard"
+        await rig.link.command(*command)
+        return
+    # The first setpoint counts: it must not be an idle one of the time on the ground.
+    await rig.until(lambda: _commands_flight(rig), "a target from guidance")
+    rig.loop.on = True
+
+
+def _commands_flight(rig: Rig) -> bool:
+    return rig.loop.command is not None and not rig.loop.command.idle
 
 
 def _in(rig: Rig, role: Role) -> bool:
-    return role_of(rig.link.family, rig.link.state.mode) is role
+    return role in roles_of(rig.link)
 
 
 def _home_altitude(rig: Rig) -> float:

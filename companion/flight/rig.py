@@ -31,6 +31,7 @@ class Rig:
             from the rate at which heartbeats really come.
         mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
+        note: writes down and shows that something happened.
     """
 
     config: Config
@@ -44,6 +45,7 @@ class Rig:
     heartbeat_limit: float = _SLOWEST_HEARTBEAT
     mode_at_checks: str | None = None
     arm_sent: bool = False
+    note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:
         """Stop answering samples: from here on nothing is sent that steers."""

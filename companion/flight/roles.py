@@ -1,35 +1,16 @@
-"""What a mode of the autopilot means to a flight, whatever the family calls it."""
+"""Whether the vehicle still is in a mode of the flight's own."""
 
 from collections.abc import Set
-from enum import Enum
 
 from companion.flight.ending import Exit, FlightEnded
-from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.link import Link
+from companion.mavlink.roles import Role
 
 
-class Role(Enum):
-    """The modes that a flight passes through; every other mode is somebody else's doing."""
-
-    TAKEOFF = "take-off"
-    HOLD = "hold"
-    OFFBOARD = "offboard"
-    LAND = "land"
-
-
-def mode_name(family: AutopilotFamily, role: Role) -> str:
-    """What the family calls the mode in this role."""
-    return {
-        Role.TAKEOFF: family.takeoff_mode,
-        Role.HOLD: family.hold_mode,
-        Role.OFFBOARD: family.offboard_mode,
-        Role.LAND: family.land_mode,
-    }[role]
-
-
-def role_of(family: AutopilotFamily, mode: str | None) -> Role | None:
-    """The role of a mode; None for a mode that is not ours, or not known yet."""
-    return next((role for role in Role if mode_name(family, role) == mode), None)
+def roles_of(link: Link) -> frozenset[Role]:
+    """What the present mode is to a flight; empty for one that is not ours, or not known yet."""
+    mode = link.state.mode
+    return frozenset() if mode is None else link.family.roles(mode)
 
 
 def require_role(link: Link, allowed: Set[Role]) -> None:
@@ -38,7 +19,7 @@ def require_role(link: Link, allowed: Set[Role]) -> None:
     Raises:
         FlightEnded: with who, as far as can be known, took it.
     """
-    if role_of(link.family, link.state.mode) in allowed:
+    if roles_of(link) & allowed:
         return
     who = (
         "the autopilot's failsafe took over"

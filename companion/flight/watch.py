@@ -6,9 +6,10 @@ from collections.abc import Callable
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.phases import Phase
 from companion.flight.rig import Rig
-from companion.flight.roles import Role, require_role, role_of
+from companion.flight.roles import require_role, roles_of
 from companion.flight.safety import Action, SafetyLadder
 from companion.flight.safety.monitor import EXITS
+from companion.mavlink.roles import Role
 
 
 class Watch:
@@ -48,8 +49,7 @@ class Watch:
             FlightEnded: as `judge`.
         """
         self.judge(phase)
-        link = self._rig.link
-        if self._rig.loop.held_back and role_of(link.family, link.state.mode) is Role.OFFBOARD:
+        if self._rig.loop.held_back and Role.OFFBOARD in roles_of(self._rig.link):
             self._rig.loop.resume()
 
     def ask_mode(self) -> None:

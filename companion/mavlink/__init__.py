@@ -20,7 +20,8 @@ from companion.mavlink.errors import (
     UnknownParameter,
     UnsupportedAutopilot,
 )
-from companion.mavlink.family import AutopilotFamily, family_for
+from companion.mavlink.families import family_for
+from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.link import Link
 from companion.mavlink.records import Heartbeat
 from companion.mavlink.samples import AttitudeSample

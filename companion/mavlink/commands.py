@@ -2,7 +2,7 @@
 
 import asyncio
 
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import CommandRefused, CommandTimeout

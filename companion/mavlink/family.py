@@ -1,45 +1,65 @@
-"""What differs between autopilots, behind one face."""
+"""What differs between autopilots, behind one face.
+
+A further family is one new file beside `px4.py` and `ardupilot.py`, and its line in `families.py`.
+"""
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from companion.mavlink.command import Command
-from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.px4 import Px4
+from companion.mavlink.parameter_rules import ParameterRule
 from companion.mavlink.readiness import Readiness
+from companion.mavlink.roles import Role
 
-MAV_AUTOPILOT_PX4 = 12
+
+class DeadMan(NamedTuple):
+    """What the autopilot does when our setpoints stop.
+
+    Attributes:
+        parameter: Sets for how long, in s, it holds the last rates; see `AutopilotFamily`.
+        default: Its value unless somebody changed it, s.
+        then: What follows, in words.
+    """
+
+    parameter: str
+    default: float
+    then: str
 
 
 class AutopilotFamily(Protocol):
-    """How to speak to one kind of autopilot.
+    """How to speak to one kind of autopilot, and what its words mean to a flight.
+
+    Thrust is 0..1 of the collective in every family; what a vehicle must be set to for that, and
+    whether it divides by cos(tilt) itself, is told by `parameters`. All of them hold the last rates
+    for a while when setpoints stop, and obey a later one unless a mode was commanded meanwhile.
 
     Attributes:
         name: For people, such as `PX4`.
         autopilot: MAV_AUTOPILOT number.
-        offboard_mode: Name of the mode in which it obeys body rates.
-        takeoff_mode: Name of the mode in which it takes off.
-        hold_mode: Name of the mode that holds position.
-        land_mode: Name of the mode that lands here.
         modes: `custom_mode` of each mode that may be entered, by name.
+        ready_mode: Name of the mode in which a pilot who armed hands the vehicle over to us.
         bytewise_parameters: Whether integer parameters travel as bytes.
-        tilt_compensated: Whether the autopilot itself divides thrust by cos(tilt) in rate mode.
         wanted_rates: Messages the flight needs, with the rate to ask for, Hz.
+        interval_step_us: SET_MESSAGE_INTERVAL counts in whole multiples of this.
+        dead_man: What it does when setpoints stop.
+        parameters: Those that matter to a flight by body rates.
     """
 
     name: str
     autopilot: int
-    offboard_mode: str
-    takeoff_mode: str
-    hold_mode: str
-    land_mode: str
     modes: Mapping[str, int]
+    ready_mode: str
     bytewise_parameters: bool
-    tilt_compensated: bool
     wanted_rates: Mapping[str, float]
+    interval_step_us: int
+    dead_man: DeadMan
+    parameters: tuple[ParameterRule, ...]
 
-    def mode_name(self, custom_mode: int) -> str:
+    def mode_name(self, base_mode: int, custom_mode: int) -> str:
         """Name of the mode in a heartbeat; for an unknown one its number."""
+
+    def roles(self, mode: str) -> frozenset[Role]:
+        """What the mode of that name, as `mode_name` gives it, is to a flight; empty: none."""
 
     def set_mode(self, name: str) -> Command:
         """Command that enters a mode of `modes`. Raises `KeyError` for any other."""
@@ -47,28 +67,28 @@ class AutopilotFamily(Protocol):
     def not_ready(self, readiness: Readiness) -> str | None:
         """What still is missing before it can be armed and flown, or `None`."""
 
-    def arm(self) -> Command:
-        """Command that arms, with all checks."""
+    def arm(self) -> tuple[Command, ...]:
+        """Commands that make it ready for our take-off and arm it, with all checks, in order."""
 
     def disarm(self) -> Command:
         """Command that disarms on the ground."""
 
-    def take_off(self, altitude_amsl_m: float) -> Command:
-        """Command that takes off to an altitude above mean sea level, m, from an armed hold."""
+    def take_off(self, height_m: float, home_altitude_m: float) -> Command:
+        """Command that takes off from where it stands armed.
+
+        Args:
+            height_m: To reach, above home.
+            home_altitude_m: Of home, above mean sea level.
+        """
+
+    def take_over(self) -> Command | None:
+        """Command by which it obeys the setpoints that have been streaming for a second.
+
+        `None`: it obeys the first one, so none may leave before that is wanted.
+        """
+
+    def hold(self) -> Command:
+        """Command by which it holds position by itself, without a pilot's sticks."""
 
     def land(self) -> Command:
-        """Command that lands at the present place."""
-
-
-def family_for(autopilot: int) -> AutopilotFamily:
-    """The family of a heartbeat's `autopilot` number.
-
-    Raises:
-        UnsupportedAutopilot: None of ours.
-    """
-    if autopilot == MAV_AUTOPILOT_PX4:
-        return Px4()
-    raise UnsupportedAutopilot(
-        f"the vehicle's autopilot (MAV_AUTOPILOT {autopilot}) is not supported; this version "
-        "flies PX4 (12)"
-    )
+        """Command by which it lands at the present place."""

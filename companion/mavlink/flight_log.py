@@ -6,17 +6,17 @@ from pathlib import Path
 
 from companion.mavlink.codec import IGNORE_ATTITUDE, Message
 from companion.mavlink.errors import LogError
-from companion.mavlink.family import MAV_AUTOPILOT_PX4
-from companion.mavlink.px4 import Px4
+from companion.mavlink.families import FAMILIES, FAMILY_NAMES
+from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.roles import Role
 from companion.mavlink.tlog_file import messages
 
 Row = tuple[float, ...]
 
-_OBEYS = {MAV_AUTOPILOT_PX4: Px4.modes[Px4.offboard_mode], 3: 4}
-"""`custom_mode` in which body rates are obeyed, by MAV_AUTOPILOT; ArduPilot's (3) is GUIDED."""
+_FAMILIES = {family.autopilot: family for family in FAMILIES}
 _ARMED = 128
 _WHAT_COUNTS = IGNORE_ATTITUDE | 0b1100111
-"""Of a type mask: quaternion, three rates, throttle, and PX4's body thrust, which replaces it."""
+"""Of a type mask: quaternion, three rates, throttle, and the body thrust that may replace it."""
 _STANDARD_GRAVITY = 9.80665
 _RECENT = 500
 """A setpoint that echoes the stamp of a sample echoes one of the latest so many."""
@@ -53,22 +53,21 @@ def read_flight_log(path: Path) -> FlightLog:
 
     A setpoint that carries the stamp of a recent sample answers that sample, as ours do; any other
     is taken to answer the latest sample recorded before it. It counts where the heartbeats before
-    and after it say that the vehicle is armed and in the mode that obeys it: PX4's OFFBOARD,
-    ArduPilot's GUIDED.
+    and after it say that the vehicle is armed and obeys rates, in the words of its family.
 
     Raises:
-        LogError: the file cannot be read, is not a `.tlog`, or holds no heartbeat of a PX4 or an
-            ArduPilot, or no setpoint that it obeyed.
+        LogError: the file cannot be read, is not a `.tlog`, or holds no heartbeat of an autopilot
+            that we know, or no setpoint that it obeyed.
     """
     reader = _Reader()
     for frame, message in messages(path, _NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
-        raise LogError(f"{path}: holds no heartbeat of a PX4 or an ArduPilot")
+        raise LogError(f"{path}: holds no heartbeat of {FAMILY_NAMES}")
     if not reader.obeyed:
         raise LogError(
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
-            "armed, in PX4's OFFBOARD or ArduPilot's GUIDED"
+            "armed, in the mode that obeys it"
         )
     # Both kinds tell the same rates; together they would count twice.
     return FlightLog(
@@ -93,6 +92,7 @@ class _Reader:
     quaternion: list[Row] = field(default_factory=list)
     euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
+    _family: AutopilotFamily | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)
     _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -108,12 +108,13 @@ class _Reader:
             self._telemetry(kind, message)
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
-        if self.vehicle is None and heartbeat.autopilot in _OBEYS:
-            self.vehicle = source
-        if source != self.vehicle:
+        if self.vehicle is None and heartbeat.autopilot in _FAMILIES:
+            self.vehicle, self._family = source, _FAMILIES[heartbeat.autopilot]
+        if source != self.vehicle or self._family is None:
             return
+        mode = self._family.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
         armed = bool(heartbeat.base_mode & _ARMED)
-        obeying = armed and heartbeat.custom_mode == _OBEYS[heartbeat.autopilot]
+        obeying = armed and Role.OFFBOARD in self._family.roles(mode)
         if obeying and self._obeying:
             self.obeyed.extend(self._unconfirmed)
         self._unconfirmed.clear()

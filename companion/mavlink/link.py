@@ -195,7 +195,7 @@ class Link:
         """Call `callback` with each message of that name; call the result to end it.
 
         Raises:
-            UnknownMessage: MAVLink common has no such message.
+            UnknownMessage: The dialect has no such message.
         """
         return self._router.subscribe(name, callback)
 
@@ -223,7 +223,7 @@ class Link:
         """Ask once for a message and return it.
 
         Raises:
-            UnknownMessage: MAVLink common has no such message.
+            UnknownMessage: The dialect has no such message.
             CommandRefused: The autopilot does not give it.
             LinkTimeout: It was promised but did not come.
             LinkLost: The connection dropped meanwhile.
@@ -267,11 +267,13 @@ class Link:
         """Ask for message rates in Hz (0 stops one) and count what comes for `window_s`.
 
         Raises:
-            UnknownMessage: A name is not in MAVLink common; nothing was sent then.
+            NotConnected: The autopilot was not heard yet.
+            UnknownMessage: A name is not in the dialect; nothing was sent then.
             CommandTimeout: The autopilot did not answer a request.
             LinkLost: The connection dropped meanwhile.
         """
-        return await set_rates(self._commands, self.stats, rates, window_s)
+        step_us = self.family.interval_step_us
+        return await set_rates(self._commands, self.stats, rates, window_s, step_us)
 
     async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:
         """Rates in Hz at which messages arrive, counted over `window_s`."""

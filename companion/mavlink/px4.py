@@ -15,7 +15,10 @@ from companion.mavlink.command import (
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
+from companion.mavlink.family import DeadMan
+from companion.mavlink.px4_parameters import PX4_PARAMETERS
 from companion.mavlink.readiness import Readiness
+from companion.mavlink.roles import Role
 
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x8  # attitude, both velocities, horizontal position
 _CUSTOM_MODE_ENABLED = 1.0
@@ -43,6 +46,12 @@ _MODES = {
     "STABILIZED": _custom_mode(7),
 }
 _NAMES = {number: name for name, number in _MODES.items()}
+_ROLES = {
+    "AUTO.TAKEOFF": frozenset({Role.TAKEOFF}),
+    "AUTO.LOITER": frozenset({Role.HOLD}),
+    "OFFBOARD": frozenset({Role.OFFBOARD}),
+    "AUTO.LAND": frozenset({Role.LAND}),
+}
 
 
 class Px4:
@@ -56,13 +65,9 @@ class Px4:
 
     name = "PX4"
     autopilot = 12
-    offboard_mode = "OFFBOARD"
-    takeoff_mode = "AUTO.TAKEOFF"
-    hold_mode = "AUTO.LOITER"
-    land_mode = "AUTO.LAND"
     modes: Mapping[str, int] = MappingProxyType(_MODES)
+    ready_mode = "AUTO.LOITER"
     bytewise_parameters = True
-    tilt_compensated = False
     # PX4 rounds the interval to its inner loop: asked 250 Hz, a 250 Hz loop gives 197 and an
     # 800 Hz loop 196; asked 400 Hz they give 191 and 392.
     wanted_rates: Mapping[str, float] = MappingProxyType(
@@ -81,10 +86,17 @@ class Px4:
             "ODOMETRY": 10.0,
         }
     )
+    interval_step_us = 1
+    dead_man = DeadMan("COM_OF_LOSS_T", 1.0, "it does what COM_OBL_RC_ACT says")
+    parameters = PX4_PARAMETERS
 
-    def mode_name(self, custom_mode: int) -> str:
-        """Name of a heartbeat's `custom_mode`."""
+    def mode_name(self, base_mode: int, custom_mode: int) -> str:
+        """Name of a heartbeat's `custom_mode`, which says it all."""
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
+
+    def roles(self, mode: str) -> frozenset[Role]:
+        """What a mode is to a flight."""
+        return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
         """DO_SET_MODE with PX4's main and sub mode. Raises `KeyError` for an unknown name."""
@@ -106,17 +118,26 @@ class Px4:
             return "the autopilot's pre-arm checks"
         return None
 
-    def arm(self) -> Command:
-        """Arm, with all checks."""
-        return Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    def arm(self) -> tuple[Command, ...]:
+        """Arm, with all checks; the take-off comes with a mode of its own."""
+        return (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),)
 
     def disarm(self) -> Command:
         """Disarm on the ground; in the air it is refused."""
         return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
-    def take_off(self, altitude_amsl_m: float) -> Command:
+    def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Take off here, keeping the heading: NaN means "as it is" to PX4."""
-        return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude_amsl_m)
+        altitude = home_altitude_m + height_m
+        return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
+
+    def take_over(self) -> Command:
+        """Into OFFBOARD."""
+        return self.set_mode("OFFBOARD")
+
+    def hold(self) -> Command:
+        """Into AUTO.LOITER."""
+        return self.set_mode("AUTO.LOITER")
 
     def land(self) -> Command:
         """Land here, keeping the heading."""

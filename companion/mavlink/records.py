@@ -107,7 +107,7 @@ class Home(NamedTuple):
 
 
 class Estimator(NamedTuple):
-    """ESTIMATOR_STATUS.
+    """ESTIMATOR_STATUS, or EKF_STATUS_REPORT, whose flags mean the same.
 
     Attributes:
         received: Event-loop time, s.

@@ -32,7 +32,7 @@ class Router:
         """Call `callback` with each decoded message of that name.
 
         Raises:
-            UnknownMessage: MAVLink common has no such message.
+            UnknownMessage: The dialect has no such message.
         """
         return _add(self._decoded, message_id(name), callback)
 

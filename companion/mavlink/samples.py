@@ -12,7 +12,8 @@ class AttitudeSample(NamedTuple):
         time_boot_ms: The vehicle's time stamp as it came, ms since its boot.
         vehicle_time: The same in s; the control law's clock.
         received: Event-loop time of arrival, s; the watchdogs' clock.
-        received_ns: `time.perf_counter_ns()` right after the socket was read, for latency.
+        received_ns: `time.perf_counter_ns()` at which it reached this computer (over UDP, by the
+            kernel's stamp) or was read; for latency.
         q: Attitude (w, x, y, z), body FRD -> world NED.
         body_rates: Measured rates about body x, y, z, rad/s.
     """

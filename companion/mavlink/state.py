@@ -6,7 +6,8 @@ from math import isfinite
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.family import AutopilotFamily, family_for
+from companion.mavlink.families import family_for
+from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
     Battery,
@@ -27,7 +28,7 @@ _UNKNOWN_U16 = 65535
 _AUTOPILOT_INVALID = 8
 _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
-LANDED_ON_GROUND = 1
+LANDED_ON_GROUND, LANDED_TAKEOFF = 1, 3
 
 
 @dataclass
@@ -81,6 +82,7 @@ class VehicleState(_Values):
             "GPS_RAW_INT": self._on_gps,
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
+            "EKF_STATUS_REPORT": self._on_estimator,
             "ODOMETRY": self._on_odometry,
             "STATUSTEXT": self._on_text,
         }.items():
@@ -105,6 +107,11 @@ class VehicleState(_Values):
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground; unknown is not landed."""
         return self.landed_state == LANDED_ON_GROUND
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether the autopilot says that its take-off is not over yet."""
+        return self.landed_state == LANDED_TAKEOFF
 
     @property
     def battery_remaining(self) -> float | None:
@@ -145,12 +152,12 @@ class VehicleState(_Values):
             return  # an autopilot does not change its kind; this is some other part of the vehicle
         if self.family is None:
             try:
-                self.family, self.unsupported = family_for(message.autopilot), None
+                self.family, self.unsupported = family_for(message.autopilot, message.type), None
             except UnsupportedAutopilot as error:
                 self.family, self.unsupported = None, error
         mode = str(message.custom_mode)
         if self.family is not None:
-            mode = self.family.mode_name(message.custom_mode)
+            mode = self.family.mode_name(message.base_mode, message.custom_mode)
         self.heartbeat = Heartbeat(
             self._clock(),
             message.autopilot,

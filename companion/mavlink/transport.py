@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 Receive = Callable[[bytes, int], bool]
-"""Takes bytes and the `perf_counter_ns` of their reading; true if a frame in them was accepted."""
+"""Takes bytes and the `perf_counter_ns` of their arrival; true if a frame in them was accepted."""
 
 Lost = Callable[[str], None]
 """Takes the reason why the connection is gone."""

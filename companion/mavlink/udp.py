@@ -1,9 +1,11 @@
 """MAVLink over UDP: one non-blocking socket, read where the loop is fastest."""
 
 import asyncio
+import contextlib
 import errno
 import logging
 import socket
+import struct
 import time
 
 from companion.mavlink.endpoint import UdpIn, UdpOut
@@ -14,6 +16,10 @@ from companion.mavlink.transport import Receive
 _LOG = logging.getLogger(__name__)
 
 _MAX_DATAGRAM = 4096  # far above the largest MAVLink frame (280); routers pack several into one
+_SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux; the module names it from 3.13 on
+_STAMP = struct.Struct("@qq")  # s and ns since 1970
+_STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
+_OLDEST_NS = 1_000_000_000  # a stamp that seems older means that the computer's clock was set
 _BURST = 32  # datagrams read before other work of the loop has its turn
 _PEER_SILENCE_S = 2.0  # then a vehicle at another address may take the place of a silent one
 
@@ -44,6 +50,9 @@ class UdpTransport:
     that peer has been silent for 2 s the socket is opened afresh, so that a vehicle which comes
     back from another port is heard. Refusals by ICMP (vehicle not up yet) are no reason to stop.
 
+    A datagram counts as received when the kernel took it from the network, not when we came to read
+    it: latency is then honest where this process woke up late.
+
     Attributes:
         local: The (host, port) the socket is bound to.
     """
@@ -73,6 +82,8 @@ class UdpTransport:
         opened = socket.socket(self._family, socket.SOCK_DGRAM)
         try:
             opened.setblocking(False)
+            with contextlib.suppress(OSError):  # without stamps the time of reading has to do
+                opened.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             if isinstance(self._endpoint, UdpIn):
                 opened.bind(self._address)
             else:
@@ -88,11 +99,11 @@ class UdpTransport:
         if not self._connected:
             self._read_first()
             return
-        receive, read = self._receive, self._socket.recv
+        receive, read = self._receive, self._socket.recvmsg
         try:
             for _ in range(_BURST):
-                data = read(_MAX_DATAGRAM)
-                if receive(data, time.perf_counter_ns()):
+                data, stamps, _, _ = read(_MAX_DATAGRAM, _STAMP_SPACE)
+                if receive(data, _arrival_ns(stamps)):
                     self._heard = True
         except OSError:
             return  # nothing left to read, or an ICMP refusal of something sent before
@@ -136,6 +147,16 @@ class UdpTransport:
         """Close the socket."""
         self._timer.cancel()
         self._release()
+
+
+def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
+    """When the kernel took the datagram, as a `perf_counter_ns`; now, if it does not say."""
+    now = time.perf_counter_ns()
+    if not stamps:
+        return now
+    seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
+    age = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
+    return now - age if 0 <= age < _OLDEST_NS else now
 
 
 def _why(endpoint: UdpIn | UdpOut, error: OSError) -> str:

@@ -14,7 +14,7 @@ from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 VEHICLES = sorted(CONFIGS.glob("vehicle-*.yaml"))
-FILES = [CONFIGS / "mock-px4.yaml", CONFIGS / "px4.yaml"]
+FILES = [CONFIGS / f"{name}.yaml" for name in ("mock-px4", "px4", "mock-ardupilot", "ardupilot")]
 
 
 @pytest.mark.parametrize("path", FILES, ids=[p.name for p in FILES])
@@ -61,6 +61,7 @@ def test_what_differs_from_the_default_is_marked_so(path):
 def test_a_real_vehicle_is_not_armed_by_default():
     assert Config().flight.arm is False
     assert load(CONFIGS / "px4.yaml").flight.arm is False
+    assert load(CONFIGS / "ardupilot.yaml").flight.arm is False
 
 
 def test_the_schema_is_the_one_that_is_printed(capsys):

@@ -19,12 +19,16 @@ from companion.mavlink import lockstep
 from companion.yaml_file import parse
 from sitl_mock import __main__ as sitl_mock
 
+CONFIGS = Path(__file__).parents[2] / "configs"
+
 QUICK_MOCK = {
     "gcs_port": 0,
     "prearm_delay_s": 0.2,
     "speed": 20.0,
     "lockstep": {"patience_s": 0.5},
-    "parameters": {
+}
+QUICK_PARAMETERS = {
+    "px4": {
         "MPC_TKO_RAMP_T": 0.3,
         "COM_SPOOLUP_TIME": 0.1,
         "MPC_TKO_SPEED": 3.0,
@@ -35,12 +39,22 @@ QUICK_MOCK = {
         "MPC_Z_V_AUTO_DN": 3.0,
         "COM_DISARM_LAND": 0.2,
     },
+    "ardupilot": {
+        "GUID_OPTIONS": 8,
+        "ATC_ANGLE_BOOST": 0,
+        "LAND_SPEED": 150.0,
+        "WPNAV_SPEED_DN": 300.0,
+        "WPNAV_ACCEL_Z": 300.0,
+    },
 }
 QUICK_FLIGHT = {
     "flight": {"arm": True, "takeoff_height_m": 3.0, "programme": ["hover"]},
     "hover": {"duration_s": 6.0},
     "guidance": {"drag_per_s": 1.0},
     "thrust": {"hover_thrust": 0.49},
+}
+OTHER_VEHICLES = {
+    "ardupilot": {"guidance": {"drag_per_s": 0.36}, "thrust": {"hover_thrust": 0.364}},
 }
 
 
@@ -54,9 +68,9 @@ def merged(base, changes):
 class Mock:
     """A running mock vehicle and its control channel."""
 
-    def __init__(self, process, port, control_port, config, in_lockstep):
+    def __init__(self, process, port, control_port, config, in_lockstep, autopilot):
         self.process, self.port, self.config = process, port, config
-        self.in_lockstep = in_lockstep
+        self.in_lockstep, self.autopilot = in_lockstep, autopilot
         self._address = ("127.0.0.1", control_port)
 
     def ask(self, request):
@@ -83,7 +97,7 @@ class Mock:
 
 
 @contextmanager
-def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
+def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings):
     """Start the mock on free ports; its words go to `folder`/mock.log.
 
     It is forked from the test, which has imported it: a new interpreter would take as much time as
@@ -91,7 +105,8 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
     """
     port, control_port = free_port(), free_port()
     config = folder / "mock.yaml"
-    config.write_text(yaml.safe_dump({"mock": merged(QUICK_MOCK, settings)}))
+    quick = {**QUICK_MOCK, "autopilot": autopilot, "parameters": QUICK_PARAMETERS[autopilot]}
+    config.write_text(yaml.safe_dump({"mock": merged(quick, settings)}))
     arguments = ["--headless", "--config", str(config), "--port", str(port)]
     arguments += ["--control-port", str(control_port)] + ["--lockstep"] * in_lockstep
     process = multiprocessing.get_context("fork").Process(
@@ -99,7 +114,7 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, **settings):
     )
     process.start()
     try:
-        yield Mock(process, port, control_port, config, in_lockstep)
+        yield Mock(process, port, control_port, config, in_lockstep, autopilot)
     finally:
         process.terminate()
         process.join(10)
@@ -115,7 +130,8 @@ def _serve(arguments, log):
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
     link = {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep}
-    text = yaml.safe_dump(merged(merged(QUICK_FLIGHT, {"link": link}), changes))
+    flight = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
+    text = yaml.safe_dump(merged(merged(flight, {"link": link}), changes))
     folder.mkdir(exist_ok=True)
     return Session(
         parse(text, "test", Config), folder, observer or Silent(), ask_landing or decline

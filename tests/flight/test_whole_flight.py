@@ -81,5 +81,5 @@ def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
         summary = fly(mock, tmp_path / "log", **PROGRAMME)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events
-    assert summary.response().cross_axis_max < 0.04  # the hold in gusts is moving as a step begins
+    assert summary.response().cross_axis_max < 0.05  # the hold in gusts is moving as a step begins
     assert summary.tracking()["height_rms_m"] < 0.3

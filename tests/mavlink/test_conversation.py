@@ -36,7 +36,7 @@ def test_an_accepted_command_carries_its_parameters(run):
         async with linked() as (link, vehicle):
             vehicle.answers["COMMAND_LONG"] = lambda message: [ack(message.command, 0)]
             await link.command(ARM, 1.0, 2.0)
-            await link.command(*Px4().take_off(40.0))
+            await link.command(*Px4().take_off(10.0, 30.0))
             arm, take_off = vehicle.of("COMMAND_LONG")
             assert (arm.command, arm.param1, arm.param2, arm.param7) == (ARM, 1.0, 2.0, 0.0)
             assert (arm.target_system, arm.target_component, arm.confirmation) == (1, 1, 0)
@@ -268,7 +268,7 @@ def test_rates_are_asked_for_and_counted(run):
 
             def answer(message):
                 if message.param1 != 31:
-                    return [ack(message.command, 2)]
+                    return [ack(message.command, 3)]
                 burst = [attitude(4 * index) for index in range(20)]
                 asyncio.get_running_loop().call_later(0.02, vehicle.send, *burst)
                 return [ack(message.command, 0)]
@@ -280,9 +280,9 @@ def test_rates_are_asked_for_and_counted(run):
             first, second = vehicle.of("COMMAND_LONG")
             assert (first.command, first.param1, first.param2) == (511, 331.0, 2500.0)
             assert (second.param1, second.param2) == (31.0, 4000.0)
-            assert rates["ODOMETRY"] == (400.0, 0.0, "DENIED")
-            asked, achieved, refusal = rates["ATTITUDE_QUATERNION"]
-            assert (asked, refusal) == (250.0, "")
+            assert rates["ODOMETRY"] == (400.0, 0.0, 0.0, "UNSUPPORTED")
+            asked, granted, achieved, refusal = rates["ATTITUDE_QUATERNION"]
+            assert (asked, granted, refusal) == (250.0, 250.0, "")
             assert 20 / 0.4 < achieved <= 20 / 0.2 + 1e-6
             with pytest.raises(UnknownMessage):
                 await link.set_rates({"ATTITUDE": 50.0, "NONSENSE": 1.0})

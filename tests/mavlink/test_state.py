@@ -5,9 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink import UnsupportedAutopilot, family_for
 from companion.mavlink.codec import decode
-from companion.mavlink.px4 import Px4
 from companion.mavlink.router import Router
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
@@ -135,31 +133,6 @@ def test_a_text_without_its_end_is_given_when_the_next_begins(bench):
     bench.take(text(b"", 9, 1))
     words = [entry.text for entry in bench.state.texts]
     assert words == ["a" * 50, "next", "d" * 50, "e" * 50]
-
-
-def test_px4_speaks_px4():
-    family = family_for(12)
-    assert family.name == "PX4"
-    assert family.set_mode("OFFBOARD")[:4] == (176, 1.0, 6.0, 0.0)
-    assert family.set_mode("AUTO.LOITER")[:4] == (176, 1.0, 4.0, 3.0)
-    for name, number in family.modes.items():
-        assert family.mode_name(number) == name
-    assert {family.offboard_mode, family.hold_mode, family.land_mode} <= set(family.modes)
-    assert family.arm()[:2] == (400, 1.0)
-    assert family.disarm()[:2] == (400, 0.0)
-    assert family.land()[0] == 21
-    with pytest.raises(KeyError):
-        family.set_mode("WARP")
-
-
-def test_wanted_messages_exist():
-    for name in Px4.wanted_rates:
-        Router(LinkStats()).subscribe(name, lambda _: None)
-
-
-def test_other_autopilots_are_refused():
-    with pytest.raises(UnsupportedAutopilot, match="PX4"):
-        family_for(3)
 
 
 def test_a_malformed_message_is_counted(bench):

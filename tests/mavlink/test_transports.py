@@ -3,6 +3,7 @@
 import asyncio
 import os
 import pty
+import time
 import tty
 
 import pytest
@@ -269,5 +270,22 @@ def test_udp_vehicle_may_come_back_from_another_port(run, monkeypatch):
             link.send_setpoint(4, LEVEL, 0.5)
             await other.hears("SET_ATTITUDE_TARGET")
             other.close()
+
+    run(scene())
+
+
+def test_a_sample_of_udp_is_as_old_as_its_way_through_this_computer(run):
+    """Whoever wakes up late must not count from there."""
+
+    async def scene():
+        async with linked() as (link, vehicle):
+            ages = []
+            link.on_attitude = lambda sample: ages.append(
+                time.perf_counter_ns() - sample.received_ns
+            )
+            vehicle.send(attitude(100, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            time.sleep(0.03)  # noqa: ASYNC251 - this process is held up
+            await until(lambda: ages)
+            assert 0.03e9 <= ages[0] < 1e9
 
     run(scene())

@@ -5,29 +5,41 @@ from typing import Any
 from mock_rig import ACCEPTED, Rig
 from pymavlink.dialects.v20 import ardupilotmega
 
+from sitl_mock.wire import decode
+
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 2, 4, 5, 6, 9, 17
 FAILED = 4
 HOVER = 0.364
 THRUST_IS_THRUST = {"GUID_OPTIONS": 8}
 READY_S = 0.5
+QUICK = {"WPNAV_SPEED_UP": 400.0, "WPNAV_ACCEL_Z": 400.0}
+"""A quicker take-off than ArduCopter's."""
 _parser = ardupilotmega.MAVLink(None)
 
 
 class ArduRig(Rig):
-    """One ArduCopter and a client; unless told otherwise it boots in half a second.
+    """One ArduCopter and a client.
 
-    Setpoints come from (255, 190), or from ``source``.
+    Unless ``boot`` is off it boots in half a second; unless ``true_speed``, it climbs quickly.
     """
 
-    def __init__(self, *, boot: bool = True, **settings: Any) -> None:
+    def __init__(self, *, boot: bool = True, true_speed: bool = False, **settings: Any) -> None:
         if boot:
             settings.setdefault("prearm_delay_s", READY_S)
+        if boot and not true_speed:
+            settings["parameters"] = {**QUICK, **settings.get("parameters", {})}
         super().__init__(boot=boot, quick=False, autopilot="ardupilot", **settings)
 
     def _take(self) -> None:
         for frame in self.autopilot.companion.take():
             message = _parser.decode(bytearray(frame))
             self.received.append((self.time, message))
+
+    def say_frame(self, frame: bytes) -> None:
+        """Deliver a frame as it is."""
+        for each in decode(frame):
+            self.autopilot.handle(each, self.autopilot.companion)
+        self._take()
 
     def texts(self) -> list[str]:
         """Every text said so far, its chunks put together."""
@@ -53,7 +65,7 @@ class ArduRig(Rig):
         assert self.arm() == ACCEPTED
         assert self.start(height) == ACCEPTED
         self.run_until(lambda: self.height > height - 0.15, 20.0)
-        self.run(1.0)
+        self.run(0.6)
 
     def fly(self, height: float = 5.0, **setpoint: Any) -> None:
         """Take off and hand over to a stream of rates that goes on by itself."""

@@ -36,9 +36,9 @@ def vector(axis, value):
     return tuple(value if each == axis else 0.0 for each in range(3))
 
 
-def hovering(rate_loop=None):
+def hovering(rate_loop=None, airframe=None):
     rate_loop = rate_loop or RateLoopConfig.ardupilot()
-    return Multirotor(AirframeConfig(), rate_loop, LEVEL, GRAVITY)
+    return Multirotor(airframe or AirframeConfig(), rate_loop, LEVEL, GRAVITY)
 
 
 def fly(multirotor, setpoint, seconds):
@@ -56,9 +56,9 @@ def rotation(q):
 
 
 @cache
-def response(axis, rate):
+def response(axis, rate, of=hovering):
     """Times in s and rates per setpoint; a roll of 2 rad/s comes to 57 degrees in its time."""
-    y = fly(hovering(), vector(axis, rate), 1.0 if axis == YAW else 0.5)[:, axis] / rate
+    y = fly(of(), vector(axis, rate), 1.0 if axis == YAW else 0.5)[:, axis] / rate
     return np.arange(len(y)) * DT, y
 
 
@@ -83,9 +83,16 @@ def fitted(model, t, y, start):
 STEPS = [(axis, rate) for axis, steps in MEASURED.items() for rate in steps]
 
 
+def arducopter():
+    """The vehicle that `autopilot: ardupilot` brings along: other rotors, the same answer."""
+    settings = MockSettings(autopilot="ardupilot")
+    return hovering(settings.rate_loop, settings.airframe)
+
+
+@pytest.mark.parametrize("vehicle", [hovering, arducopter])
 @pytest.mark.parametrize(("axis", "rate"), STEPS)
-def test_the_answer_to_a_step_is_as_measured(axis, rate):
-    t, y = response(axis, rate)
+def test_the_answer_to_a_step_is_as_measured(axis, rate, vehicle):
+    t, y = response(axis, rate, vehicle)
     measured = MEASURED[axis][rate]
     assert fitted(first_order, t, y, np.array(measured) * 1e-3) == pytest.approx(measured, rel=0.1)
     assert y.max() < 1.03

@@ -1,0 +1,34 @@
+"""The families that this program flies."""
+
+from companion.mavlink.ardupilot import ArduPilot
+from companion.mavlink.errors import UnsupportedAutopilot
+from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.px4 import Px4
+
+FAMILIES: tuple[AutopilotFamily, ...] = (Px4(), ArduPilot())
+
+FAMILY_NAMES = " or ".join(f"{family.name} ({family.autopilot})" for family in FAMILIES)
+"""For people, with their MAV_AUTOPILOT numbers."""
+
+_MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
+"""MAV_TYPE of four, two coaxial, six, eight, three, twelve and ten rotors."""
+
+
+def family_for(autopilot: int, vehicle_type: int) -> AutopilotFamily:
+    """The family of a heartbeat's `autopilot` and `type`.
+
+    Raises:
+        UnsupportedAutopilot: None of ours, or no multirotor: the same mode numbers mean something
+            else to a plane.
+    """
+    if vehicle_type not in _MULTIROTORS:
+        raise UnsupportedAutopilot(
+            f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor, and only those are flown"
+        )
+    for family in FAMILIES:
+        if family.autopilot == autopilot:
+            return family
+    raise UnsupportedAutopilot(
+        f"the vehicle's autopilot (MAV_AUTOPILOT {autopilot}) is not supported; this version "
+        f"flies {FAMILY_NAMES}"
+    )

@@ -1,0 +1,130 @@
+"""Parameters of an autopilot that matter to a flight by body rates, as data and a pure judgement.
+
+A family lists its rules; `judge` tells what they find in a set of values. Nothing here reads or
+writes a parameter.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+Values = Mapping[str, float]
+"""Parameters as read, under the newest of their names; those the autopilot has not are absent."""
+
+
+class Setup(NamedTuple):
+    """What our configuration says, as far as the autopilot's parameters have to agree with it.
+
+    Attributes:
+        source_system: Our own system id.
+        attitude_rate_hz: Asked of it for attitude.
+        silence_limit: After this long without control we hand back, s.
+        hover_thrust: Normalised thrust at hover that the flight begins with.
+        curve_factor: Of the thrust curve that we make up for; 0: none.
+        tilt_compensated: Whether it is to divide thrust by cos(tilt) itself.
+        tilt_acceleration_limit: Of roll and pitch, as the planner has it, rad/s²; `None`: no limit.
+        yaw_acceleration_limit: Of yaw.
+        max_tilt: Largest tilt of a target, rad.
+    """
+
+    source_system: int
+    attitude_rate_hz: float
+    silence_limit: float
+    hover_thrust: float
+    curve_factor: float
+    tilt_compensated: bool
+    tilt_acceleration_limit: float | None
+    yaw_acceleration_limit: float | None
+    max_tilt: float
+
+
+class Verdict(Enum):
+    """How much a value matters."""
+
+    SAFE = "safe"
+    UNSAFE = "unsafe"
+    """Somebody may be hurt or the vehicle lost."""
+    INEFFECTIVE = "ineffective"
+    """The flight does not do what is asked of it, or a protection does nothing."""
+
+
+class Complaint(NamedTuple):
+    """What is wrong with a value.
+
+    Attributes:
+        verdict: How much it matters.
+        because: What comes of it, one sentence.
+        set_to: What to set the parameter to; `None` where only the user can know, or where it is
+            our configuration that is to change, and `because` says so.
+    """
+
+    verdict: Verdict
+    because: str
+    set_to: float | None = None
+
+
+Check = Callable[[float, Values, Setup], Complaint | None]
+"""Judges a parameter's own value; others, which may be absent, and our setup may count."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRule:
+    """One parameter that matters.
+
+    Attributes:
+        names: Its name, the newest first; older versions know it by the others.
+        meaning: What it decides, one clause.
+        check: Judges it; `None` is a value that is as it should be.
+        source: Where this is known from.
+        vital: A flight reads it before it arms, and refuses what is not safe.
+    """
+
+    names: tuple[str, ...]
+    meaning: str
+    check: Check
+    source: str
+    vital: bool = False
+
+    @property
+    def name(self) -> str:
+        """The newest name."""
+        return self.names[0]
+
+
+class Finding(NamedTuple):
+    """What a rule says of a vehicle.
+
+    Attributes:
+        rule: Which.
+        value: What the autopilot has.
+        verdict: How much it matters.
+        because: What comes of it; empty where it is safe.
+        set_to: What to set it to, or `None`.
+    """
+
+    rule: ParameterRule
+    value: float
+    verdict: Verdict
+    because: str = ""
+    set_to: float | None = None
+
+    def sentence(self) -> str:
+        """What is wrong and how to mend it, for people."""
+        mend = "" if self.set_to is None else f"; set {self.rule.name} to {self.set_to:g}"
+        return f"{self.rule.name} is {self.value:g}: {self.because}{mend}"
+
+
+def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[Finding]:
+    """What the rules find, in their order; a parameter that the autopilot has not is left out."""
+    findings = []
+    for rule in rules:
+        if rule.name not in values:
+            continue
+        value = values[rule.name]
+        complaint = rule.check(value, values, setup)
+        if complaint is None:
+            findings.append(Finding(rule, value, Verdict.SAFE))
+        else:
+            findings.append(Finding(rule, value, *complaint))
+    return findings

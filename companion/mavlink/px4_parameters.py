@@ -1,0 +1,191 @@
+"""PX4's parameters that matter to a flight by body rates.
+
+Sources: PX4's parameter reference and `commander`; "measured": PX4 main in simulation, 2026.
+"""
+
+from math import degrees
+
+from companion.mavlink.parameter_checks import (
+    INEFFECTIVE,
+    UNSAFE,
+    at_most,
+    bit_clear,
+    bit_set,
+    forbidden,
+    hover_thrust,
+    our_system,
+    positive,
+    rates_held,
+    required,
+    thrust_curve,
+)
+from companion.mavlink.parameter_rules import Complaint, ParameterRule, Setup, Values
+
+_REFERENCE = "PX4 parameter reference"
+_MEASURED = "measured on PX4 main, 2026"
+_STOPS_MOTORS = "the motors stop in the air"
+_STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
+_INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
+_TERMINATION_OFF = 121212
+_OVERSHOOT = 15.0
+"""By which a gust or a step may carry the tilt over its limit, degrees."""
+
+
+def _attitude_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
+    wanted = setup.attitude_rate_hz
+    if value >= min(wanted, _INTEGRATION_RATES[-1]):
+        return None
+    enough = [rate for rate in _INTEGRATION_RATES if rate >= wanted]
+    return Complaint(
+        INEFFECTIVE,
+        f"attitude is estimated no faster than that, so link.attitude_rate_hz {wanted:g} is not "
+        "reached",
+        enough[0] if enough else _INTEGRATION_RATES[-1],
+    )
+
+
+def _termination(value: float, values: Values, setup: Setup) -> Complaint | None:
+    """Flight termination is only to be armed where our own tilt cannot set it off."""
+    angles = [values[name] for name in ("FD_FAIL_R", "FD_FAIL_P") if values.get(name, 0.0) > 0.0]
+    if value == _TERMINATION_OFF or not angles:
+        return None
+    if min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
+        return None
+    return Complaint(
+        UNSAFE,
+        f"a tilt of {min(angles):g}° (FD_FAIL_R, FD_FAIL_P) stops the motors, and "
+        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}",
+        float(_TERMINATION_OFF),
+    )
+
+
+def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | None:
+    """The failure detector's angle matters by itself only where it is below our own tilt."""
+    if value == 0.0 or value > degrees(setup.max_tilt):
+        return None
+    return Complaint(
+        INEFFECTIVE,
+        f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
+        "allows",
+        60.0,
+    )
+
+
+PX4_PARAMETERS: tuple[ParameterRule, ...] = (
+    ParameterRule(
+        ("COM_OF_LOSS_T",), "for how long the last rates are held", rates_held, _MEASURED
+    ),
+    ParameterRule(
+        ("COM_OBL_RC_ACT",),
+        "what PX4 does when our setpoints stop",
+        forbidden(
+            UNSAFE,
+            {
+                2.0: "PX4 goes to manual flight, and falls or drifts unless a pilot acts at once",
+                6.0: _STOPS_MOTORS,
+                7.0: _STOPS_MOTORS,
+            },
+            set_to=5.0,
+        ),
+        f"{_REFERENCE}; {_MEASURED}",
+    ),
+    ParameterRule(
+        ("COM_RC_OVERRIDE",),
+        "whether the pilot's sticks take the vehicle from us (before 1.18)",
+        bit_set(
+            INEFFECTIVE, 2, "moving the sticks does not end offboard; only the mode switch does"
+        ),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_RC_STICK_OV",),
+        "how far the sticks must be moved to take over, in percent (before 1.18)",
+        at_most(INEFFECTIVE, 60.0, "a pilot in a hurry may not move the sticks that far", 30.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MAN_OVERRIDE_SPD",),
+        "how quickly the sticks must be moved to take over (1.18 on)",
+        positive(INEFFECTIVE, _STICKS_DO_NOTHING, 30.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_RC_IN_MODE",),
+        "whether there is a pilot's transmitter at all",
+        forbidden(
+            UNSAFE, {4.0: "stick input is disabled, so that no pilot can take over"}, set_to=0.0
+        ),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MAV_FWDEXTSP",),
+        "whether setpoints that arrive by MAVLink are obeyed",
+        required(INEFFECTIVE, 1.0, "our setpoints are not obeyed, and OFFBOARD is not entered"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("NAV_DLL_ACT",),
+        "what PX4 does when the ground station's heartbeat stops, although our setpoints continue",
+        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        f"{_REFERENCE}; {_MEASURED}",
+    ),
+    ParameterRule(
+        ("NAV_RCL_ACT",),
+        "what PX4 does when the pilot's transmitter is lost",
+        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_RCL_EXCEPT",),
+        "in which modes a lost transmitter is ignored",
+        bit_clear(INEFFECTIVE, 4, "in OFFBOARD nothing is done about a lost transmitter"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MPC_THR_HOVER",), "at which thrust PX4 expects to hover", hover_thrust, _REFERENCE
+    ),
+    ParameterRule(
+        ("THR_MDL_FAC",), "whether PX4 makes up for the thrust curve", thrust_curve, _REFERENCE
+    ),
+    ParameterRule(
+        ("COM_DISARM_PRFLT",),
+        "after how long on the ground PX4 disarms itself",
+        positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
+        f"{_REFERENCE}; {_MEASURED}",
+    ),
+    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
+    ParameterRule(
+        ("IMU_INTEG_RATE",), "how often attitude is estimated, Hz", _attitude_rate, _MEASURED
+    ),
+    ParameterRule(
+        ("GF_ACTION",),
+        "what PX4 does at its own geofence",
+        forbidden(UNSAFE, {4.0: _STOPS_MOTORS}, set_to=2.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_LOW_BAT_ACT",),
+        "what PX4 does about an empty battery",
+        forbidden(
+            INEFFECTIVE,
+            {0.0: "PX4 only warns; nobody lands should our program have ended"},
+            set_to=3.0,
+        ),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("CBRK_SUPPLY_CHK",),
+        "whether arming checks the power supply",
+        forbidden(INEFFECTIVE, {894281.0: "the power supply is not checked before arming"}, 0.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("CBRK_FLIGHTTERM",), "whether the failure detector stops motors", _termination, _REFERENCE
+    ),
+    ParameterRule(
+        ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", _failure_tilt, _REFERENCE
+    ),
+    ParameterRule(
+        ("FD_FAIL_P",), "beyond which pitch PX4 reports a failure", _failure_tilt, _REFERENCE
+    ),
+)

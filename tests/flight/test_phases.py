@@ -1,0 +1,90 @@
+"""Which phases a flight has, by the family that it meets; and which modes each of them allows."""
+
+import pytest
+
+from companion.config_sections import FlightConfig
+from companion.flight.ending import Exit, FlightEnded
+from companion.flight.phases import exit_phases, flight_phases, ground_phases
+from companion.flight.roles import require_role, roles_of
+from companion.mavlink.families import FAMILIES, family_for
+from companion.mavlink.roles import Role
+
+QUADROTOR = 2
+PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, QUADROTOR)
+FROM_ARMING = ["arm", "takeoff", "offboard", "programme", "hand back", "land", "disarm"]
+
+
+class Vehicle:
+    """As much of a link as tells a mode."""
+
+    def __init__(self, family, base_mode, custom_mode):
+        self.family, self.state = family, self
+        self.mode = family.mode_name(base_mode, custom_mode)
+        self.failsafe = False
+
+
+def phases(family):
+    return {phase.name: phase for phase in flight_phases(FlightConfig(), 10.0, family)}
+
+
+def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
+    """On ArduPilot the first setpoint takes over, and would end the take-off."""
+    assert [phase.name for phase in ground_phases(FlightConfig())] == ["connect", "checks"]
+    assert list(phases(PX4)) == ["stream", *FROM_ARMING]
+    assert list(phases(ARDUPILOT)) == FROM_ARMING
+
+
+@pytest.mark.parametrize(
+    ("family", "phase", "base_mode", "custom_mode", "ours"),
+    [
+        (PX4, "programme", 129, 0x00060000, True),
+        (PX4, "programme", 157, 0x00030000, False),
+        (PX4, "takeoff", 157, 0x02040000, True),
+        (ARDUPILOT, "takeoff", 217, 4, True),
+        (ARDUPILOT, "takeoff", 209, 4, False),  # somebody else's rates are obeyed
+        (ARDUPILOT, "offboard", 217, 4, True),
+        (ARDUPILOT, "offboard", 209, 4, True),
+        (ARDUPILOT, "programme", 209, 4, True),
+        (ARDUPILOT, "programme", 217, 4, False),  # it holds: our rates are not obeyed any more
+        (ARDUPILOT, "programme", 209, 0, False),
+        (ARDUPILOT, "programme", 217, 5, False),
+        (ARDUPILOT, "hand back", 217, 17, True),
+        (ARDUPILOT, "land", 217, 9, True),
+        (ARDUPILOT, "land", 217, 6, False),
+    ],
+)
+def test_a_mode_that_is_not_the_phases_own_lets_the_vehicle_go(
+    family, phase, base_mode, custom_mode, ours
+):
+    vehicle = Vehicle(family, base_mode, custom_mode)
+    allowed = phases(family)[phase].modes
+    if ours:
+        require_role(vehicle, allowed)
+        return
+    with pytest.raises(FlightEnded, match="took over") as ended:
+        require_role(vehicle, allowed)
+    assert ended.value.exit is Exit.LET_GO
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+def test_every_role_is_played_by_a_mode_that_the_family_enters(family):
+    played = {
+        role
+        for base_mode in (128, 128 | 8)
+        for number in family.modes.values()
+        for role in family.roles(family.mode_name(base_mode, number))
+    }
+    assert played == set(Role)
+
+
+def test_an_unknown_mode_plays_no_role():
+    vehicle = Vehicle(PX4, 157, 0x05040000)
+    assert roles_of(vehicle) == frozenset()
+    vehicle.mode = None
+    assert roles_of(vehicle) == frozenset()
+
+
+def test_each_exit_ends_on_the_ground_or_in_other_hands():
+    for exit_ in Exit:
+        names = [phase.name for phase in exit_phases(FlightConfig(), exit_)]
+        assert names in ([], ["disarm"], ["hand back"], ["land", "disarm"])

@@ -1,0 +1,190 @@
+"""What each family's rules find: nothing on a good vehicle, and each mistake by itself."""
+
+from math import radians
+
+import pytest
+
+from companion.mavlink.ardupilot_parameters import ARDUPILOT_PARAMETERS
+from companion.mavlink.families import FAMILIES
+from companion.mavlink.parameter_rules import Setup, Verdict, judge
+from companion.mavlink.px4_parameters import PX4_PARAMETERS
+
+UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
+PX4_SETUP = Setup(
+    source_system=1,
+    attitude_rate_hz=250.0,
+    silence_limit=0.5,
+    hover_thrust=0.49,
+    curve_factor=0.0,
+    tilt_compensated=False,
+    tilt_acceleration_limit=None,
+    yaw_acceleration_limit=None,
+    max_tilt=radians(35.0),
+)
+ARDUPILOT_SETUP = PX4_SETUP._replace(
+    hover_thrust=0.364,
+    tilt_acceleration_limit=radians(1100.0),
+    yaw_acceleration_limit=radians(270.0),
+)
+# As recorded on the ground, but for the battery's action and what that vehicle did not tell.
+GOOD_PX4 = {
+    "COM_OF_LOSS_T": 1.0,
+    "COM_OBL_RC_ACT": 0.0,
+    "COM_RC_OVERRIDE": 3.0,
+    "COM_RC_STICK_OV": 30.0,
+    "MAN_OVERRIDE_SPD": 30.0,
+    "COM_RC_IN_MODE": 1.0,
+    "MAV_FWDEXTSP": 1.0,
+    "NAV_DLL_ACT": 0.0,
+    "NAV_RCL_ACT": 2.0,
+    "COM_RCL_EXCEPT": 0.0,
+    "MPC_THR_HOVER": 0.5,
+    "THR_MDL_FAC": 0.0,
+    "COM_DISARM_PRFLT": 10.0,
+    "MAV_SYS_ID": 1.0,
+    "IMU_INTEG_RATE": 250.0,
+    "GF_ACTION": 2.0,
+    "COM_LOW_BAT_ACT": 3.0,
+    "CBRK_SUPPLY_CHK": 0.0,
+    "CBRK_FLIGHTTERM": 121212.0,
+    "FD_FAIL_R": 60.0,
+    "FD_FAIL_P": 60.0,
+}
+GOOD_ARDUPILOT = {
+    "GUID_OPTIONS": 8.0,
+    "ATC_ANGLE_BOOST": 0.0,
+    "GUID_TIMEOUT": 1.0,
+    "ATC_RATE_FF_ENAB": 1.0,
+    "ATC_INPUT_TC": 0.15,
+    "ATC_ACC_R_MAX": 1100.0,
+    "ATC_ACC_P_MAX": 1100.0,
+    "ATC_ACC_Y_MAX": 270.0,
+    "ATC_ACCEL_R_MAX": 110000.0,
+    "ATC_ACCEL_P_MAX": 110000.0,
+    "ATC_ACCEL_Y_MAX": 27000.0,
+    "FS_GCS_ENABLE": 0.0,
+    "MAV_GCS_SYSID": 255.0,
+    "MAV_SYSID": 1.0,
+    "FS_THR_ENABLE": 1.0,
+    "FS_OPTIONS": 16.0,
+    "MOT_THST_HOVER": 0.39,
+    "MOT_THST_EXPO": 0.65,
+    "ARMING_SKIPCHK": 0.0,
+    "ARMING_CHECK": 1.0,
+    "DISARM_DELAY": 10.0,
+    "SCHED_LOOP_RATE": 400.0,
+    "FS_EKF_ACTION": 1.0,
+    "FENCE_ACTION": 1.0,
+    "FENCE_ENABLE": 0.0,
+    "BATT_FS_LOW_ACT": 2.0,
+    "BATT_FS_CRT_ACT": 1.0,
+}
+PX4 = (PX4_PARAMETERS, GOOD_PX4, PX4_SETUP)
+ARDUPILOT = (ARDUPILOT_PARAMETERS, GOOD_ARDUPILOT, ARDUPILOT_SETUP)
+
+
+def complaints(family, changes=None, **setup):
+    """What is found amiss after `changes` of a good vehicle's values, and of our setup."""
+    rules, good, ours = family
+    findings = judge(rules, good | (changes or {}), ours._replace(**setup))
+    return [finding for finding in findings if finding.verdict is not Verdict.SAFE]
+
+
+@pytest.mark.parametrize("family", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
+def test_a_good_vehicle_is_found_good_by_every_rule(family):
+    rules, good, ours = family
+    findings = judge(rules, good, ours)
+    assert [finding.rule.name for finding in findings] == [rule.name for rule in rules]
+    assert {finding.verdict for finding in findings} == {Verdict.SAFE}
+
+
+@pytest.mark.parametrize(
+    ("family", "changes", "verdict", "set_to"),
+    [
+        (PX4, {"COM_OF_LOSS_T": 5.0}, UNSAFE, 1.0),
+        (PX4, {"COM_OF_LOSS_T": 0.3}, UNSAFE, 1.0),
+        (PX4, {"COM_OBL_RC_ACT": 7.0}, UNSAFE, 5.0),
+        (PX4, {"COM_RC_OVERRIDE": 1.0}, INEFFECTIVE, 3.0),
+        (PX4, {"COM_RC_STICK_OV": 80.0}, INEFFECTIVE, 30.0),
+        (PX4, {"MAN_OVERRIDE_SPD": -1.0}, INEFFECTIVE, 30.0),
+        (PX4, {"COM_RC_IN_MODE": 4.0}, UNSAFE, 0.0),
+        (PX4, {"MAV_FWDEXTSP": 0.0}, INEFFECTIVE, 1.0),
+        (PX4, {"NAV_DLL_ACT": 5.0}, UNSAFE, 2.0),
+        (PX4, {"NAV_RCL_ACT": 6.0}, UNSAFE, 2.0),
+        (PX4, {"COM_RCL_EXCEPT": 5.0}, INEFFECTIVE, 1.0),
+        (PX4, {"MPC_THR_HOVER": 0.25}, INEFFECTIVE, None),
+        (PX4, {"COM_DISARM_PRFLT": 0.0}, UNSAFE, 10.0),
+        (PX4, {"MAV_SYS_ID": 7.0}, INEFFECTIVE, None),
+        (PX4, {"IMU_INTEG_RATE": 200.0}, INEFFECTIVE, 250.0),
+        (PX4, {"GF_ACTION": 4.0}, UNSAFE, 2.0),
+        (PX4, {"COM_LOW_BAT_ACT": 0.0}, INEFFECTIVE, 3.0),
+        (PX4, {"CBRK_SUPPLY_CHK": 894281.0}, INEFFECTIVE, 0.0),
+        (PX4, {"CBRK_FLIGHTTERM": 0.0, "FD_FAIL_P": 45.0}, UNSAFE, 121212.0),
+        (PX4, {"FD_FAIL_R": 30.0}, INEFFECTIVE, 60.0),
+        (ARDUPILOT, {"GUID_OPTIONS": 5.0}, UNSAFE, 13.0),
+        (ARDUPILOT, {"ATC_ANGLE_BOOST": 1.0}, UNSAFE, 0.0),
+        (ARDUPILOT, {"GUID_TIMEOUT": 3.0}, UNSAFE, 1.0),
+        (ARDUPILOT, {"ATC_RATE_FF_ENAB": 0.0}, INEFFECTIVE, 1.0),
+        (ARDUPILOT, {"ATC_INPUT_TC": 1.0}, INEFFECTIVE, 0.15),
+        (ARDUPILOT, {"ATC_ACC_P_MAX": 500.0}, INEFFECTIVE, None),
+        (ARDUPILOT, {"ATC_ACC_R_MAX": 0.0}, INEFFECTIVE, None),
+        (ARDUPILOT, {"ATC_ACCEL_Y_MAX": 54000.0}, INEFFECTIVE, None),
+        (ARDUPILOT, {"FS_GCS_ENABLE": 1.0, "MAV_GCS_SYSID": 1.0}, INEFFECTIVE, 255.0),
+        (ARDUPILOT, {"FS_GCS_ENABLE": 2.0}, INEFFECTIVE, 1.0),
+        (ARDUPILOT, {"FS_THR_ENABLE": 0.0}, UNSAFE, 1.0),
+        (ARDUPILOT, {"FS_OPTIONS": 20.0}, INEFFECTIVE, 16.0),
+        (ARDUPILOT, {"MOT_THST_HOVER": 0.2}, INEFFECTIVE, None),
+        (ARDUPILOT, {"ARMING_SKIPCHK": 4.0}, UNSAFE, 0.0),
+        (ARDUPILOT, {"ARMING_CHECK": 0.0}, UNSAFE, 1.0),
+        (ARDUPILOT, {"DISARM_DELAY": 0.0}, UNSAFE, 10.0),
+        (ARDUPILOT, {"SCHED_LOOP_RATE": 200.0}, INEFFECTIVE, None),
+        (ARDUPILOT, {"FS_EKF_ACTION": 2.0}, UNSAFE, 1.0),
+        (ARDUPILOT, {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, INEFFECTIVE, 1.0),
+        (ARDUPILOT, {"BATT_FS_LOW_ACT": 5.0}, UNSAFE, 2.0),
+        (ARDUPILOT, {"BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0}, INEFFECTIVE, 1.0),
+    ],
+)
+def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
+    family, changes, verdict, set_to
+):
+    (found,) = complaints(family, changes)
+    assert found.rule.name in changes
+    assert (found.verdict, found.set_to, found.value) == (verdict, set_to, changes[found.rule.name])
+    assert found.rule.name in found.sentence()
+    assert found.because
+    if set_to is not None:
+        assert not complaints(family, changes | {found.rule.name: set_to})
+
+
+@pytest.mark.parametrize(
+    ("family", "setup", "name"),
+    [
+        (PX4, {"silence_limit": 1.0}, "COM_OF_LOSS_T"),
+        (PX4, {"curve_factor": 0.4}, None),  # PX4 does not make up for the curve, so we may
+        (ARDUPILOT, {"curve_factor": 0.4}, "MOT_THST_EXPO"),
+        (PX4, {"source_system": 245}, "MAV_SYS_ID"),
+        (PX4, {"attitude_rate_hz": 400.0}, "IMU_INTEG_RATE"),
+        (ARDUPILOT, {"attitude_rate_hz": 500.0}, "SCHED_LOOP_RATE"),
+        (ARDUPILOT, {"tilt_compensated": True}, "ATC_ANGLE_BOOST"),
+    ],
+)
+def test_our_own_configuration_counts_too(family, setup, name):
+    assert [found.rule.name for found in complaints(family, **setup)] == [name] * (name is not None)
+
+
+def test_no_loss_of_a_station_matters_where_another_is_watched():
+    assert not complaints(ARDUPILOT, {"FS_THR_ENABLE": 0.0, "FS_GCS_ENABLE": 1.0})
+
+
+def test_what_the_autopilot_has_not_is_left_out():
+    assert judge(PX4_PARAMETERS, {}, PX4_SETUP) == []
+    (only,) = judge(PX4_PARAMETERS, {"COM_OF_LOSS_T": 1.0}, PX4_SETUP)
+    assert only.rule.name == "COM_OF_LOSS_T"
+
+
+def test_names_fit_the_protocol_and_none_is_ruled_twice():
+    for family in FAMILIES:
+        names = [name for rule in family.parameters for name in rule.names]
+        assert len(set(names)) == len(names)
+        assert all(len(name) <= 16 for name in names)
+        assert all(rule.meaning and rule.source for rule in family.parameters)

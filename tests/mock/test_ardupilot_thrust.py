@@ -1,0 +1,76 @@
+"""ArduCopter's thrust: the measured table, the boost, the climb rate."""
+
+from itertools import pairwise
+from math import cos, inf, nan, radians
+
+import pytest
+
+from sitl_mock.ardupilot_climb import Climb, approach
+from sitl_mock.ardupilot_settings import AIRFRAME
+from sitl_mock.ardupilot_thrust import (
+    GRAVITY,
+    asked_climb,
+    asked_thrust,
+    boosted,
+    specific_thrust,
+)
+from sitl_mock.config import AirframeConfig
+from sitl_mock.rotors import Rotors
+
+MEASURED = {
+    0.0: 0.045, 0.1: 0.29, 0.2: 0.57, 0.3: 0.82, 0.36: 0.99, 0.4: 1.09, 0.5: 1.33, 0.6: 1.58,
+    0.8: 2.03, 1.0: 2.30,
+}  # fmt: skip
+"""Normalised thrust -> specific thrust in g."""
+
+
+@pytest.mark.parametrize(("thrust", "g"), MEASURED.items())
+def test_the_measured_table(thrust, g):
+    assert specific_thrust(thrust) / GRAVITY == pytest.approx(g, abs=0.01)
+
+
+def test_more_thrust_always_gives_more_and_0_364_hovers():
+    values = [specific_thrust(0.01 * step) for step in range(101)]
+    assert all(high > low for low, high in pairwise(values))
+    assert specific_thrust(0.364) == pytest.approx(GRAVITY)
+
+
+def test_the_airframe_can_give_all_of_it():
+    rotors = Rotors(AirframeConfig(**AIRFRAME), 1e-3)
+    share = rotors.throttle(0.25 * specific_thrust(1.0))
+    assert share == pytest.approx(1.0)
+    assert rotors.throttle(0.25 * specific_thrust(0.8)) < 0.95
+
+
+@pytest.mark.parametrize(
+    ("asked", "thrust"), [(0.4, 0.4), (nan, 0.0), (inf, 1.0), (-1.0, 0.0), (1.5, 1.0)]
+)
+def test_odd_thrusts(asked, thrust):
+    assert asked_thrust(asked) == thrust
+
+
+@pytest.mark.parametrize(
+    ("asked", "climb"), [(0.5, 0.0), (1.0, 2.5), (0.0, -1.5), (0.75, 1.25), (nan, 0.0), (inf, 2.5)]
+)
+def test_thrust_as_a_climb_rate(asked, climb):
+    assert asked_climb(asked, 2.5, 1.5) == climb
+
+
+def test_the_boost_divides_by_the_cosine_of_the_tilt_and_ends_upside_down():
+    assert boosted(0.364, cos(radians(25.0))) * cos(radians(25.0)) == pytest.approx(0.364)
+    assert boosted(0.364, 0.0) == boosted(0.364, -0.5) == 0.0
+
+
+def test_a_climb_gathers_speed_no_faster_than_its_limit():
+    climb = Climb()
+    climb.begin(3.0, -0.5)
+    for _ in range(100):
+        climb.step(2.0, 1.0, 0.01)
+    assert climb.rate == pytest.approx(0.5)
+    assert climb.height == pytest.approx(3.0, abs=0.01)
+
+
+def test_an_approach_can_still_stop():
+    assert approach(2.0, 1.0, 10.0) ** 2 / 2.0 == pytest.approx(2.0)
+    assert approach(100.0, 1.0, 2.5) == 2.5
+    assert approach(-1.0, 1.0, 2.5) == 0.0
