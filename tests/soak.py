@@ -34,7 +34,15 @@ SETTLED_S = 60.0
 MOST_GROWTH = 2 * 1024 * 1024
 AFTERMATH_S = 12.0
 """So long after a fault it may still show: the dead time is judged over 8 s, and twice."""
-EXPECTED = ("mode ", "armed", "disarmed", "autopilot: ", "realtime: ", "the vehicle's drag is")
+EXPECTED = (
+    "mode ",
+    "armed",
+    "disarmed",
+    "autopilot: ",
+    "realtime: ",
+    "should our setpoints stop",
+    "the vehicle's drag is",
+)
 """How the events of an undisturbed flight begin."""
 FAULTS = (
     {"kind": "drop", "probability": 0.3},

@@ -1,8 +1,13 @@
-"""Between the vehicle and the program: passes datagrams on, and times each sample's answer."""
+"""Between the vehicle and the program: passes datagrams on, and times each sample's answer.
+
+A sample's time begins as it is passed on, and ends by the kernel's stamp of the answer: so a relay
+that wakes up late does not measure itself.
+"""
 
 import math
 import select
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -12,7 +17,9 @@ from sitl_mock.wire import decode
 DEADLINE_S = 0.004
 """`deadman.deadline_ms`, its default."""
 DOUBT_S = 0.001
-"""The relay is woken late, too."""
+"""What the kernel takes on the way, both ways."""
+_SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)
+_STAMP = struct.Struct("@qq")
 _PATIENCE_S = 0.5
 _HOST = "127.0.0.1"
 
@@ -78,6 +85,7 @@ class Relay:
         self._to_vehicle.bind((_HOST, vehicle_port))
         self._to_companion = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._to_companion.connect((_HOST, companion_port))
+        self._to_companion.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         self._begin, self._over = begin, threading.Event()
         self._thread = threading.Thread(target=self._pass_on, daemon=True)
 
@@ -96,9 +104,9 @@ class Relay:
         vehicle = None
         while not self._over.is_set():
             ready, _, _ = select.select([self._to_vehicle, self._to_companion], [], [], 0.1)
-            now = time.monotonic()
             if self._to_vehicle in ready:
                 data, vehicle = self._to_vehicle.recvfrom(4096)
+                now = time.monotonic()
                 try:
                     self._to_companion.send(data)
                 except ConnectionRefusedError:
@@ -108,11 +116,17 @@ class Relay:
                         self.answers.sample(message.time_boot_ms, now)
             if self._to_companion in ready:
                 try:
-                    data = self._to_companion.recv(4096)
+                    data, stamps, _, _ = self._to_companion.recvmsg(4096, 64)
                 except ConnectionRefusedError:
                     continue
                 if vehicle is not None:
                     self._to_vehicle.sendto(data, vehicle)
                 for message in decode(data):
                     if message.get_type() == "SET_ATTITUDE_TARGET":
-                        self.answers.setpoint(message.time_boot_ms, now)
+                        self.answers.setpoint(message.time_boot_ms, _arrived(stamps))
+
+
+def _arrived(stamps: list[tuple[int, int, bytes]]) -> float:
+    """When the kernel took a datagram, by `time.monotonic`."""
+    seconds, nanoseconds = _STAMP.unpack(stamps[0][2])
+    return time.monotonic() - (time.time() - seconds - 1e-9 * nanoseconds)
