@@ -67,7 +67,8 @@ class FaultEffects:
         """Whether a message is not streamed at present."""
         if not self._stopped:
             return False
-        name = dialect.mavlink_map[message_id].msgname
+        known = dialect.mavlink_map.get(message_id)  # the dialect lacks some of ArduPilot's
+        name = None if known is None else known.msgname
         return any(not fault.messages or name in fault.messages for fault in self._stopped)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
