@@ -20,7 +20,7 @@ demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 test: lint  ## style, types, import rules, then every test
 	$(BIN)/python -m pytest -n 2 --dist loadscope
 
-matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about two minutes
+matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about three minutes
 	$(BIN)/python -m pytest -n 2 -m "matrix or not matrix" tests/flight/test_fault_matrix.py
 
 lint: $(VENV)/.test

@@ -1,8 +1,8 @@
 """The fault matrix: every fault of the mock begun in every phase, on each kind of autopilot.
 
-`docs/safety.md` shows the same table. The cells marked * are flown always, those marked + always
-on PX4, all by `make matrix`. A fault stays until the end, so one that the hand back survives is flown into the
-landing, too.
+`docs/safety.md` shows the same table. The cells marked * are flown always, those marked + always on
+PX4, all by `make matrix`. A fault stays until the end, so one that the hand back survives is flown
+into the landing, too.
 """
 
 import re
