@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test matrix lint soak bench clean
+.PHONY: demo test test-all matrix lint soak bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -17,11 +17,16 @@ $(VENV)/.test: $(VENV)/.fly
 demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 	$(BIN)/companion demo
 
-test: lint  ## style, types, import rules, then every test
-	$(BIN)/python -m pytest -n 2 --dist loadscope
+PYTEST := $(BIN)/python -m pytest -n 3 --dist loadscope
+
+test: lint  ## style, types, import rules, then the tests
+	$(PYTEST) -m 'not slow'
+
+test-all: lint  ## the same with every test, also what only proves more widely what others prove
+	$(PYTEST)
 
 matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about three minutes
-	$(BIN)/python -m pytest -n 2 -m "matrix or not matrix" tests/flight/test_fault_matrix.py
+	$(BIN)/python -m pytest -n 2 tests/flight/test_fault_matrix.py
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

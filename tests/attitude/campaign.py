@@ -8,7 +8,7 @@ from companion.attitude import Limits, Target, make_planner
 from tests.attitude.independent import attitudes
 from tests.attitude.lag_plant import Flight, LagPlant, fly
 
-CALM = 1.0
+CALM = 0.7
 """The end of every flight without gusts, s."""
 _GUST_MEMORY = 0.15  # s
 _PULSE = 2.0, 0.05  # rad/s, s

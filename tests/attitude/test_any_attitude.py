@@ -44,7 +44,7 @@ limits = st.one_of(
 periods = st.floats(math.log(1e-6), math.log(0.5)).map(math.exp)
 gains = st.floats(0.1, 20.0)
 
-fuzz = effort(max_examples=400)
+fuzz = effort(max_examples=150)
 
 
 @pytest.mark.parametrize("name", LAW_NAMES)
@@ -96,10 +96,10 @@ def test_opposite_quaternions_take_the_same_way_of_an_exact_half_turn(name, q):
 
 @pytest.fixture(scope="module")
 def whole_sphere():
-    """From level to exactly inverted, leaning to four sides, at four headings."""
+    """From level to exactly inverted, leaning to four sides, at two headings."""
     tilts = np.radians([0.0, 30.0, 60.0, 74.9, 75.1, 80.0, 85.1, 90.0, 120.0, 150.0, 179.0, 180.0])
     bearings = np.arange(4) * np.pi / 2 + 0.1
-    headings = np.array([-3.0, -1.0, 0.4, 2.2])
+    headings = np.array([-3.0, 0.4])
     tilt, bearing, heading = (g.ravel() for g in np.meshgrid(tilts, bearings, headings))
     level = np.zeros(len(tilt))
     lean = np.column_stack([tilt * np.cos(bearing), tilt * np.sin(bearing), level])
@@ -107,7 +107,7 @@ def whole_sphere():
     return Rotation.from_rotvec(lean) * Rotation.from_rotvec(turn)
 
 
-@pytest.mark.parametrize("dt", [0.01, 0.04])
+@pytest.mark.parametrize("dt", [0.02, 0.04])
 @pytest.mark.parametrize("name", LAW_NAMES)
 def test_converges_from_the_whole_sphere_within_the_limits(name, dt, whole_sphere):
     bounds = Limits(math.radians(35), np.pi / 2, 1.2)
@@ -131,7 +131,7 @@ def test_recovery_always_reduces_the_tilt_and_never_jumps(name):
     """Along sweeps of tilt the rates are continuous; beyond 85° they follow the short arc."""
     w_m = np.pi / 2
     planner = make_planner(name, 5.0, limits=Limits(math.radians(35), w_m))
-    tilt = np.radians(np.arange(60.0, 179.0, 0.05))
+    tilt = np.radians(np.arange(60.0, 179.0, 0.1))
     for bearing in np.arange(4) * np.pi / 2 + 0.1:
         lean = np.outer(tilt, [np.cos(bearing), np.sin(bearing), 0.0])
         r = Rotation.from_rotvec(lean) * Rotation.from_rotvec([0.0, 0.0, 0.7])
@@ -140,7 +140,7 @@ def test_recovery_always_reduces_the_tilt_and_never_jumps(name):
         assert (then < tilt)[tilt > np.radians(75.0)].all()
         far = tilt > np.radians(85.0)
         assert (then - tilt)[far] == pytest.approx(-w_m * 1e-4, rel=1e-6)
-        assert np.abs(np.diff(rates, axis=0)).max() < 0.05
+        assert np.abs(np.diff(rates, axis=0)).max() < 0.1
 
 
 @pytest.mark.parametrize("name", ["first-order", "exact"])

@@ -3,11 +3,14 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+import yaml
 
 from companion import demo
 from companion.cli import main
+from tests.flight.fly import QUICK_PARAMETERS, merged
 
 
 @pytest.fixture
@@ -27,8 +30,23 @@ def companion(folder, *arguments):
     )
 
 
+def quick_demo(folder: Path) -> str:
+    """The configuration that ships, flown with short steps by a vehicle that wastes no time."""
+    shipped = yaml.safe_load(demo.default_config().read_text())
+    mine = {
+        "include": str(demo.default_config().with_name(shipped["include"])),
+        "steps": {"duration_s": 0.5, "settle_s": 0.5},
+        "flight": {"takeoff_height_m": 2.0},
+        "mock": {"prearm_delay_s": 0.2, "parameters": QUICK_PARAMETERS["px4"]},
+    }
+    path = folder / "quick.yaml"
+    path.write_text(yaml.safe_dump(merged(shipped, mine)))
+    return str(path)
+
+
 def test_the_demo_flies_shows_and_can_be_drawn(folder):
-    done = companion(folder, "demo", "--lockstep", "--programme", "steps", "--json")
+    options = ("--config", quick_demo(folder), "--lockstep", "--programme", "steps", "--json")
+    done = companion(folder, "demo", *options)
     assert done.returncode == 0, done.stderr
     assert "flight ok" in done.stderr
     assert "time constant north" in done.stderr

@@ -38,6 +38,7 @@ def config_for(folder, endpoint, **changes):
         "link": {"endpoint": endpoint, "lockstep": True},
         "recording": {"directory": str(folder / "flights")},
         "planner": {"name": "model-following"},
+        "identify": {"settle_s": 1.0},
         "vehicle": {"lag_ms": 20, "dead_time_ms": 900},  # not to be flown with
     }
     path.write_text(yaml.safe_dump(merged(merged(QUICK_FLIGHT, places), changes)))

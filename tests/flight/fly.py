@@ -1,10 +1,7 @@
 """Whole flights for the tests: a mock vehicle in its own process, the companion in this one."""
 
 import json
-import multiprocessing
-import os
 import socket
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +14,9 @@ from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.yaml_file import parse
-from sitl_mock import __main__ as sitl_mock
+from tests.flight import mock_start
+
+lockstep._SPIN_S = 0.0  # the cores are busy with other flights
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -48,8 +47,8 @@ QUICK_PARAMETERS = {
     },
 }
 QUICK_FLIGHT = {
-    "flight": {"arm": True, "takeoff_height_m": 3.0, "programme": ["hover"]},
-    "hover": {"duration_s": 6.0},
+    "flight": {"arm": True, "takeoff_height_m": 2.0, "programme": ["hover"]},
+    "hover": {"duration_s": 5.0},
     "guidance": {"drag_per_s": 1.0},
     "thrust": {"hover_thrust": 0.49},
 }
@@ -98,34 +97,20 @@ class Mock:
 
 @contextmanager
 def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings):
-    """Start the mock on free ports; its words go to `folder`/mock.log.
-
-    It is forked from the test, which has imported it: a new interpreter would take as much time as
-    the half of a flight.
-    """
+    """Start a mock on free ports; its words go to `folder`/mock.log."""
     port, control_port = free_port(), free_port()
-    config = folder / "mock.yaml"
+    config, words = folder / "mock.yaml", folder / "mock.log"
     quick = {**QUICK_MOCK, "autopilot": autopilot, "parameters": QUICK_PARAMETERS[autopilot]}
     config.write_text(yaml.safe_dump({"mock": merged(quick, settings)}))
-    arguments = ["--headless", "--config", str(config), "--port", str(port)]
-    arguments += ["--control-port", str(control_port)] + ["--lockstep"] * in_lockstep
-    process = multiprocessing.get_context("fork").Process(
-        target=_serve, args=(arguments, folder / "mock.log")
-    )
-    process.start()
+    arguments = ["--headless", "--config", str(config)]
+    arguments += ["--port", str(port), "--control-port", str(control_port)]
+    process = mock_start.start(arguments + ["--lockstep"] * in_lockstep, words)
     try:
         yield Mock(process, port, control_port, config, in_lockstep, autopilot)
     finally:
         process.terminate()
-        process.join(10)
-        assert process.exitcode == 0, (folder / "mock.log").read_text()
-
-
-def _serve(arguments, log):
-    with log.open("wb") as words:
-        for stream in (sys.stdout, sys.stderr):
-            os.dup2(words.fileno(), stream.fileno())
-    sys.exit(sitl_mock.main(arguments))
+        process.join(10.0)
+        assert process.exitcode == 0, words.read_text()
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):

@@ -174,7 +174,7 @@ def flown(folder, programme, **fault):
     """The summary of a flight on PX4's measured response, with 40 ms more in one direction."""
     faults = [{"kind": "delay", "delay_ms": 40, **fault}] if fault else []
     with mock_vehicle(folder, seed=3, faults=faults) as mock:
-        flight = {"programme": [programme], "takeoff_height_m": 5.0}
+        flight = {"programme": [programme], "takeoff_height_m": 3.0}
         summary = fly(mock, folder / "log", vehicle=PX4, flight=flight)
     assert summary.result == "ok", summary.events
     return summary

@@ -88,7 +88,7 @@ def cells():
                 always = end.endswith("*") or (end.endswith("+") and autopilot == "px4")
                 expected = ELSE.get((autopilot, phase, name), end.strip("*+"))
                 label = f"{autopilot}-{name}-{phase}"
-                marks = () if always else (pytest.mark.matrix,)
+                marks = () if always else (pytest.mark.slow,)
                 yield pytest.param(autopilot, fault, phase, expected, marks=marks, id=label)
 
 

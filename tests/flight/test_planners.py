@@ -21,7 +21,7 @@ from companion.attitude import (
 from companion.config_file import load
 from companion.flight import assembly
 from companion.mavlink import loop
-from tests.flight.fly import fly, merged, mock_vehicle, session_for
+from tests.flight.fly import fly, mock_vehicle, session_for
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -36,7 +36,7 @@ def flown(request, tmp_path_factory):
         changes = {
             "planner": {"name": request.param},
             "flight": {"programme": ["steps"]},
-            "steps": {"settle_s": 2.0},
+            "steps": {"duration_s": 0.8, "settle_s": 1.0},
         }
         summary = fly(mock, folder / "log", **changes)
         assert not mock.state()["crashed"]
@@ -47,7 +47,7 @@ def test_it_flies_lands_and_disarms(flown):
     _, summary = flown
     assert summary.result == "ok", summary.events
     assert summary.phase == "disarm"
-    assert summary.counts.setpoints == summary.counts.samples > 5000
+    assert summary.counts.setpoints == summary.counts.samples > 4000
     assert summary.tracking()["height_rms_m"] < 0.05
 
 
@@ -74,17 +74,16 @@ def test_every_setpoint_is_within_the_limits(flown):
 
 
 FIGURE_2 = {
-    "corners": {"north_coefficient": 0.4, "east_coefficient": 0.5},
+    "corners": {
+        "north_coefficient": 0.4,
+        "east_coefficient": 0.5,
+        "duration_s": 1.2,
+        "settle_s": 0.5,
+    },
     "limits": {"max_tilt_deg": 45, "max_tilt_rate_deg_s": 400},
-    "flight": {"programme": ["corners"], "takeoff_height_m": 5.0},
+    "flight": {"programme": ["corners"], "takeoff_height_m": 3.0},
 }
 """The step of the paper's figure 2, at several heights of its rectangle, without its rate limit."""
-
-
-QUICK_CORNERS = {
-    "corners": {"duration_s": 0.8, "settle_s": 0.5},
-    "flight": {"takeoff_height_m": 3.0},
-}
 
 
 def shipped_vehicle(loop):
@@ -116,6 +115,7 @@ def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop,
     assert away["model-following"] < min(away["first-order"], away["quaternion"])
 
 
+@pytest.mark.slow
 def test_the_order_is_the_same_in_real_time(tmp_path):
     """Two vehicles flown at once, without lockstep."""
     names = ("model-following", "first-order")
@@ -128,8 +128,7 @@ def test_the_order_is_the_same_in_real_time(tmp_path):
                 mock_vehicle(folder, in_lockstep=False, seed=3, speed=1.0, rate_loop="px4")
             )
             changes = {"planner": {"name": name}, "vehicle": shipped_vehicle("px4")}
-            changes = merged(merged(FIGURE_2, changes), QUICK_CORNERS)
-            sessions.append(session_for(mock, folder / "log", **changes))
+            sessions.append(session_for(mock, folder / "log", **FIGURE_2, **changes))
 
         async def fly_all():
             return await asyncio.gather(*(session.fly() for session in sessions))

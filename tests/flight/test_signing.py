@@ -5,9 +5,7 @@ import pytest
 from companion.demo import wire_like
 from companion.mavlink import Link, LinkSettings, LinkTimeout, Signing, lockstep
 from companion.mavlink import loop as link_loop
-from tests.flight.fly import fly, mock_vehicle, session_for
-
-HOVER = {"hover": {"duration_s": 1.0}}
+from tests.flight.fly import mock_vehicle, session_for
 
 
 @pytest.fixture
@@ -19,17 +17,6 @@ def keys(tmp_path):
 
 def signed(key):
     return {"signing": {"passphrase_file": key}} if key else {}
-
-
-def test_a_signed_flight(keys, tmp_path):
-    with mock_vehicle(tmp_path, **signed(keys["right"])) as mock:
-        summary = fly(mock, tmp_path / "flight", link={"signing_key_file": keys["right"]}, **HOVER)
-        truth = mock.state()
-    assert (summary.result, summary.phase) == ("ok", "disarm")
-    assert truth["signing"]["accepted"] > 250
-    assert truth["signing"]["unsigned"] == truth["signing"]["refused"] == 0
-    assert "autopilot: Armed by external command" in [text for _, text in summary.events]
-    assert not any("its frames" in text for _, text in summary.events)
 
 
 @pytest.mark.parametrize(

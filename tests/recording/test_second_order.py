@@ -1,7 +1,5 @@
 """The nearest second-order model, against responses made by SciPy from known ones."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -20,30 +18,25 @@ def answered(times, targets, frequency, damping, dead_time, start=STILL):
     `start` is c and ċ, which keeps its speed until the first target has effect.
     """
     matrix = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * damping * frequency]])
-    rows = []
-    for at in times:
-        state, now = np.array(start, dtype=float), times[0]
-        for since, until, target in acting(times, targets, dead_time, at):
-            assert since == pytest.approx(now)
-            if target is None:
-                state[0] += (until - since) * state[1]
-            else:
-                goal = np.array([target, (0.0, 0.0)])
-                state = expm(matrix * (until - since)) @ (state - goal) + goal
-            now = until
-        rows.append(state[0])
-    return np.array(rows)
 
+    def after(seconds, state, target):
+        """States (m, 2, 2) under a target, which is None before the first."""
+        seconds = np.reshape(seconds, (-1, 1, 1))
+        if target is None:
+            return state + seconds * [state[1], (0.0, 0.0)]
+        goal = np.array([target, (0.0, 0.0)])
+        return expm(matrix * seconds) @ (state - goal) + goal
 
-def acting(times, targets, dead_time, end):
-    """(from, to, target) of all that acts until `end`; the target is None before the first."""
     changes = [0, *(np.flatnonzero(np.any(np.diff(targets, axis=0), axis=1)) + 1)]
-    knots = [times[0], *(times[k] + dead_time for k in changes), np.inf]
-    for (since, until), target in zip(
-        pairwise(knots), [None, *(targets[k] for k in changes)], strict=True
+    knots = [times[0], *(times[k] + dead_time for k in changes)]
+    state, rows = np.array(start, dtype=float), np.empty((len(times), 2))
+    for since, until, target in zip(
+        knots, [*knots[1:], times[-1]], [None, *(targets[k] for k in changes)], strict=True
     ):
-        if since < end:
-            yield since, min(until, end), target
+        inside = (times >= since) & (times <= until)
+        rows[inside] = after(times[inside] - since, state, target)[:, 0]
+        (state,) = after(until - since, state, target)
+    return rows
 
 
 def run_of(model, *, hold=1.0, steps=3, rate_hz=100, seed=1, noise=0.0, start=STILL, begin=5.0):

@@ -5,6 +5,7 @@ import importlib.util
 import math
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import yaml
 from rich.console import Console
 
 from companion.cli import main
-from companion.study import runner
+from companion.study import fig2, fig3, fig4, fig5, runner
 from companion.study.case import Case
 from companion.study.names import PAPER_STUDIES
 from companion.yaml_file import ConfigError
@@ -20,6 +21,8 @@ from companion.yaml_file import ConfigError
 ROOT = Path(__file__).parents[2]
 PAPER = {name: runner._STUDIES[name] for name in PAPER_STUDIES}
 CASE = ROOT / "configs" / "study-case.yaml"
+EIGHT = tuple(k * math.pi / 4.0 for k in range(-3, 5))
+"""Headings, best and worst of Euler angles among them; figure 3 alone flies all 72."""
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +39,10 @@ def results(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "_tick", counting)
         patch.setattr(runner, "_STUDIES", PAPER)
+        patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT))
+        patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=1.0))
+        patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
+        patch.setattr(fig5, "STEP", replace(fig5.STEP, headings=EIGHT[3:6:2], seconds=1.5))
         page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
 

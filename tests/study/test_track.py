@@ -86,6 +86,7 @@ def test_each_flight_is_told_as_it_begins(flown):
     ]
 
 
+@pytest.mark.slow
 def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
     alone, company = flight.fly(TASKS[0]), flown[0][TASKS[0]]
     assert (alone.told, alone.true) == (company.told, company.true)
@@ -93,7 +94,7 @@ def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
 
 
 def test_a_flight_that_fails_has_no_error_to_show(vehicle):
-    vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 4.0}])
+    vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 2.5}])
     tracked = flight.fly(TASKS[0])
     assert not tracked.ok
     assert tracked.result
@@ -216,8 +217,20 @@ def test_json_goes_with_this_study_alone(tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+SHORT = """
+import sys
+from companion.cli import main
+from companion.study.track import study, task
+arcs = [task.Task(task.Course(task.CIRCLE, 2.0, 0.1), name) for name in task.PLANNER_NAMES]
+study.tasks = lambda: arcs
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
+"""
+"""The command, with flights for which it does not have to wait long."""
+
+
 def test_interrupted_it_leaves_no_vehicle_behind(tmp_path):
-    command = [sys.executable, "-m", "companion", "study", "track", "--out", str(tmp_path)]
+    command = [sys.executable, "-c", SHORT, "study", "track", "--out", str(tmp_path)]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
