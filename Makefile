@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all lint soak bench clean
+.PHONY: demo test test-all matrix lint soak bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -24,6 +24,9 @@ test: lint  ## style, types, import rules, then the tests
 
 test-all: lint  ## the same with every test, also what only proves more widely what others prove
 	$(PYTEST)
+
+matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about three minutes
+	$(BIN)/python -m pytest -n 2 tests/flight/test_fault_matrix.py
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -16,6 +16,7 @@ from companion.config_programmes import (
     IdentifyConfig,
     StepsConfig,
 )
+from companion.config_safety import SafetyConfig
 from companion.config_sections import (
     AUTO,
     DeadmanConfig,
@@ -45,6 +46,7 @@ class Config(Section):
     vehicle: VehicleConfig = VehicleConfig()
     limits: LimitsConfig = LimitsConfig()
     deadman: DeadmanConfig = DeadmanConfig()
+    safety: SafetyConfig = SafetyConfig()
     guidance: GuidanceConfig = GuidanceConfig()
     nmpc: NmpcConfig = NmpcConfig()
     thrust: ThrustConfig = ThrustConfig()

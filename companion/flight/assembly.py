@@ -18,7 +18,7 @@ from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.programmes import programme
 from companion.flight.rig import Rig
-from companion.flight.safety import Fence, SafetyMonitors
+from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.inbox import Notice
@@ -225,18 +225,13 @@ def assemble(
         position_stale=deadman.position_stale_ms * _MS,
         clock=clock,
     )
-    limits = config.limits
-    monitors = SafetyMonitors(
-        link.state,
-        Fence(limits.fence_radius_m, limits.fence_ceiling_m, limits.fence_floor_m),
-        limits.min_battery_percent / 100.0,
-        clock,
-    )
-    rig = Rig(config, link, loop, guide, monitors, programme(config))
-    watch = Watch(rig, silence_limit=deadman.silence_limit_ms * _MS, clock=clock)
+    lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
+    rig = Rig(config, link, loop, guide, lookout, programme(config))
+    ladder = SafetyLadder(monitors(config), config.safety.hold_s)
+    watch = Watch(rig, ladder, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    rig.note = flight.note
+    ladder.note = rig.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:

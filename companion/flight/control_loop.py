@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from companion.attitude import AttitudeError, BodyRates, Limits, Planner, Target
 from companion.attitude.rotation import within_limits
+from companion.flight.estimator_resets import EstimatorResets
 from companion.flight.freshness import SampleClock
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
@@ -24,12 +25,13 @@ class Command(NamedTuple):
     """What guidance left behind for the loop.
 
     Attributes:
-        target: for the planner.
+        target: for the planner; its heading is the one without jumps (`EstimatorResets`).
         acceleration_down: wanted vertical acceleration, m/s².
         made_at: when, s on our clock.
         idle: on the ground: no rates, no thrust.
         is_step: an open-loop step, whose response is measured.
         body_rates: instead of the planner's, rad/s; sent as far as the limits allow.
+        turn: sum of the estimate's jumps in heading when it was made, rad.
     """
 
     target: Target
@@ -38,6 +40,7 @@ class Command(NamedTuple):
     idle: bool = False
     is_step: bool = False
     body_rates: BodyRates | None = None
+    turn: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,9 @@ class ControlLoop:
         on: whether samples are answered at all.
         guarded: whether a gap needs the autopilot's mode confirmed.
         held_back: a gap happened and `resume` has not come yet.
+        resets: jumps of the estimate, which the planner does not see.
         ask_mode: called once a gap, when telemetry is back.
+        thrust: as it was last sent, 0..1.
         last_answer, last_sample, last_newer, last_fresh: when a setpoint last left; when a sample
             last came; one that was newer than those before; and one that was fresh. s on our clock.
         samples, setpoints, missed_deadlines, stale, refused: counts since the loop was made.
@@ -80,6 +85,8 @@ class ControlLoop:
         self.on = False
         self.guarded = False
         self.held_back = False
+        self.resets = EstimatorResets()
+        self.thrust = 0.0
         self.ask_mode: Callable[[], None] = lambda: None
         self.last_answer = self.last_sample = self.last_newer = self.last_fresh = -inf
         self.samples = self.setpoints = self.missed_deadlines = self.stale = self.refused = 0
@@ -107,6 +114,8 @@ class ControlLoop:
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. Called by the link as the datagram arrives."""
         age = self._clock.age(sample.vehicle_time, sample.received)
+        if age is not None and self.resets.on_attitude(sample):
+            self.plan_anew()
         fresh = age is not None and age <= self._deadlines.telemetry_stale
         dt = self._note_arrival(sample, newer=age is not None, fresh=fresh)
         if not self.on:
@@ -140,19 +149,20 @@ class ControlLoop:
     def _rates(self, sample: AttitudeSample, command: Command, dt: float) -> BodyRates:
         """The planner's answer, or the rates that guidance asks for within the same limits."""
         if command.body_rates is None:
-            return self._plan(sample, command.target, dt)
+            return self._plan(sample, self.resets.target(command.target, command.turn), dt)
         limits = self._limits
         return BodyRates(*within_limits(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
     def _plan(self, sample: AttitudeSample, target: Target, dt: float) -> BodyRates:
         """Ask the planner; after a gap, or at the first sample, it is to begin anew."""
+        q = self.resets.attitude(sample.q)
         since = sample.vehicle_time - self._planned_at
         if since > _LONGEST_STEP:
-            self._planner.reset(sample.q, sample.body_rates)
+            self._planner.reset(q, sample.body_rates)
             since = self._period or dt  # a gap says nothing of when the next sample comes
         self._period = since
         self._planned_at = sample.vehicle_time
-        return self._planner.rates(sample.q, target, since, sample.body_rates)
+        return self._planner.rates(q, target, since, sample.body_rates)
 
     def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
         """Keep what the watch asks for; returns the sample period in s."""
@@ -180,6 +190,7 @@ class ControlLoop:
         thrust: float,
     ) -> None:
         self.setpoints += 1
+        self.thrust = thrust
         self.last_answer = self._gap_from = sample.received
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from math import acos, degrees, nan
+from math import acos, degrees, dist, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import cos_tilt
@@ -26,6 +26,9 @@ from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.state import VehicleState
 from companion.recording.trace import FlightTrace
 
+_REJOINED = 1.0
+"""Nearer than this to its reference a vehicle is back from open-loop commands, m."""
+
 _LEVEL = Target(0.0, 0.0, 0.0)
 
 
@@ -34,12 +37,17 @@ class Guide:
 
     On the ground the command is idle. In the air and without a programme it damps the motion where
     the vehicle is; `hold` keeps a pose; `follow` flies a programme from it. A programme's open-loop
-    rates are given up, and the vehicle held where it is, once it tilts too far.
+    rates are given up, and the vehicle held where it is, once it tilts too far. Jumps of the
+    autopilot's estimate are not chased: poses and references go on without them.
 
     Attributes:
         begun_at: when the programme began, s on our clock, or None.
         pose: the pose that is held, or None.
         given_up: why the programme was given up, or None.
+        bound_to_hold: no programme is flown any more; set by `give_up`.
+        motion: of the vehicle at the last step, without the jumps of the estimate, or None.
+        off_course: distance from the reference at the last step, m; None where none is followed,
+            and on the way back to it after open-loop commands.
         predictive: flies trajectories instead of linear guidance, or None.
         estimate: of the motion.
         learning: of the hover thrust.
@@ -62,6 +70,10 @@ class Guide:
         self.begun_at: float | None = None
         self.pose: Pose | None = None
         self.given_up: str | None = None
+        self.bound_to_hold = False
+        self.motion: VehicleMotion | None = None
+        self.off_course: float | None = None
+        self._astray = False
         self.predictive: Predictive | None = None
         self._loop = loop
         self._guidance = guidance
@@ -91,8 +103,15 @@ class Guide:
         self.stand_by()
         self.pose = Pose(self._situation(self._clock()).now.position_ned, self._heading())
 
+    def give_up(self) -> None:
+        """Hold here, and fly no programme any more."""
+        self.bound_to_hold = True
+        self.hold_here()
+
     def follow(self, programme: Sequence) -> None:
-        """Fly `programme` from the pose that is held."""
+        """Fly `programme` from the pose that is held; after `give_up`, go on holding."""
+        if self.bound_to_hold:
+            return
         if self.pose is None:
             self.hold_here()
         self._programme = programme
@@ -126,16 +145,16 @@ class Guide:
             self.learning.stand()
             self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
             return
+        position = self._loop.resets.without_jumps(position)
+        self.estimate.turn_to(self._loop.resets.turn)
         self.estimate.note_position(position, obeyed=self._loop.guarded)
         situation = self._situation(now)
+        self.motion = situation.now
         self._give_up_if_tilted()
         reference_at = self._reference(situation.now)
         reference = reference_at(now)
         command = self._guidance.command(reference_at, now, situation)
-        if self.predictive is not None:
-            vehicle = self.estimate.vehicle(now, situation)
-            command = self.predictive.command(command, vehicle, self._following(now))
-        target, down = command
+        target, down = self._predicted(now, command, situation)
         self.estimate.vertical = GRAVITY - down if self._loop.guarded else GRAVITY
         self._loop.command = Command(
             target,
@@ -143,7 +162,9 @@ class Guide:
             now,
             is_step=reference.coefficients is not None,
             body_rates=reference.body_rates,
+            turn=self._loop.resets.turn,
         )
+        self.off_course = self._distance(reference, situation.now)
         self.learning.step(
             now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
         )
@@ -152,7 +173,24 @@ class Guide:
             self._note_tracking(measured_at, reference, situation.now)
 
     def _heading(self) -> float:
-        return heading(self._q)
+        return heading(self._loop.resets.attitude(self._q))
+
+    def _predicted(
+        self, now: float, linear: tuple[Target, float], situation: Situation
+    ) -> tuple[Target, float]:
+        """What predictive control says, if it flies; its headings are the estimate's own."""
+        if self.predictive is None:
+            return linear
+        turn, (target, down) = self._loop.resets.turn, linear
+        vehicle = self.estimate.vehicle(now, situation)
+        linear = target._replace(heading=target.heading + turn), down
+        target, down = self.predictive.command(linear, vehicle, self._following(now))
+        return target._replace(heading=target.heading - turn), down
+
+    def _distance(self, reference: Reference, motion: VehicleMotion) -> float | None:
+        distance = dist(reference.position_ned, motion.position_ned)
+        self._astray = not reference.closed_loop or (self._astray and distance > _REJOINED)
+        return None if self.pose is None or self._astray else distance
 
     def _situation(self, now: float) -> Situation:
         return self.estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)
@@ -173,7 +211,9 @@ class Guide:
         if self._programme is None or self.begun_at is None or self.pose is None:
             return None
         part, within = self._programme.part_at(now - self.begun_at)
-        return Following(part, within, self.pose) if isinstance(part, Follow) else None
+        if not isinstance(part, Follow):
+            return None
+        return Following(part, within, self.pose, self._loop.resets.turn)
 
     def _give_up_if_tilted(self) -> None:
         """Hold where we are if open-loop rates have tilted the vehicle too far."""

@@ -48,6 +48,7 @@ class MotionEstimate:
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
+        self._turn = 0.0
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude; it tells where the thrust points."""
@@ -55,6 +56,13 @@ class MotionEstimate:
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
+
+    def turn_to(self, turn: float) -> None:
+        """The estimate's jumps in heading come to `turn`, rad; attitudes before are not counted."""
+        if turn != self._turn:
+            self._observer.turn(turn - self._turn)
+            self._slopes.forget()
+            self._turn = turn
 
     def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
         """Take a measured position and velocity; the same one twice counts once.

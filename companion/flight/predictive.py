@@ -26,11 +26,13 @@ class Following(NamedTuple):
         part: the trajectory as a programme.
         time: since it began, s.
         pose: where it began.
+        turn: jumps of the estimate's heading, which its headings move along with, rad.
     """
 
     part: Follow
     time: float
     pose: Pose
+    turn: float = 0.0
 
 
 @dataclass
@@ -119,7 +121,7 @@ class Predictive:
             return
         self._number += 1
         turned = pose.heading if part.trajectory.holds_heading else 0.0
-        start = Start(pose.position_ned, turned)
+        start = Start(pose.position_ned, turned + following.turn)
         self._solver.request(Request(self._number, vehicle, at, start, tuple(self._inputs)))
 
     def _remember(self, now: float, command: tuple[Target, float]) -> None:

@@ -37,6 +37,7 @@ async def checks(rig: Rig) -> None:
         rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
     _heed(rig, examine(config, evidence))
     _tell_dead_man(rig, evidence.survey.values)
+    rig.mode_at_checks = link.state.mode
 
 
 async def stream(rig: Rig) -> None:
@@ -49,6 +50,14 @@ async def stream(rig: Rig) -> None:
 async def arm(rig: Rig) -> None:
     """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
     if rig.config.flight.arm:
+        # What was good at the checks may not be so any more.
+        await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
+        _check_battery(rig)
+        await rig.fresh_heartbeat()
+        if rig.link.state.mode != rig.mode_at_checks:
+            raise FlightEnded(
+                f"the pilot or another station took over before arming: mode {rig.link.state.mode}"
+            )
         rig.detail = "the autopilot to accept arming"
         rig.arm_sent = True
         for command in rig.link.family.arm():
@@ -76,12 +85,20 @@ async def undo_arming(rig: Rig) -> None:
 
 def _ready(rig: Rig) -> bool:
     state = rig.link.state
-    for finding in (vehicle_checks.armed(state), vehicle_checks.battery(rig.config, state)):
-        if finding.verdict is Verdict.UNSAFE:
-            raise FlightEnded(finding.sentence())
+    _refuse(vehicle_checks.armed(state))
+    _check_battery(rig)
     missing = rig.link.family.not_ready(state.readiness)
     rig.detail = missing or ""
     return missing is None
+
+
+def _check_battery(rig: Rig) -> None:
+    _refuse(vehicle_checks.battery(rig.config, rig.link.state))
+
+
+def _refuse(finding: Finding) -> None:
+    if finding.verdict is Verdict.UNSAFE:
+        raise FlightEnded(finding.sentence())
 
 
 def _heed(rig: Rig, findings: list[Finding]) -> None:

@@ -23,6 +23,7 @@ _SELF_DISARM = 8.0
 async def takeoff(rig: Rig) -> None:
     """Let the autopilot take off, and wait for the height."""
     state, height = rig.link.state, rig.config.flight.takeoff_height_m
+    await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
     await rig.fresh_heartbeat()
     require_role(rig.link, {Role.HOLD, Role.TAKEOFF})
     if not (state.landed and state.armed):
@@ -33,7 +34,7 @@ async def takeoff(rig: Rig) -> None:
 
     def reached() -> bool:
         nonlocal climbing
-        now, position = state.height, state.position
+        now, position = state.height, rig.fresh_position()
         if now is None or position is None:
             return False
         rig.detail = f"{height:g} m, now {now:.1f} m"
@@ -50,7 +51,7 @@ async def takeoff(rig: Rig) -> None:
 async def offboard(rig: Rig) -> None:
     """Hand control over to our stream, and settle."""
     rig.guide.hold_here()
-    rig.monitors.begin()
+    rig.lookout.begin(asyncio.get_running_loop().time())
     # The mode we know may be a second old; never take the vehicle from a pilot who took it.
     await rig.fresh_heartbeat()
     require_role(rig.link, {Role.TAKEOFF, Role.HOLD})
@@ -83,6 +84,11 @@ async def programme(rig: Rig) -> None:
 async def hand_back(rig: Rig) -> None:
     """Stop moving, and stream until the autopilot holds by itself."""
     _stop_moving(rig)
+    if not rig.loop.guarded:
+        # Control stood still, and what was heard since may be old: who has the vehicle now?
+        rig.detail = "the autopilot's mode"
+        await rig.fresh_heartbeat()
+        require_role(rig.link, {Role.TAKEOFF, Role.HOLD, Role.OFFBOARD})
     rig.detail = "the autopilot to hold"
     await rig.link.command(*rig.link.family.hold())
     await rig.until(lambda: _in(rig, Role.HOLD))

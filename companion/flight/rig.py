@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
-from companion.flight.safety import SafetyMonitors
+from companion.flight.safety import Lookout
 from companion.guidance import Sequence
 from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
+from companion.mavlink.records import LocalPosition
 
 _POLL = 0.02
 """How often a condition is looked at, s; telemetry that changes it is slower."""
@@ -28,6 +29,7 @@ class Rig:
         rate_hz: setpoints a second while the programme was flown.
         heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
             from the rate at which heartbeats really come.
+        mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
         note: writes down and shows that something happened.
     """
@@ -36,11 +38,12 @@ class Rig:
     link: Link
     loop: ControlLoop
     guide: Guide
-    monitors: SafetyMonitors
+    lookout: Lookout
     programme: Sequence
     detail: str = ""
     rate_hz: float = 0.0
     heartbeat_limit: float = _SLOWEST_HEARTBEAT
+    mode_at_checks: str | None = None
     arm_sent: bool = False
     note: Callable[[str], None] = lambda _: None
 
@@ -68,6 +71,12 @@ class Rig:
             return heartbeat is not None and heartbeat.received >= began
 
         await self.until(newer)
+
+    def fresh_position(self) -> LocalPosition | None:
+        """The newest position, unless it is stale."""
+        position, now = self.link.state.position, asyncio.get_running_loop().time()
+        limit = self.config.deadman.position_stale_ms / 1e3
+        return None if position is None or now - position.received > limit else position
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

@@ -1,4 +1,4 @@
-"""The deadman and the pilot's right: judged on a timer and at every heartbeat."""
+"""The pilot's right, and the safety ladder's look: on a timer and at every heartbeat."""
 
 import asyncio
 from collections.abc import Callable
@@ -7,10 +7,9 @@ from companion.flight.ending import Exit, FlightEnded
 from companion.flight.phases import Phase
 from companion.flight.rig import Rig
 from companion.flight.roles import require_role, roles_of
+from companion.flight.safety import Action, SafetyLadder
+from companion.flight.safety.monitor import EXITS
 from companion.mavlink.roles import Role
-
-_HEARD = 0.3
-"""Nothing at all from the vehicle for this long, s: it would not be heard taking over, either."""
 
 
 class Watch:
@@ -18,16 +17,14 @@ class Watch:
 
     Args:
         rig: the parts of the flight.
-        silence_limit: how long control may stand still before it is given up, s.
+        ladder: judges what it sees while the autopilot obeys us.
         clock: our clock, s.
     """
 
-    def __init__(self, rig: Rig, *, silence_limit: float, clock: Callable[[], float]) -> None:
+    def __init__(self, rig: Rig, ladder: SafetyLadder, clock: Callable[[], float]) -> None:
         self._rig = rig
-        self._silence_limit = silence_limit
+        self._ladder = ladder
         self._clock = clock
-        self._frames = 0
-        self._heard_at = clock()
         self._question: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
@@ -36,14 +33,12 @@ class Watch:
         Raises:
             FlightEnded: the phase must end, with the reason and what is to be done.
         """
-        self._listen()
-        loop = self._rig.loop
+        now = self._clock()
+        self._rig.lookout.listen(now)
         if phase.modes:
             require_role(self._rig.link, phase.modes)
-        if phase.monitored and loop.guarded:
-            if self._clock() - loop.last_answer > self._silence_limit:
-                self._give_up()
-            self._rig.monitors.check(self._rig.guide.pose)
+        if phase.monitored and self._rig.loop.guarded:
+            self._climb(now)
         if phase.modes:
             self._judge_heartbeat()
 
@@ -62,10 +57,17 @@ class Watch:
         # Without an answer the silence limit decides.
         self._question = asyncio.create_task(self._rig.fresh_heartbeat())
 
-    def _listen(self) -> None:
-        frames = self._rig.link.stats.frames
-        if frames != self._frames:
-            self._frames, self._heard_at = frames, self._clock()
+    def _climb(self, now: float) -> None:
+        """Let the ladder look, and do what it says."""
+        verdict = self._ladder.step(self._rig.lookout.snapshot(now))
+        if verdict is None:
+            return
+        if verdict.action is Action.HOLD:
+            self._rig.guide.give_up()
+            return
+        if verdict.mutes:
+            self._rig.release()
+        raise FlightEnded(verdict.reason, EXITS[verdict.action])
 
     def _judge_heartbeat(self) -> None:
         heartbeat = self._rig.link.state.heartbeat
@@ -73,29 +75,3 @@ class Watch:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
             )
-
-    def _give_up(self) -> None:
-        """Control stood still too long: it is not taken up again.
-
-        Raises:
-            FlightEnded: asks for hold while the vehicle is heard; else its failsafe must do, for
-                a pilot who took over could not be heard and would be overruled.
-        """
-        reason = self._why_silent()
-        self._rig.release()
-        heard = self._clock() - self._heard_at < _HEARD
-        raise FlightEnded(reason, Exit.HOLD if heard else Exit.LET_GO)
-
-    def _why_silent(self) -> str:
-        now, limit, loop = self._clock(), self._silence_limit, self._rig.loop
-        if now - loop.last_sample > limit:
-            return f"no attitude from the vehicle for {now - loop.last_sample:.1f} s"
-        if now - loop.last_newer > limit:
-            return "the vehicle's clock stands still"
-        if now - loop.last_fresh > limit:
-            return "attitude arrives later than deadman.telemetry_stale_ms"
-        if loop.command is None or now - loop.command.made_at > limit:
-            return "no position from the vehicle"
-        if loop.held_back:
-            return "after a gap in telemetry the autopilot did not confirm offboard"
-        return "attitude from the vehicle cannot be used, or setpoints cannot leave"

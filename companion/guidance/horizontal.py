@@ -1,6 +1,6 @@
-"""Horizontal vectors, and how one is kept short."""
+"""Horizontal vectors: how one is kept short, and how one is turned."""
 
-from math import hypot
+from math import cos, hypot, sin
 
 Horizontal = tuple[float, float]
 """(north, east)."""
@@ -12,3 +12,9 @@ def limited(north: float, east: float, most: float) -> Horizontal:
     if length <= most:
         return north, east
     return north * most / length, east * most / length
+
+
+def rotated(north: float, east: float, angle: float) -> Horizontal:
+    """The vector turned clockwise, seen from above, by an angle in rad."""
+    c, s = cos(angle), sin(angle)
+    return c * north - s * east, s * north + c * east

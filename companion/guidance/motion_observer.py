@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import exp
 
-from companion.guidance.horizontal import Horizontal, limited
+from companion.guidance.horizontal import Horizontal, limited, rotated
 from companion.guidance.reference import Vector, VehicleMotion
 
 
@@ -75,6 +75,13 @@ class MotionObserver:
             found[axis] = disturbance[axis] + learned * off
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
         self.disturbance = limited(found[0], found[1], settings.largest)
+
+    def turn(self, angle: float) -> None:
+        """The measured attitudes jumped in heading by an angle in rad, and the vehicle did not.
+
+        It leans against the disturbance; so that it goes on leaning that way, this turns along.
+        """
+        self.disturbance = rotated(*self.disturbance, angle)
 
     def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
         """The motion at a vehicle time (s), moved on from the newest measurement.

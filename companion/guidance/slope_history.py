@@ -47,6 +47,11 @@ class SlopeHistory:
             )
         self.newest = slope
 
+    def forget(self) -> None:
+        """Start anew: the attitudes before are seen from another north."""
+        self._times.clear()
+        self._sums.clear()
+
     def mean(self, start: float, end: float) -> Horizontal:
         """The mean slope between two vehicle times, s; before and after what is known, as there."""
         if not start < end or not self._times:

@@ -94,6 +94,7 @@ class Home(NamedTuple):
         longitude_deg: WGS84.
         altitude_m: Above mean sea level, m.
         down: In the local frame of LOCAL_POSITION_NED, m.
+        north, east: The same.
     """
 
     received: float
@@ -101,6 +102,8 @@ class Home(NamedTuple):
     longitude_deg: float
     altitude_m: float
     down: float
+    north: float = 0.0
+    east: float = 0.0
 
 
 class Estimator(NamedTuple):

@@ -212,7 +212,7 @@ class VehicleState(_Values):
         self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
 
     def _on_home(self, message: Message) -> None:
-        if not isfinite(message.z):
+        if not all(map(isfinite, (message.x, message.y, message.z))):
             self._stats.non_finite += 1
             return
         self.home = Home(
@@ -221,6 +221,8 @@ class VehicleState(_Values):
             message.longitude / 1e7,
             message.altitude / 1000.0,
             message.z,
+            message.x,
+            message.y,
         )
 
     def _on_estimator(self, message: Message) -> None:

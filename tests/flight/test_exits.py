@@ -10,8 +10,12 @@ from resource import RLIMIT_FSIZE, prlimit
 
 import pytest
 import yaml
+from pymavlink import mavutil
 
-from tests.flight.fly import QUICK_FLIGHT, merged, mock_vehicle
+from companion.flight.guide import Guide
+from companion.mavlink import lockstep
+from tests.flight.fly import QUICK_FLIGHT, fly, merged, mock_vehicle, session_for
+from tests.flight.test_authority import When
 
 RETURN_LOW = {"parameters": {"COM_OBL_RC_ACT": 4}}
 
@@ -125,3 +129,67 @@ def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_pat
     assert "flight.tlog" in told[0]
     assert result["link"]["not_recorded"] > 1000
     assert json.loads(next((tmp_path / "flights").glob("*/summary.json")).read_text()) == result
+
+
+def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(mock, tmp_path):
+    """Stopped as a stuck event loop is; PX4 would let one setpoint in again.
+
+    In real time: in lockstep our clock would stand still with us.
+    """
+    process = start(mock, tmp_path)
+    mock.until(in_offboard)
+    process.send_signal(signal.SIGSTOP)
+    frozen = mock.until(lambda state: state["mode"] == "LAND")
+    process.send_signal(signal.SIGCONT)
+    result = finish(process, 1)
+    state = mock.until(lambda state: state["landed"])
+    assert frozen["time"] - frozen["last_setpoint"] < 1.3
+    assert state["last_setpoint"] == frozen["last_setpoint"]
+    assert (state["crashed"], state["mode"]) == (False, "LAND")
+    assert any("failsafe took over" in event["text"] for event in result["events"])
+
+
+def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkeypatch):
+    flown = Guide.step
+
+    def freezing(guide):
+        if not (guide.begun_at is not None and guide._clock() > guide.begun_at + 1.0):
+            flown(guide)
+
+    monkeypatch.setattr(Guide, "step", freezing)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        state = mock.state()
+    assert summary.result == "guidance makes no commands any more"
+    assert (state["mode"], state["armed"], state["crashed"]) == ("LOITER", True, False)
+    began = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    assert setpoints(summary)[-1]._timestamp < began + 1.2 + 1.0 + 0.2
+
+
+def test_an_unplugged_cable_is_let_go_and_the_failsafe_lands_it(tmp_path):
+    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+        observer = When("programme", lambda: mock.ask({"fault": {"kind": "drop"}}), after=1.0)
+        summary = fly(mock, tmp_path / "log", observer)
+        state = mock.until(lambda state: state["landed"] and not state["armed"], seconds=40)
+    assert "no attitude" in summary.result
+    assert "letting go" in summary.events[-1][1]
+    assert not state["crashed"]
+    assert state["time"] < setpoints(summary)[-1]._timestamp + 8.0
+
+
+def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("programme", lambda: session.interrupt("enough"), after=1.0)
+        steps = {"flight": {"programme": ["steps"]}}
+        session = session_for(mock, tmp_path / "log", observer, **steps)
+        summary = lockstep.run(session.fly())
+        assert mock.state()["mode"] == "LOITER"
+    interrupted = next(at for at, text in summary.events if text == "enough")
+    held = next(at for at, t in summary.events if at > interrupted and t == "mode AUTO.LOITER")
+    last = setpoints(summary)[-1]
+    assert interrupted < held <= last._timestamp + 0.03
+
+
+def setpoints(summary):
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    return list(iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None))

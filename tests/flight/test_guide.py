@@ -7,6 +7,7 @@ import pytest
 
 from companion.attitude import BodyRates
 from companion.config import Config
+from companion.flight.estimator_resets import EstimatorResets
 from companion.flight.guide import Guide
 from companion.flight.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
@@ -42,7 +43,7 @@ class Bench:
     def __init__(self):
         self.now = 10.0
         self.hover = HoverSpy()
-        self.loop = SimpleNamespace(command=None, guarded=True)
+        self.loop = SimpleNamespace(command=None, guarded=True, resets=EstimatorResets())
         self.state = SimpleNamespace(position=None, landed=False, battery=None)
         self.guide = Guide(
             self.loop,
@@ -93,6 +94,16 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     assert bench.guide.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None
     assert not bench.guide.finished
+
+
+def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
+    bench = Bench()
+    bench.fly(IN_FIRST_DOUBLET, position=(9.0, 4.0, -5.0))
+    assert bench.guide.off_course is None
+    bench.fly(IN_HOLD - 0.3, position=(9.0, 4.0, -5.0))
+    assert bench.guide.off_course is None
+    bench.fly(IN_HOLD + 0.3)  # so much later that it is no jump of the estimate
+    assert bench.guide.off_course < 1.0
 
 
 def test_position_hold_may_tilt_as_it_must():

@@ -1,0 +1,180 @@
+"""Makes the snapshots: newest telemetry, our own counters, and shares over the last second."""
+
+from collections import deque
+from math import cos, degrees, dist, inf, radians
+from typing import NamedTuple
+
+from companion.flight.control_loop import ControlLoop
+from companion.flight.guide import Guide
+from companion.flight.safety.estimate import GPS_FIX_3D
+from companion.flight.safety.fence import EARTH_RADIUS
+from companion.flight.safety.snapshot import (
+    Autopilot,
+    Control,
+    Health,
+    Motion,
+    Place,
+    Resets,
+    Snapshot,
+)
+from companion.guidance.reference import Vector
+from companion.mavlink.link import Link
+
+_WINDOW = 1.0
+"""Shares are over the last of this, s."""
+_EARLY = 0.9
+"""Of the window; before so much of it is known there are no shares."""
+_LATE = 0.03
+"""Between two looks, s; the timer's period is 0.02 s."""
+_WHILE = 30.0
+"""Within so long, s, resets of the estimator are counted together."""
+
+
+class _Counted(NamedTuple):
+    """Counters at one look; `late` is by how long that look came late, s."""
+
+    now: float
+    frames: int
+    lost: int
+    setpoints: int
+    missed: int
+    late: float
+
+
+class Lookout:
+    """Looks at everything that the monitors judge.
+
+    Args:
+        link: to the vehicle.
+        loop: answers the samples.
+        guide: makes the commands.
+        real_time: whether deadlines mean anything: in lockstep the vehicle waits for us.
+    """
+
+    def __init__(self, link: Link, loop: ControlLoop, guide: Guide, *, real_time: bool) -> None:
+        self._link, self._loop, self._guide = link, loop, guide
+        self._real_time = real_time
+        self._counted: deque[_Counted] = deque()
+        self._frames = 0
+        self._heard_at = 0.0
+        self._start: Vector | None = None
+        self._origin: Place | None = None
+        self._began_at = 0.0
+        self._turn = 0.0
+        self._shift: Vector = (0.0, 0.0, 0.0)
+        self._had_gps = False
+        self._good_flags = 0
+
+    def begin(self, now: float) -> None:
+        """Control begins: fences are about this place, and resets before this do not count."""
+        state, resets = self._link.state, self._loop.resets
+        motion = self._guide.motion
+        self._start = None if motion is None else motion.position_ned
+        self._origin = self._geodetic(self._start)
+        self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
+        resets.largest_tilt = 0.0
+        self._good_flags = 0 if state.estimator is None else state.estimator.flags
+        self._counted.clear()
+
+    def listen(self, now: float) -> None:
+        """Note what is heard, and count; at every look, whatever the phase."""
+        stats, loop, gps = self._link.stats, self._loop, self._link.state.gps
+        self._had_gps = self._had_gps or (gps is not None and gps.fix_type >= GPS_FIX_3D)
+        if stats.frames != self._frames:
+            self._frames, self._heard_at = stats.frames, now
+        loop.resets.on_counter(self._link.state.reset_counter, now)
+        counted = self._counted
+        late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0
+        counted.append(
+            _Counted(now, stats.frames, stats.lost, loop.setpoints, loop.missed_deadlines, late)
+        )
+        while len(counted) > 2 and now - counted[1].now >= _WINDOW:
+            counted.popleft()
+
+    def snapshot(self, now: float) -> Snapshot:
+        """What is known at `now`, s on our clock; after `listen`."""
+        state, loop = self._link.state, self._loop
+        command = loop.command
+        return Snapshot(
+            now,
+            Autopilot(
+                state.armed,
+                state.landed,
+                state.failsafe,
+                state.battery,
+                state.gps,
+                state.estimator,
+            ),
+            self._motion(),
+            Control(
+                loop.last_answer,
+                loop.last_sample,
+                loop.last_newer,
+                loop.last_fresh,
+                -inf if command is None else command.made_at,
+                -inf if state.position is None else state.position.received,
+                self._heard_at,
+                loop.held_back,
+            ),
+            self._health(),
+            self._resets(now),
+            self._had_gps,
+            self._good_flags,
+        )
+
+    def _motion(self) -> Motion:
+        guide, loop, start = self._guide, self._loop, self._start
+        offset, velocity = None, (0.0, 0.0, 0.0)
+        if guide.motion is not None:
+            (north, east, down), velocity = guide.motion
+            if start is not None:
+                offset = north - start[0], east - start[1], down - start[2]
+        sample, idle = loop.resets.newest, loop.command is None or loop.command.idle
+        return Motion(
+            None if sample is None else sample.q,
+            (0.0, 0.0, 0.0) if sample is None else sample.body_rates,
+            offset,
+            velocity,
+            self._link.state.height,
+            guide.off_course,
+            None if idle else loop.thrust,
+            self._origin,
+        )
+
+    def _health(self) -> Health:
+        first, last = self._counted[0], self._counted[-1]
+        span = last.now - first.now
+        if span < _EARLY * _WINDOW:
+            return Health(round_trip=self._link.timesync.round_trip_s)
+        late = sum(counted.late for counted in self._counted) - first.late
+        lost = last.lost - first.lost
+        return Health(
+            lost / max(1, lost + last.frames - first.frames),
+            self._link.timesync.round_trip_s,
+            (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
+            if self._real_time
+            else None,
+            late / span,
+        )
+
+    def _resets(self, now: float) -> Resets:
+        resets = self._loop.resets
+        since = max(self._began_at, now - _WHILE)
+        return Resets(
+            sum(at > since for at in resets.times),
+            dist(resets.shift, self._shift),
+            resets.turn - self._turn,
+            resets.largest_tilt,
+        )
+
+    def _geodetic(self, start: Vector | None) -> Place | None:
+        """Latitude and longitude of where control begins, degrees; the earth is flat here."""
+        home = self._link.state.home
+        if start is None or home is None:
+            return None
+        raw = [a + b for a, b in zip(start, self._loop.resets.shift, strict=True)]
+        north, east = raw[0] - home.north, raw[1] - home.east
+        return Place(
+            home.latitude_deg + degrees(north / EARTH_RADIUS),
+            home.longitude_deg + degrees(east / (EARTH_RADIUS * cos(radians(home.latitude_deg)))),
+        )

@@ -1,0 +1,74 @@
+"""What the flight lives on: the battery, the link, and this computer's time."""
+
+from companion.flight.safety.monitor import Judge, released
+from companion.flight.safety.snapshot import Snapshot
+
+_STATUS_STALE = 5.0
+"""The battery is reported at 1 Hz at least; silence this long, in s, hides an empty one."""
+
+
+def battery(least: float) -> Judge:
+    """Less than the share `least` is left, or nobody says how much."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        told = snapshot.autopilot.battery
+        if told is None:
+            return None
+        if snapshot.now - told.received > _STATUS_STALE:
+            return "the battery's state is not reported any more"
+        if told.remaining is None or told.remaining >= least:
+            return None
+        return (
+            f"battery at {100 * told.remaining:.0f} %, below "
+            f"limits.min_battery_percent {100 * least:.0f}"
+        )
+
+    return judge
+
+
+def loss(most: float) -> Judge:
+    """A larger share than `most` of the vehicle's frames is lost on the way."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        lost = snapshot.health.lost
+        if lost is None or lost <= released(most, raised):
+            return None
+        return f"{100 * lost:.0f} % of the vehicle's frames are lost"
+
+    return judge
+
+
+def round_trip(most: float) -> Judge:
+    """A question and its answer take longer than `most`, s."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        seconds = snapshot.health.round_trip
+        if seconds is None or seconds <= released(most, raised):
+            return None
+        return f"the link's round trip takes {1e3 * seconds:.0f} ms"
+
+    return judge
+
+
+def deadlines(most: float) -> Judge:
+    """A larger share than `most` of our answers misses deadman.deadline_ms."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        missed = snapshot.health.missed
+        if missed is None or missed <= released(most, raised):
+            return None
+        return f"{100 * missed:.0f} % of the answers miss deadman.deadline_ms"
+
+    return judge
+
+
+def starvation(most: float) -> Judge:
+    """Our timer is late by a larger share of the time than `most`."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        starved = snapshot.health.starved
+        if starved is None or starved <= released(most, raised):
+            return None
+        return f"this computer has no time for us: {100 * starved:.0f} % of it are lost"
+
+    return judge
