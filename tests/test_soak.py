@@ -69,6 +69,7 @@ def test_answers_are_timed_and_missing_ones_counted():
     assert answers.figures() == {"answered": 500, "late": 4, "missing": 250}
 
 
+@pytest.mark.slow
 def test_a_short_soak(tmp_path):
     report = soak(tmp_path, 3.0, seed=3, every=1.0)
     assert report.summary["result"] == "ok"

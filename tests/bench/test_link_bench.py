@@ -64,6 +64,7 @@ def test_senseless_arguments_are_refused(seconds, rate):
         link.run(seconds, rate, as_json=True)
 
 
+@pytest.mark.slow
 def test_all_of_them_in_one_go(capsys):
     pytest.importorskip("mavsdk")
     figures = link.run(1.0, 100.0, as_json=False)

@@ -37,6 +37,7 @@ def test_without_numba_the_batches_are_in_python_and_it_is_said(monkeypatch, cap
     assert "mavlink-companion[study]" in shown
 
 
+@pytest.mark.slow
 def test_json_is_one_object_of_the_same_figures(capsys):
     pytest.importorskip("numba")
     assert cli.main(["bench", "planner", "--json", "--seconds", "0.01"]) == 0

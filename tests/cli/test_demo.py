@@ -71,6 +71,7 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
     assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.slow
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
     wire = demo.udp_wire()
     (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")

@@ -202,7 +202,13 @@ def test_a_flight_measures_what_is_configured_and_keeps_its_rates(tmp_path):
     assert len(rows) < len(asked) - 500  # on the ground and in the climb nobody obeyed
 
 
-@pytest.mark.parametrize(("direction", "age"), [("to_companion", 0.04), ("from_companion", 0.0)])
+@pytest.mark.parametrize(
+    ("direction", "age"),
+    [
+        ("to_companion", 0.04),
+        pytest.param("from_companion", 0.0, marks=pytest.mark.slow),
+    ],
+)
 def test_a_slow_link_shows_as_dead_time_and_is_warned_of_in_flight(tmp_path, direction, age):
     summary = flown(tmp_path, "corners", direction=direction)
     told = summary.as_dict()["dead_time_s"]

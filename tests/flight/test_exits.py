@@ -68,7 +68,9 @@ def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(mock, tmp_path):
     assert mock.state()["setpoints"] == count
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)]
+)
 def test_other_signals_hand_back_too(tmp_path, number):
     with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
         process = start(mock, tmp_path, "--lockstep")

@@ -133,7 +133,17 @@ MILD = [
 ]
 
 
-@pytest.mark.parametrize("fault", MILD, ids=[f["kind"] for f in MILD])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(
+            fault,
+            id=fault["kind"],
+            marks=() if fault["kind"] in ("drop", "delay") else pytest.mark.slow,
+        )
+        for fault in MILD
+    ],
+)
 def test_a_mild_fault_is_flown_through_and_counted(tmp_path, fault):
     with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
         summary = fly(mock, tmp_path / "log")

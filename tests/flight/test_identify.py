@@ -152,6 +152,7 @@ def test_no_doublet_tilts_it_far(px4):
     assert 10.0 < max(tilts) < 20.0
 
 
+@pytest.mark.slow
 def test_a_first_order_rate_loop_gives_back_its_configured_numbers(tmp_path):
     summary, vehicle = identified(tmp_path, **FIRST_ORDER)
     assert summary.result == "ok", summary.events
@@ -175,6 +176,7 @@ def test_another_vehicle_is_found_as_the_judge_finds_it(tmp_path):
         assert vehicle.axes[axis].dead_time == pytest.approx(dead_time, abs=0.005), axis
 
 
+@pytest.mark.slow
 def test_ardupilots_acceleration_limits_are_told_from_its_lags(tmp_path):
     summary, vehicle = identified(tmp_path, rate_loop="ardupilot")
     assert summary.result == "ok", summary.events

@@ -28,7 +28,13 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 
 
-@pytest.fixture(scope="module", params=LAW_NAMES)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.slow) if name in ("exact", "so3", "euler") else name
+        for name in LAW_NAMES  # exact flies as first-order does, so3 and euler as quaternion
+    ],
+)
 def flown(request, tmp_path_factory):
     """Its name, and the summary of steps north, east and along a diagonal."""
     folder = tmp_path_factory.mktemp("flight")

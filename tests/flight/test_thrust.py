@@ -133,7 +133,7 @@ def test_a_wrong_hover_thrust_costs_little_height(tmp_path, wrong_by, faults):
     assert len(told) == 1
 
 
-@pytest.mark.parametrize("exponent", [2.0, 0.0])
+@pytest.mark.parametrize("exponent", [2.0, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_battery_that_sags_costs_little_height(tmp_path, exponent):
     """Acceptance 5: the voltage falls by 15 % within 9 s, and the thrust by 28 %."""
     battery = {"capacity_ah": 0.035, "empty_cell_v": 3.57}

@@ -55,6 +55,7 @@ def test_one_seed_gives_one_log_to_the_bit(twice):
     assert rows == pytest.approx(again, nan_ok=True)
 
 
+@pytest.mark.slow
 def test_another_seed_gives_another_log(twice, tmp_path):
     """Compared as far as the first programme leads."""
     logs = [twice[0].log / "flight.tlog"]

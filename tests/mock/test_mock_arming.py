@@ -131,6 +131,7 @@ def test_the_take_off_altitude_counts_at_arming():
     assert -rig.truth.position_ned[2] > 3.5
 
 
+@pytest.mark.slow
 def test_return_goes_home_and_lands():
     rig = Rig(home={"heading_deg": 40.0})
     rig.take_off(5.0)

@@ -52,6 +52,7 @@ def fly(seed, tmp_path, *extra):
         return client.lockstep(12_000, flight(client))
 
 
+@pytest.mark.slow
 def test_a_lockstep_flight_is_the_same_to_the_bit_for_a_seed(tmp_path):
     first, again, other = (fly(seed, tmp_path) for seed in (5, 5, 6))
     assert len(first) >= 3000

@@ -76,6 +76,7 @@ def rows(out, name):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_every_model_is_timed_by_one_iteration_and_to_the_end(out):
     labels = [look.label for look in LOOKS.values()]
     table = rows(out, "nmpc")
@@ -89,6 +90,7 @@ def test_every_model_is_timed_by_one_iteration_and_to_the_end(out):
     assert len(rows(out, "nmpc-error")) == 9
 
 
+@pytest.mark.slow
 def test_from_cold_ours_converges_from_every_state(out):
     *_, ours = table = rows(out, "nmpc-cold-start")
     assert [row.pop("model") for row in table] == [look.label for look in LOOKS.values()]
@@ -97,6 +99,7 @@ def test_from_cold_ours_converges_from_every_state(out):
     assert table[0]["the wrong way"] == "inf"
 
 
+@pytest.mark.slow
 def test_the_tables_of_errors_are_those_of_the_flights(out):
     flights = rows(out, "nmpc-flights")
     assert len(flights) == 23 * RATE_HZ
@@ -112,11 +115,13 @@ def test_the_tables_of_errors_are_those_of_the_flights(out):
     assert mine == pytest.approx(fly(EIGHT, Contestant("limited"), 1.0).errors, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_whole_answer_of_the_process_takes_longer_than_its_solve(out):
     whole, solve = rows(out, "nmpc-exchange")
     assert 0.0 < float(solve["p50, ms"]) < float(whole["p50, ms"])
 
 
+@pytest.mark.slow
 def test_the_page_has_every_finding_and_the_paper_s_claim(out):
     text = (out / "nmpc.html").read_text()
     assert len(re.findall(r'class="(?:holds|fails)">', text)) == 8

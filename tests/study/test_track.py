@@ -69,6 +69,7 @@ def test_the_course_is_measured_and_nothing_else(flown):
     assert (steps == 0.0).sum() < 5  # it neither holds before nor after
 
 
+@pytest.mark.slow
 def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
     """Told without noise and without delay, the two are one."""
     names = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
@@ -93,6 +94,7 @@ def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
     assert np.array_equal(alone.path, company.path)
 
 
+@pytest.mark.slow
 def test_a_flight_that_fails_has_no_error_to_show(vehicle):
     vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 2.5}])
     tracked = flight.fly(TASKS[0])
@@ -229,6 +231,7 @@ if __name__ == "__main__":
 """The command, with flights for which it does not have to wait long."""
 
 
+@pytest.mark.slow
 def test_interrupted_it_leaves_no_vehicle_behind(tmp_path):
     command = [sys.executable, "-c", SHORT, "study", "track", "--out", str(tmp_path)]
     process = subprocess.Popen(
