@@ -26,6 +26,7 @@ from companion.mavlink.records import Heartbeat
 from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.silence import no_beacon, no_heartbeat
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate, measure, set_rates
@@ -128,7 +129,7 @@ class Link:
                     while self.state.heartbeat is None:
                         await heard.next(timeout_s)
             except TimeoutError:
-                raise LinkTimeout(_why_silent(self.settings, self.stats, timeout_s)) from None
+                raise LinkTimeout(no_heartbeat(self.settings, self.stats, timeout_s)) from None
             finally:
                 unsubscribe()
         if self.state.unsupported is not None:
@@ -301,41 +302,15 @@ class Link:
         self._tasks.append(task)
 
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
-        timeout_s = self.settings.first_beacon_timeout_s
         # A vehicle that waits to be spoken to (udpout, TCP) hears us by this.
         send_heartbeat(self.settings, self._outbox)
         try:
-            async with asyncio.timeout(timeout_s):
+            async with asyncio.timeout(self.settings.first_beacon_timeout_s):
                 await lockstep.first_beacon
         except TimeoutError:
-            start = f"no lockstep beacon within {timeout_s:g} s"
-            why = f"{start} on {self.settings.endpoint}; is the vehicle running, and in lockstep?"
-            raise LinkTimeout(_refused(start, self.stats) or why) from None
+            raise LinkTimeout(no_beacon(self.settings, self.stats)) from None
 
 
 def _log_failure(task: asyncio.Task[None]) -> None:
     if not task.cancelled() and task.exception() is not None:
         _LOG.error("a task of the link failed", exc_info=task.exception())
-
-
-def _why_silent(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
-    start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    refused = _refused(start, stats)
-    if refused is not None:
-        return refused
-    if stats.bad_crc:
-        return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
-    return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"
-
-
-def _refused(start: str, stats: LinkStats) -> str | None:
-    """What came instead and was refused, `None` if nothing was."""
-    if stats.ignored_foreign:
-        source = "/".join(map(str, min(stats.foreign_sources)))
-        return (
-            f"{start}, but {stats.ignored_foreign} frames from others, such as system/component "
-            f"{source}; is link.target_system right?"
-        )
-    if stats.bad_signature:
-        return f"{start}, but {stats.bad_signature} frames not signed with our key"
-    return None
