@@ -33,9 +33,9 @@ def _missing(rule: ParameterRule, family: str) -> Finding:
     return Finding(
         rule.name,
         Verdict.UNSAFE,
-        f"the autopilot has no parameter {rule.name}",
+        f"the autopilot has no parameter {rule.name}, or did not tell it",
         f"it cannot be known {rule.meaning}",
-        f"this needs a newer version of {family}",
+        f"mend the link; where it has none, this needs a newer version of {family}",
         rule.source,
     )
 

@@ -74,6 +74,19 @@ class Flight:
         if not self._end.done():
             self._end.set_result(ended)
 
+    def fail(self, error: Exception) -> None:
+        """A fault of ours beside the phases ends the flight; an ending under way goes on.
+
+        It then goes on without our stream, which may be what is at fault.
+        """
+        reason = f"internal error: {error!r}"
+        if self.failed_in is None:
+            self.end(FlightEnded(reason))
+            return
+        self._rig.release()
+        if all(text != reason for _, text in self.events):
+            self.note(reason)
+
     def interrupt(self, reason: str) -> None:
         """The user wants out: hold if we fly, else whatever the phase needs.
 
@@ -143,17 +156,26 @@ class Flight:
 
     async def _leave(self, exit_: Exit) -> None:
         """Do with the vehicle what the ending asks for; what fails here is told, not raised."""
-        self.note(exit_.value)
-        self._end = self._new_end()
-        config = self._rig.config.flight
         try:
-            for phase in exit_phases(config, exit_):
-                await self._fly(phase)
+            await self._exit(exit_)
             if exit_ is Exit.HOLD and self._interrupted and await self._told_to_land():
-                for phase in exit_phases(config, Exit.LAND):
-                    await self._fly(phase)
+                await self._exit(Exit.LAND)
         except FlightEnded as ended:
             self.note(ended.reason)
+
+    async def _exit(self, exit_: Exit) -> None:
+        """Fly an ending; where a phase of it fails, the ending which that phase says for that."""
+        self.note(exit_.value)
+        self._end = self._new_end()
+        try:
+            for phase in exit_phases(self._rig.config.flight, exit_):
+                await self._fly(phase)
+        except FlightEnded as ended:
+            then = ended.exit or self._usual_exit()
+            if then in (exit_, Exit.LEAVE, Exit.LET_GO):
+                raise
+            self.note(ended.reason)
+            await self._exit(then)
 
     async def _told_to_land(self) -> bool:
         """Ask the user; somebody else may take the vehicle while the answer is thought over."""
@@ -164,7 +186,7 @@ class Flight:
         try:
             await work()
         except Exception as error:
-            self.end(FlightEnded(f"internal error: {error!r}", Exit.LAND))
+            self.fail(error)
 
     async def _judge(self) -> None:
         while True:
@@ -172,6 +194,8 @@ class Flight:
                 self._watch.judge(self.phase)
             except FlightEnded as ended:
                 self.end(ended)
+            except Exception as error:  # the watch goes on: an ending needs it, too
+                self.fail(error)
             await asyncio.sleep(_WATCH_PERIOD)
 
     async def _tell(self) -> None:

@@ -98,7 +98,7 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
     return {
         Exit.LEAVE: (),
         Exit.LET_GO: (),
-        Exit.DISARM: (Phase("disarm", "the motors to stop", preparation.undo_arming, _SHORT),),
+        Exit.DISARM: (_undo_arming(),),
         Exit.HOLD: (_hand_back(),),
         Exit.LAND: (_land(config), _disarm()),
     }[exit_]
@@ -122,6 +122,18 @@ def _land(config: FlightConfig) -> Phase:
         procedures.land,
         config.landing_timeout_s,
         modes=_AIRBORNE | {Role.OFFBOARD, Role.LAND},
+    )
+
+
+def _undo_arming() -> Phase:
+    """Where it is refused, the vehicle flies after all."""
+    return Phase(
+        "disarm",
+        "the motors to stop",
+        preparation.undo_arming,
+        _SHORT,
+        Exit.LAND,
+        on_failure_landed=Exit.LEAVE,
     )
 
 

@@ -118,9 +118,10 @@ def _tell_dead_man(rig: Rig, values: Values) -> None:
     """Tell what the autopilot would do without our setpoints."""
     family = rig.link.family
     dead_man = family.dead_man
-    seconds = values.get(dead_man.parameter, dead_man.default)
+    seconds = values.get(dead_man.parameter)
+    how_long = "a time that is not known" if seconds is None else f"{seconds:g} s"
     rig.note(
-        f"should our setpoints stop, {family.name} holds the last rates for {seconds:g} s "
+        f"should our setpoints stop, {family.name} holds the last rates for {how_long} "
         f"({dead_man.parameter}); then {dead_man.then}"
     )
 

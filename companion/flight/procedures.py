@@ -124,20 +124,25 @@ async def disarm(rig: Rig) -> None:
 
 
 def _stop_moving(rig: Rig) -> None:
-    if rig.loop.guarded:
+    if not rig.loop.guarded:
+        return
+    try:
         rig.loop.plan_anew()  # the estimator may have jumped
         rig.guide.hold_here()
+    except Exception as error:  # whatever is wrong with guidance, the autopilot must be asked
+        rig.note(f"internal error: {error!r}")
+        rig.release()
 
 
 async def _take_over(rig: Rig) -> None:
     """Have our setpoints obeyed: by a command, or by the first of them."""
+    # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
+    await rig.until(lambda: _commands_flight(rig), "a target from guidance")
     command = rig.link.family.take_over()
     if command is not None:
         rig.detail = "the autopilot to enter offboard"
         await rig.link.command(*command)
         return
-    # The first setpoint counts: it must not be an idle one of the time on the ground.
-    await rig.until(lambda: _commands_flight(rig), "a target from guidance")
     rig.loop.on = True
 
 

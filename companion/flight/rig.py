@@ -63,14 +63,21 @@ class Rig:
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that is newer than this call; asked for, or the next one due."""
         began = asyncio.get_running_loop().time()
-        with suppress(LinkError):  # an autopilot that does not send it on demand sends it anyway
-            await self.link.request_message("HEARTBEAT")
 
         def newer() -> bool:
             heartbeat = self.link.state.heartbeat
             return heartbeat is not None and heartbeat.received >= began
 
-        await self.until(newer)
+        # One that comes by itself is as good: a lost answer must not keep us waiting.
+        question = asyncio.create_task(self._ask_heartbeat())
+        try:
+            await self.until(newer)
+        finally:
+            question.cancel()
+
+    async def _ask_heartbeat(self) -> None:
+        with suppress(LinkError):  # an autopilot that does not send it on demand sends it anyway
+            await self.link.request_message("HEARTBEAT")
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, unless it is stale."""

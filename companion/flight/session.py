@@ -11,7 +11,6 @@ from companion import realtime
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.chronicle import Chronicle
-from companion.flight.ending import FlightEnded
 from companion.flight.flight import AskLanding
 from companion.flight.observer import Observer
 from companion.mavlink.link import Link
@@ -102,7 +101,7 @@ class Session:
                 dead_time_watch.after_answer(sample.received)
 
         link.on_attitude = on_attitude
-        link.on_error = lambda error: flight.end(FlightEnded(f"internal error: {error!r}"))
+        link.on_error = flight.fail
         chronicle = Chronicle(link.state, flight.note)
 
         def on_heartbeat(_: object) -> None:

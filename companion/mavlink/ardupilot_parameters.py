@@ -64,7 +64,7 @@ def _ground_station(value: float, values: Values, setup: Setup) -> Complaint | N
         INEFFECTIVE,
         f"our own heartbeat, of system {setup.source_system}, counts as the ground station's, so "
         "that its loss is not noticed",
-        255.0,
+        255.0 if setup.source_system != 255 else None,
     )
 
 
@@ -134,7 +134,13 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         _MEASURED,
         vital=True,
     ),
-    ParameterRule(("GUID_TIMEOUT",), "for how long the last rates are held", rates_held, _MEASURED),
+    ParameterRule(
+        ("GUID_TIMEOUT",),
+        "for how long the last rates are held",
+        rates_held,
+        _MEASURED,
+        vital=True,
+    ),
     ParameterRule(
         ("ATC_RATE_FF_ENAB",),
         "whether body rates are fed forward",

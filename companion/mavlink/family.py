@@ -17,12 +17,10 @@ class DeadMan(NamedTuple):
 
     Attributes:
         parameter: Sets for how long, in s, it holds the last rates; see `AutopilotFamily`.
-        default: Its value unless somebody changed it, s.
         then: What follows, in words.
     """
 
     parameter: str
-    default: float
     then: str
 
 

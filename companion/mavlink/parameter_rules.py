@@ -81,8 +81,8 @@ class ParameterRule:
         meaning: What it decides, one clause.
         check: Judges it; `None` is a value that is as it should be.
         source: Where this is known from.
-        vital: Without it nobody can know how a setpoint is obeyed, so a vehicle that has it not is
-            not flown.
+        vital: Without it nobody can know how a setpoint is obeyed, or for how long, so a vehicle
+            that does not tell it is not flown.
         reboot: A change counts only after the autopilot was started anew.
     """
 

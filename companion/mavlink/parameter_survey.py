@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from companion.mavlink.errors import UnknownParameter
+from companion.mavlink.errors import ParameterRefused, UnknownParameter
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import ParameterRule, Values
 
@@ -44,7 +44,7 @@ async def survey(
             for name in rule.names:
                 try:
                     value = await link.read_parameter(name, timeout_s=timeout_s, retries=retries)
-                except UnknownParameter:
+                except (ParameterRefused, UnknownParameter):
                     continue
                 return name, float(value)
         return None

@@ -87,7 +87,7 @@ class Px4:
         }
     )
     interval_step_us = 1
-    dead_man = DeadMan("COM_OF_LOSS_T", 1.0, "it does what COM_OBL_RC_ACT says")
+    dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says")
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
@@ -119,8 +119,8 @@ class Px4:
         return None
 
     def arm(self) -> tuple[Command, ...]:
-        """Arm, with all checks; the take-off comes with a mode of its own."""
-        return (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),)
+        """Into AUTO.LOITER, whatever the sticks had chosen, and arm with all checks."""
+        return (self.hold(), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
 
     def disarm(self) -> Command:
         """Disarm on the ground; in the air it is refused."""

@@ -68,7 +68,7 @@ def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | Non
         INEFFECTIVE,
         f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
         "allows",
-        60.0,
+        max(60.0, degrees(setup.max_tilt) + _OVERSHOOT),
     )
 
 
@@ -83,7 +83,11 @@ def _signing(value: float, _: Values, setup: Setup) -> Complaint | None:
 
 PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
-        ("COM_OF_LOSS_T",), "for how long the last rates are held", rates_held, _MEASURED
+        ("COM_OF_LOSS_T",),
+        "for how long the last rates are held",
+        rates_held,
+        _MEASURED,
+        vital=True,
     ),
     ParameterRule(
         ("COM_OBL_RC_ACT",),

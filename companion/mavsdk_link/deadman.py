@@ -10,9 +10,12 @@ it is told to stop. Two things stop it when no new setpoint comes:
   so it waits with its next repetition at the latest.
 """
 
+import logging
 import threading
 from collections.abc import Callable
 from time import monotonic
+
+_LOG = logging.getLogger(__name__)
 
 SILENCE_LIMIT_S = 0.15
 """Without a new setpoint for this long MAVSDK is stopped; no sample period flown on is longer."""
@@ -50,7 +53,10 @@ class Deadman:
         while not self._closing.wait(_LOOK_PERIOD_S):
             last = self._last
             if last is not None and monotonic() - last > SILENCE_LIMIT_S:
-                self._stop_sending(SILENCE_LIMIT_S)
+                try:
+                    self._stop_sending(SILENCE_LIMIT_S)
+                except Exception:  # the next look tries again: this thread must not end
+                    _LOG.exception("MAVSDK could not be stopped from repeating the last setpoint")
 
     def _stop_sending(self, silence: float = 0.0) -> None:
         with self._lock:

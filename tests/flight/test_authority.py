@@ -6,11 +6,18 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 
+from companion.flight.ending import Exit
 from companion.flight.guide import Guide
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
+from companion.mavlink.command import (
+    MAV_CMD_COMPONENT_ARM_DISARM,
+    MAV_CMD_DO_SET_MODE,
+    Command,
+)
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.link import Link
+from companion.mavlink.px4 import Px4
 from tests.flight.fly import fly, mock_vehicle, session_for
 
 
@@ -287,4 +294,44 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, 
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert not mock.state()["crashed"]
+    assert summary.result == "ok", summary.events
+
+
+def test_a_hold_that_is_refused_becomes_a_landing(tmp_path, monkeypatch):
+    """Interrupted, and the autopilot does not hold: it must not be left to its last rates."""
+    monkeypatch.setattr(Px4, "hold", lambda _: Command(MAV_CMD_DO_SET_MODE, 1.0, 99.0))
+    monkeypatch.setattr(Px4, "arm", lambda _: (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("programme", lambda: session.interrupt("Ctrl-C"), after=1.0)
+        session = session_for(mock, tmp_path / "log", observer)
+        summary = lockstep.run(session.fly())
+        state = mock.state()
+    said = [text for _, text in summary.events]
+    assert said.index(Exit.HOLD.value) < said.index(Exit.LAND.value)
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def test_an_error_at_every_sample_does_not_stop_the_landing(tmp_path, monkeypatch):
+    """Guidance and the sample's path are broken for good: the autopilot still is asked to land."""
+
+    def broken(*_):
+        raise ZeroDivisionError("a fault of ours")
+
+    def breaks():
+        monkeypatch.setattr(Guide, "hold_here", broken)
+        monkeypatch.setattr(Guide, "note_attitude", broken)
+
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("programme", breaks, after=1.0)
+        session = session_for(mock, tmp_path / "log", observer)
+        summary = lockstep.run(session.fly())
+        state = mock.state()
+    assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
+    assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
+
+
+def test_the_vehicle_is_armed_in_a_mode_of_ours(tmp_path):
+    """With the sticks in POSCTL before the checks, as a transmitter leaves it."""
+    with mock_vehicle(tmp_path, faults=[{"kind": "pilot_takeover", "at_s": 0.1}]) as mock:
+        summary = fly(mock, tmp_path / "log", hover={"duration_s": 1.0})
     assert summary.result == "ok", summary.events

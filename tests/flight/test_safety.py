@@ -99,8 +99,8 @@ BREACHES = [
     ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
-    ("deadlines", health(missed=0.3), HAND_BACK, 0.5, "30 % of the answers"),
-    ("starvation", health(starved=0.6), HAND_BACK, 0.5, "60 %"),
+    ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the answers"),
+    ("starvation", health(starved=0.6), HAND_BACK, 1.5, "60 %"),
 ]
 
 

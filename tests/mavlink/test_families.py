@@ -46,7 +46,7 @@ def test_what_a_heartbeat_means_to_a_flight(family, base_mode, custom_mode, name
 def test_px4_speaks_px4():
     assert PX4.set_mode("AUTO.LOITER")[:4] == PX4.hold()[:4] == (176, 1.0, 4.0, 3.0)
     assert PX4.take_over()[:4] == (176, 1.0, 6.0, 0.0)
-    assert [command[:2] for command in PX4.arm()] == [(400, 1.0)]
+    assert [command[:3] for command in PX4.arm()] == [(176, 1.0, 4.0), (400, 1.0, 0.0)]
     assert PX4.disarm()[:2] == (400, 0.0)
     assert PX4.land()[0] == 21
     take_off = PX4.take_off(10.0, 489.4)

@@ -4,6 +4,7 @@ from collections import deque
 from math import cos, degrees, dist, inf, radians
 from typing import NamedTuple
 
+from companion.attitude.representation import wrap_angle
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
 from companion.flight.safety.estimate import GPS_FIX_3D
@@ -163,7 +164,7 @@ class Lookout:
         return Resets(
             sum(at > since for at in resets.times),
             dist(resets.shift, self._shift),
-            resets.turn - self._turn,
+            wrap_angle(resets.turn - self._turn),
             resets.largest_tilt,
         )
 

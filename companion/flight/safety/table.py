@@ -76,8 +76,9 @@ def _means(config: Config) -> tuple[Monitor, ...]:
     return (
         Monitor("link loss", resources.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
-        Monitor("deadlines", resources.deadlines(safety.max_missed), computer, lasts=0.5),
-        Monitor("starvation", resources.starvation(safety.max_starved), computer, lasts=0.5),
+        # Longer than the second that is looked at: one stall of the computer is no breach.
+        Monitor("deadlines", resources.deadlines(safety.max_missed), computer, lasts=1.5),
+        Monitor("starvation", resources.starvation(safety.max_starved), computer, lasts=1.5),
     )
 
 
