@@ -55,8 +55,8 @@ def _termination(value: float, values: Values, setup: Setup) -> Complaint | None
     return Complaint(
         UNSAFE,
         f"a tilt of {min(angles):g}° (FD_FAIL_R, FD_FAIL_P) stops the motors, and "
-        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}",
-        float(_TERMINATION_OFF),
+        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; raise them, lower it, or switch "
+        f"termination off ({_TERMINATION_OFF})",
     )
 
 
@@ -106,9 +106,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_RC_OVERRIDE",),
         "whether the pilot's sticks take the vehicle from us (before 1.18)",
-        bit_set(
-            INEFFECTIVE, 2, "moving the sticks does not end offboard; only the mode switch does"
-        ),
+        bit_set(INEFFECTIVE, 2, _STICKS_DO_NOTHING),
         _REFERENCE,
     ),
     ParameterRule(

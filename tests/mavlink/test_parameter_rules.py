@@ -126,7 +126,7 @@ def test_a_good_vehicle_is_found_good_by_every_rule(family):
         (PX4, {"GF_ACTION": 4.0}, UNSAFE, 2.0),
         (PX4, {"COM_LOW_BAT_ACT": 0.0}, INEFFECTIVE, 3.0),
         (PX4, {"CBRK_SUPPLY_CHK": 894281.0}, INEFFECTIVE, 0.0),
-        (PX4, {"CBRK_FLIGHTTERM": 0.0, "FD_FAIL_P": 45.0}, UNSAFE, 121212.0),
+        (PX4, {"CBRK_FLIGHTTERM": 0.0, "FD_FAIL_P": 45.0}, UNSAFE, None),
         (PX4, {"FD_FAIL_R": 30.0}, INEFFECTIVE, 60.0),
         (ARDUPILOT, {"GUID_OPTIONS": 5.0}, UNSAFE, 13.0),
         (ARDUPILOT, {"ATC_ANGLE_BOOST": 1.0}, UNSAFE, 0.0),
