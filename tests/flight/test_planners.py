@@ -97,7 +97,7 @@ def shipped_vehicle(loop):
     return yaml.safe_load((CONFIGS / f"vehicle-{loop}.yaml").read_text())["vehicle"]
 
 
-@pytest.mark.parametrize("loop", ["px4", "ardupilot"])
+@pytest.mark.parametrize("loop", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
 def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop, tmp_path):
     """By the flight's own table; and nearest to second order with a dead time."""
     across, away = {}, {}

@@ -158,6 +158,7 @@ def test_a_battery_that_drops_at_once_costs_little_height(tmp_path):
     assert error[time > 6.5].max() < 0.08
 
 
+@pytest.mark.slow
 def test_vertical_gusts_cost_little_height(tmp_path):
     with mock_vehicle(tmp_path, wind={"vertical_gust_m_s": 0.5}, **SPARSE) as mock:
         summary = fly(mock, tmp_path / "flight", hover={"duration_s": 12.0})

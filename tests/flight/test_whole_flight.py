@@ -84,6 +84,7 @@ def test_the_log_holds_both_directions_and_every_setpoint(twice):
     assert all(0.0 <= answer.thrust <= 0.9 for answer in answers)
 
 
+@pytest.mark.slow
 def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
     settings = {
         "wind": {"speed_m_s": 2.0, "from_deg": 40.0, "gust_m_s": 0.7, "vertical_gust_m_s": 0.3},

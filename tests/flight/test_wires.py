@@ -12,11 +12,11 @@ WIRES = {"udp": None, "tcp": "tcp://127.0.0.1:1", "serial": "serial:///dev/any:9
     ("autopilot", "wire", "signs"),
     [  # each pair of two of the three
         ("px4", "udp", True),
-        ("px4", "tcp", False),
+        pytest.param("px4", "tcp", False, marks=pytest.mark.slow),
         ("px4", "serial", True),
         ("ardupilot", "udp", False),
         ("ardupilot", "tcp", True),
-        ("ardupilot", "serial", False),
+        pytest.param("ardupilot", "serial", False, marks=pytest.mark.slow),
     ],
 )
 def test_the_same_flight_over_each_wire(autopilot, wire, signs, tmp_path):

@@ -33,7 +33,9 @@ def trace_of(tau, bend=0.0):
     return trace
 
 
-@pytest.mark.parametrize("tau", [0.1, 0.2, 0.34])
+@pytest.mark.parametrize(
+    "tau", [0.2, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.1, 0.34))]
+)
 def test_time_constants_are_recovered(tau):
     response = measure_response(trace_of(tau).response_rows(), gain=1 / tau)
     assert response.time_constant_north_s == pytest.approx(tau, rel=1e-3)

@@ -51,6 +51,7 @@ def vehicle(tmp_path, monkeypatch):
     return changed
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_followed_closely_only_if_led(flown):
     led, not_led, windy = (flown[0][task] for task in TASKS)
     assert led.ok
@@ -60,6 +61,7 @@ def test_a_trajectory_is_followed_closely_only_if_led(flown):
     assert 2.0 * led.told.rms < windy.told.rms < 0.15
 
 
+@pytest.mark.slow
 def test_the_course_is_measured_and_nothing_else(flown):
     path = flown[0][TASKS[0]].path
     assert np.ptp(path[:, :2], axis=0) == pytest.approx([6.0, 3.0], abs=0.01)
@@ -79,6 +81,7 @@ def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
     assert tracked.true.rms < 0.03
 
 
+@pytest.mark.slow
 def test_each_flight_is_told_as_it_begins(flown):
     assert flown[1] == [
         "figure-eight, 4 m/s, model-following",
