@@ -30,7 +30,8 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         sys.stderr.write(f"sitl_mock: {error}\n")
         return EXIT_USAGE
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have us begin with SIGINT ignored
+        signal.signal(number, _interrupt)
     for server in servers:
         sys.stdout.write(f"ready on {server.where}\n")
     sys.stdout.flush()
