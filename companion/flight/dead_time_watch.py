@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.flight.ending import internal
 from companion.identification import dead_time_by_correlation
 from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
@@ -84,7 +85,7 @@ class DeadTimeWatch:
             self._look()
         except Exception as error:  # what only watches must not end a flight
             self._due = inf
-            self._note(f"the dead time is watched no more: internal error: {error!r}")
+            self._note(f"the dead time is watched no more: {internal(error)}")
 
     def _look(self) -> None:
         self._note_ages()

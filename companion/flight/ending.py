@@ -25,3 +25,8 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
         super().__init__(reason)
         self.reason = reason
         self.exit = exit
+
+
+def internal(error: Exception) -> str:
+    """A fault of ours, in words."""
+    return f"internal error: {error!r}"

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from typing import Any
 
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.ending import Exit, FlightEnded, internal
 from companion.flight.observer import Observer
 from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
 from companion.flight.rig import Rig
@@ -79,7 +79,7 @@ class Flight:
 
         It then goes on without our stream, which may be what is at fault.
         """
-        reason = f"internal error: {error!r}"
+        reason = internal(error)
         if self.failed_in is None:
             self.end(FlightEnded(reason))
             return
@@ -144,7 +144,7 @@ class Flight:
         except LinkError as error:
             raise FlightEnded(str(error)) from error
         except Exception as error:
-            raise FlightEnded(f"internal error: {error!r}") from error
+            raise FlightEnded(internal(error)) from error
         finally:
             await _cancelled(task)
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.ending import Exit, FlightEnded, internal
 from companion.flight.rig import Rig
 from companion.flight.roles import require_role, roles_of
 from companion.mavlink.roles import Role
@@ -130,7 +130,7 @@ def _stop_moving(rig: Rig) -> None:
         rig.loop.plan_anew()  # the estimator may have jumped
         rig.guide.hold_here()
     except Exception as error:  # whatever is wrong with guidance, the autopilot must be asked
-        rig.note(f"internal error: {error!r}")
+        rig.note(internal(error))
         rig.release()
 
 
