@@ -1,13 +1,12 @@
 """The messages that tell how the vehicle and its autopilot are, in ArduCopter's conventions."""
 
 from collections.abc import Callable
-from math import hypot
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.ardupilot_modes import MODE_NUMBERS, base_mode
-from sitl_mock.geodesy import Origin, to_geodetic
+from sitl_mock.geodesy import Origin
 from sitl_mock.personality import Identity
 from sitl_mock.state import NAN, State
 from sitl_mock.system_telemetry import NO_VALUE, SystemTelemetry
@@ -22,8 +21,6 @@ _SENSORS_HEALTHY = 1467063343
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
-_PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
-_GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
 _EKF_GOOD = 0x33F
 _EKF_NO_POSITION = (
     ardupilotmega.EKF_ATTITUDE
@@ -102,15 +99,10 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         state, battery = self._state, self._vehicle.battery
         working = _HEIGHT_CONTROL if state.height_controlled else 0
         working |= _POSITION_CONTROL if state.position_controlled else 0
-        health = _SENSORS_HEALTHY | working
-        if state.prearm_problem is not None:
-            health &= ~_PREARM_CHECK
-        if not state.gps_ok:
-            health &= ~_GPS_SENSOR
         return dialect.MAVLink_sys_status_message(
             _SENSORS_PRESENT,
             _SENSORS_ENABLED | working | (_LOGGING if state.armed else 0),
-            health,
+            self._healthy(_SENSORS_HEALTHY | working),
             0,
             clip(battery.voltage_v * 1e3, 15),
             clip(battery.current_a * 1e2, 15),
@@ -142,24 +134,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         state = self._state
         if not state.gps_ok or not self._initialised():
             return dialect.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, NO_VALUE, NO_VALUE, 0, 0, 0)
-        place = to_geodetic(self._origin, state.estimate.position_ned)
-        altitude_mm = round(place.altitude_m * 1e3)
-        vx, vy, _ = state.estimate.velocity_ned
-        return dialect.MAVLink_gps_raw_int_message(
-            state.shown_us,
-            dialect.GPS_FIX_TYPE_RTK_FIXED,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            altitude_mm,
-            121,
-            200,
-            clip(hypot(vx, vy) * 100, 15),
-            0,
-            10,
-            altitude_mm,
-            300,
-            300,
-        )
+        return self._gps_fix(dialect.GPS_FIX_TYPE_RTK_FIXED, (121, 200), 0, (300, 300))
 
     def ekf_status_report(self) -> Message:
         """Return EKF_STATUS_REPORT with the recorded flags and typical variances."""

@@ -1,10 +1,8 @@
 """The messages that tell how the vehicle and its autopilot are, in PX4's conventions."""
 
-from math import hypot
-
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.geodesy import Origin, to_geodetic
+from sitl_mock.geodesy import Origin
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.personality import Identity
 from sitl_mock.px4_modes import base_mode, custom_mode, standard_mode
@@ -18,8 +16,6 @@ from sitl_mock.wire import Message
 _SENSORS_PRESENT = 50380847
 _SENSORS_ENABLED = 50446383
 _SENSORS_HEALTHY = 320915519
-_PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
-_GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
 _ESTIMATOR_GOOD = 895
 _ESTIMATOR_ON_GROUND = 1023
 _ESTIMATOR_NO_POSITION = 164
@@ -99,16 +95,11 @@ class Px4SystemTelemetry(SystemTelemetry):
 
     def sys_status(self) -> Message:
         """Return SYS_STATUS; the prearm bit is what clients call armable."""
-        state, battery = self._state, self._vehicle.battery
-        health = _SENSORS_HEALTHY
-        if state.prearm_problem is not None:
-            health &= ~_PREARM_CHECK
-        if not state.gps_ok:
-            health &= ~_GPS_SENSOR
+        battery = self._vehicle.battery
         return dialect.MAVLink_sys_status_message(
             _SENSORS_PRESENT,
             _SENSORS_ENABLED,
-            health,
+            self._healthy(_SENSORS_HEALTHY),
             100,
             clip(battery.voltage_v * 1e3, 15),
             clip(battery.current_a * 1e2, 15),
@@ -141,25 +132,7 @@ class Px4SystemTelemetry(SystemTelemetry):
             return dialect.MAVLink_gps_raw_int_message(
                 time_us, 0, 0, 0, 0, NO_VALUE, NO_VALUE, NO_VALUE, NO_VALUE, 0
             )
-        place = to_geodetic(self._origin, state.estimate.position_ned)
-        altitude_mm = round(place.altitude_m * 1e3)
-        vx, vy, _ = state.estimate.velocity_ned
-        return dialect.MAVLink_gps_raw_int_message(
-            time_us,
-            dialect.GPS_FIX_TYPE_3D_FIX,
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            altitude_mm,
-            70,
-            110,
-            clip(hypot(vx, vy) * 100, 15),
-            NO_VALUE,
-            10,
-            altitude_mm,
-            900,
-            1780,
-            400,
-        )
+        return self._gps_fix(dialect.GPS_FIX_TYPE_3D_FIX, (70, 110), NO_VALUE, (900, 1780, 400))
 
     def estimator_status(self) -> Message:
         """Return ESTIMATOR_STATUS with the recorded flags and typical ratios."""

@@ -1,16 +1,20 @@
 """The messages about the vehicle and its autopilot that every family builds alike."""
 
+from math import hypot
+
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.geodesy import Origin, to_geodetic
 from sitl_mock.personality import Identity
 from sitl_mock.quaternion import Quaternion
 from sitl_mock.state import State
-from sitl_mock.telemetry import Builder
+from sitl_mock.telemetry import Builder, clip
 from sitl_mock.wire import Message
 
 UNIX_AT_BOOT_US = 1_795_236_148_441_838
 """SYSTEM_TIME's wall clock at boot: fixed, so that a run repeats to the bit."""
+_PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
+_GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
 NO_VALUE = 65535
 """An unsigned 16-bit field that tells nothing."""
 
@@ -44,6 +48,36 @@ class SystemTelemetry:
     def extended_sys_state(self) -> Message:
         """Return EXTENDED_SYS_STATE."""
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
+
+    def _healthy(self, sensors: int) -> int:
+        """Return the health bits of SYS_STATUS: ``sensors``, less what fails just now."""
+        if self._state.prearm_problem is not None:
+            sensors &= ~_PREARM_CHECK
+        if not self._state.gps_ok:
+            sensors &= ~_GPS_SENSOR
+        return sensors
+
+    def _gps_fix(
+        self, fix: int, dilutions: tuple[int, int], course: int, accuracies: tuple[int, ...]
+    ) -> Message:
+        """Return GPS_RAW_INT at the estimated place; the rest in its own units."""
+        state = self._state
+        place = to_geodetic(self._origin, state.estimate.position_ned)
+        altitude_mm = round(place.altitude_m * 1e3)
+        vx, vy, _ = state.estimate.velocity_ned
+        return dialect.MAVLink_gps_raw_int_message(
+            state.shown_us,
+            fix,
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            altitude_mm,
+            *dilutions,
+            clip(hypot(vx, vy) * 100, 15),
+            course,
+            10,
+            altitude_mm,
+            *accuracies,
+        )
 
     def home_position(self) -> Message | None:
         """Return HOME_POSITION."""

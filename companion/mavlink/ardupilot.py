@@ -16,7 +16,7 @@ from companion.mavlink.command import (
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
-from companion.mavlink.family import DeadMan
+from companion.mavlink.family import FLIGHT_RATES, DeadMan
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.roles import Role
 
@@ -57,14 +57,7 @@ class ArduPilot:
     # Silent until asked. ODOMETRY it does not send, so there is no count of estimator resets.
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
-            "HEARTBEAT": 10.0,
-            "ATTITUDE_QUATERNION": 250.0,
-            "LOCAL_POSITION_NED": 50.0,
-            "EXTENDED_SYS_STATE": 5.0,
-            "ATTITUDE_TARGET": 10.0,
-            "SYS_STATUS": 5.0,
-            "BATTERY_STATUS": 1.0,
-            "GPS_RAW_INT": 5.0,
+            **FLIGHT_RATES,
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer

@@ -4,6 +4,7 @@ A further family is one new file beside `px4.py` and `ardupilot.py`, and its lin
 """
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from companion.mavlink.command import Command
@@ -22,6 +23,22 @@ class DeadMan(NamedTuple):
 
     parameter: str
     then: str
+
+
+FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
+    {
+        # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
+        "HEARTBEAT": 10.0,
+        "ATTITUDE_QUATERNION": 250.0,
+        "LOCAL_POSITION_NED": 50.0,
+        "EXTENDED_SYS_STATE": 5.0,
+        "ATTITUDE_TARGET": 10.0,
+        "SYS_STATUS": 5.0,
+        "BATTERY_STATUS": 1.0,
+        "GPS_RAW_INT": 5.0,
+    }
+)
+"""What a flight needs of any autopilot, with the rate to ask for, Hz."""
 
 
 class AutopilotFamily(Protocol):

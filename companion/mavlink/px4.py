@@ -15,7 +15,7 @@ from companion.mavlink.command import (
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
-from companion.mavlink.family import DeadMan
+from companion.mavlink.family import FLIGHT_RATES, DeadMan
 from companion.mavlink.px4_parameters import PX4_PARAMETERS
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.roles import Role
@@ -72,15 +72,7 @@ class Px4:
     # 800 Hz loop 196; asked 400 Hz they give 191 and 392.
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
-            # PX4 tells its mode at 1 Hz; a pilot who takes over should not have to wait for that.
-            "HEARTBEAT": 10.0,
-            "ATTITUDE_QUATERNION": 250.0,
-            "LOCAL_POSITION_NED": 50.0,
-            "EXTENDED_SYS_STATE": 5.0,
-            "ATTITUDE_TARGET": 10.0,
-            "SYS_STATUS": 5.0,
-            "BATTERY_STATUS": 1.0,
-            "GPS_RAW_INT": 5.0,
+            **FLIGHT_RATES,
             "ESTIMATOR_STATUS": 5.0,
             "HOME_POSITION": 1.0,
             "ODOMETRY": 10.0,
