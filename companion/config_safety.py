@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from companion.config_sections import NotNegative, Positive, Share
+from companion.guidance.fence import inside
 from companion.yaml_file import Section
 
 Ending = Literal["hand_back", "land"]
@@ -37,7 +38,7 @@ class SafetyConfig(Section):
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
-    """GPS lost in flight, or the estimator has lost attitude, velocity or position."""
+    """GPS lost, the estimator without attitude, velocity or position, or neither told for 5 s."""
     max_reset_m: Positive = 1.0
     """The estimator's position may jump so far in one flight; references move along with it."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 45.0
@@ -73,7 +74,7 @@ class SafetyConfig(Section):
     max_starved: Share = 0.5
     """Share of a second by which our own timer may be late: the computer gives us no time."""
     computer_action: Any = "hand_back"
-    """More of either for 0.5 s."""
+    """More of either for 1.5 s."""
 
     @model_validator(mode="after")
     def _consistent(self) -> "SafetyConfig":
@@ -84,4 +85,6 @@ class SafetyConfig(Section):
                 raise ValueError("a polygon has at least three corners")
         if any(abs(lat) > 85.0 or abs(lon) > 180.0 for lat, lon in self.fence_polygon_deg):
             raise ValueError("fence_polygon_deg: corners are [latitude, longitude] in degrees")
+        if self.fence_polygon_m and not inside(0.0, 0.0, self.fence_polygon_m):
+            raise ValueError("fence_polygon_m: [0, 0], where control begins, lies outside")
         return self

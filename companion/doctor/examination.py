@@ -16,6 +16,7 @@ CHECKS: tuple[Check, ...] = (
     vehicle_checks.power,
     vehicle_checks.readiness,
     vehicle_checks.estimator,
+    vehicle_checks.fence,
     link_checks.company,
     link_checks.signing,
     link_checks.streams,

@@ -36,6 +36,7 @@ class Key(StrEnum):
     OUR_IDS = "link.our_ids"
     SECOND_COMPANION = "link.second_companion"
     OTHER_SETPOINTS = "link.other_setpoints"
+    FENCE = "safety.fence_polygon_deg"
     PLANNER = "planner.name"
     DEAD_TIME = "vehicle.dead_time_ms"
     ACCEPT = "flight.accept"

@@ -43,7 +43,7 @@ class UndoFile:
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
         began = datetime.now(UTC)
-        self.path = directory / f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}.yaml"
+        self.path = _unused(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
         self._undo = Undo(
             autopilot=link.family.name,
             system=link.settings.target_system,
@@ -53,12 +53,13 @@ class UndoFile:
         )
 
     def add(self, parameter: str, old: float) -> None:
-        """Note an old value; on the disk, whole, when this returns.
+        """Note an old value; on the disk, whole, when this returns. The first one counts.
 
         Raises:
             ConfigError: it cannot be written, so nothing must be set.
         """
-        grown = {**self._undo.parameters, parameter: old}
+        grown = dict(self._undo.parameters)
+        grown.setdefault(parameter, old)
         self._undo = self._undo.model_copy(update={"parameters": grown})
         text = yaml.safe_dump(self._undo.model_dump(), sort_keys=False)
         part = self.path.with_suffix(".part")
@@ -69,8 +70,27 @@ class UndoFile:
                 file.flush()
                 os.fsync(file.fileno())
             part.replace(self.path)
+            _sync(self.path.parent)
         except OSError as error:
             raise ConfigError(
                 f"recording.directory: the undo file {self.path} cannot be written, so nothing "
                 f"more is set: {error.strerror}"
             ) from error
+
+
+def _unused(directory: Path, name: str) -> Path:
+    """A file that is not there yet: another run may have begun within the same second."""
+    path, number = directory / f"{name}.yaml", 1
+    while path.exists():
+        number += 1
+        path = directory / f"{name}-{number}.yaml"
+    return path
+
+
+def _sync(directory: Path) -> None:
+    """Have the file's new name on the disk, too."""
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.config import Config
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
+from companion.guidance.fence import Place, inside, local_polygon
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.state import VehicleState
 
@@ -28,8 +29,18 @@ def armed(state: VehicleState) -> Finding:
 
 def battery(config: Config, state: VehicleState) -> Finding:
     """Whether there is charge enough, as far as the vehicle tells."""
-    remaining, least = state.battery_remaining, config.limits.min_battery_percent
+    remaining = None if state.battery is None else state.battery.remaining
+    least = config.limits.min_battery_percent
     source = "BATTERY_STATUS, SYS_STATUS"
+    if state.battery_silent:
+        return Finding(
+            Key.BATTERY,
+            UNSAFE,
+            "the vehicle does not tell its battery's state any more",
+            "an empty one would not be noticed",
+            "find what holds the messages up",
+            source,
+        )
     if remaining is None:
         return Finding(
             Key.BATTERY,
@@ -98,6 +109,36 @@ def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "wait until compass and GPS have settled",
             "ODOMETRY reset_counter",
         )
+
+
+def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether it stands inside a fence that is given by latitude and longitude."""
+    corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
+    if not corners:
+        return
+    source = "GLOBAL_POSITION_INT"
+    if told is None:
+        yield Finding(
+            Key.FENCE,
+            UNSAFE,
+            "the vehicle does not tell its latitude and longitude",
+            "whether it is inside safety.fence_polygon_deg cannot be known",
+            "wait for GPS, or give safety.fence_polygon_m instead",
+            source,
+        )
+        return
+    here = Place(told.latitude_deg, told.longitude_deg)
+    if inside(0.0, 0.0, local_polygon(corners, here)):
+        yield Finding(Key.FENCE, SAFE, "it stands inside its fence", source=source)
+        return
+    yield Finding(
+        Key.FENCE,
+        UNSAFE,
+        f"it stands at {here.latitude:.5f}, {here.longitude:.5f}, outside safety.fence_polygon_deg",
+        "the flight would end as soon as it began",
+        "carry it inside, or mend the corners: each is [latitude, longitude]",
+        source,
+    )
 
 
 def version(_: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -84,6 +84,10 @@ class EstimatorResets:
             self._find_way(before, position)
         return position._replace(position_ned=_less(position.position_ned, self.shift))
 
+    def forget(self) -> None:
+        """Nothing is anchored to the estimate yet, as on the ground: what it says now is true."""
+        self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
+
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`: it also tells of resets too small to be found."""
         if counter is not None and self._counter not in (None, counter):

@@ -143,6 +143,7 @@ class Guide:
         # it true.
         if self._state.landed and not self._loop.guarded:
             self.learning.stand()
+            self._loop.resets.forget()
             self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
             return
         position = self._loop.resets.without_jumps(position)

@@ -11,7 +11,8 @@ from companion.flight.rig import Rig
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.roles import Role
 
-_AIRBORNE = frozenset({Role.TAKEOFF, Role.HOLD})
+_RISING = frozenset({Role.TAKEOFF, Role.READY})
+_AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _SHORT = 10.0
 """For what the autopilot does at once or not at all, s."""
 
@@ -67,7 +68,7 @@ def flight_phases(
             config.takeoff_timeout_s,
             Exit.LAND,
             on_failure_landed=Exit.DISARM,
-            modes=_AIRBORNE,
+            modes=_RISING,
         ),
         Phase(
             "offboard",
@@ -75,7 +76,7 @@ def flight_phases(
             procedures.offboard,
             _SHORT,
             Exit.LAND,
-            modes=_AIRBORNE | {Role.OFFBOARD},
+            modes=_RISING | {Role.OFFBOARD},
             monitored=True,
         ),
         Phase(

@@ -5,6 +5,7 @@ import asyncio
 from companion.flight.ending import Exit, FlightEnded, internal
 from companion.flight.rig import Rig
 from companion.flight.roles import require_role, roles_of
+from companion.mavlink.errors import CommandRefused
 from companion.mavlink.roles import Role
 
 _SETTLING = 1.0
@@ -16,6 +17,15 @@ _REACHED = 0.5
 _STOPPED = 1.5
 """Height below the wanted one at which a hold is somebody's wish and not the climb's end, m."""
 
+_ON_GROUND = 1.5
+"""Height above home that may be read on the ground, m: the estimate drifts."""
+
+_LIFTS_OFF = 3.0
+"""After its command, until the autopilot says that it does not stand any more, s."""
+
+_ENTERED = 1.0
+"""A mode whose command was accepted shows in a heartbeat within so long, s, or was left again."""
+
 _SELF_DISARM = 8.0
 """How long the autopilot may take to disarm itself after landing, s."""
 
@@ -25,11 +35,9 @@ async def takeoff(rig: Rig) -> None:
     state, height = rig.link.state, rig.config.flight.takeoff_height_m
     await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
     await rig.fresh_heartbeat()
-    require_role(rig.link, {Role.HOLD, Role.TAKEOFF})
-    if not (state.landed and state.armed):
-        raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
+    _require_ground(rig)
     rig.detail = "the autopilot to accept the take-off"
-    await rig.link.command(*rig.link.family.take_off(height, _home_altitude(rig)))
+    await _ask_for_take_off(rig)
     climbing = False
 
     def reached() -> bool:
@@ -54,10 +62,8 @@ async def offboard(rig: Rig) -> None:
     rig.lookout.begin(asyncio.get_running_loop().time())
     # The mode we know may be a second old; never take the vehicle from a pilot who took it.
     await rig.fresh_heartbeat()
-    require_role(rig.link, {Role.TAKEOFF, Role.HOLD})
+    require_role(rig.link, {Role.READY})
     await _take_over(rig)
-    rig.detail = "the autopilot to obey our rates"
-    await rig.until(lambda: _in(rig, Role.OFFBOARD))
     rig.guide.hold_here()
     rig.loop.guarded = True
     await asyncio.sleep(_SETTLING)
@@ -88,7 +94,7 @@ async def hand_back(rig: Rig) -> None:
         # Control stood still, and what was heard since may be old: who has the vehicle now?
         rig.detail = "the autopilot's mode"
         await rig.fresh_heartbeat()
-        require_role(rig.link, {Role.TAKEOFF, Role.HOLD, Role.OFFBOARD})
+        require_role(rig.link, {Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
     rig.detail = "the autopilot to hold"
     await rig.link.command(*rig.link.family.hold())
     await rig.until(lambda: _in(rig, Role.HOLD))
@@ -134,16 +140,59 @@ def _stop_moving(rig: Rig) -> None:
         rig.release()
 
 
+def _require_ground(rig: Rig) -> None:
+    """See that it stands ready for the take-off, and that heights mean what they should."""
+    state = rig.link.state
+    require_role(rig.link, {Role.READY})
+    if not (state.landed and state.armed):
+        raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
+    if state.height is not None and abs(state.height) > _ON_GROUND:
+        raise FlightEnded(
+            f"the vehicle stands {state.height:.1f} m above home by what it says, so take-off "
+            "height and limits.fence_floor_m would be wrong; have the autopilot set home here"
+        )
+
+
+async def _ask_for_take_off(rig: Rig) -> None:
+    try:
+        await rig.link.command(
+            *rig.link.family.take_off(rig.config.flight.takeoff_height_m, _home_altitude(rig))
+        )
+    except CommandRefused as refused:
+        if not refused.repeated:
+            raise
+        # The answer to the first may be lost, and one that flies already refuses the second.
+        try:
+            async with asyncio.timeout(_LIFTS_OFF):
+                await rig.until(lambda: not rig.link.state.landed)
+        except TimeoutError:
+            raise refused from None
+
+
 async def _take_over(rig: Rig) -> None:
     """Have our setpoints obeyed: by a command, or by the first of them."""
     # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
     await rig.until(lambda: _commands_flight(rig), "a target from guidance")
     command = rig.link.family.take_over()
-    if command is not None:
-        rig.detail = "the autopilot to enter offboard"
-        await rig.link.command(*command)
+    if command is None:
+        rig.loop.on = True
+        await rig.until(lambda: _in(rig, Role.OFFBOARD), "the autopilot to obey our rates")
         return
-    rig.loop.on = True
+    rig.detail = "the autopilot to enter offboard"
+    await rig.link.command(*command)
+    accepted = asyncio.get_running_loop().time()
+
+    def obeyed() -> bool:
+        heartbeat = rig.link.state.heartbeat
+        if _in(rig, Role.OFFBOARD):
+            return True
+        if heartbeat is not None and heartbeat.received > accepted + _ENTERED:
+            raise FlightEnded(
+                f"offboard was accepted and left again, not by us: {heartbeat.mode}", Exit.LET_GO
+            )
+        return False
+
+    await rig.until(obeyed, "the autopilot to obey our rates")
 
 
 def _commands_flight(rig: Rig) -> bool:

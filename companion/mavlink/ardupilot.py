@@ -34,7 +34,7 @@ _MODES: dict[str, int] = {
 _NAMES = {number: name for name, number in _MODES.items()}
 _BY_RATES = "GUIDED by rates"
 _ROLES = {
-    "GUIDED": frozenset({Role.TAKEOFF, Role.HOLD}),
+    "GUIDED": frozenset({Role.TAKEOFF, Role.READY}),
     _BY_RATES: frozenset({Role.OFFBOARD}),
     "BRAKE": frozenset({Role.HOLD}),
     "LAND": frozenset({Role.LAND}),
@@ -44,7 +44,7 @@ _ROLES = {
 class ArduPilot:
     """ArduCopter's member of `AutopilotFamily`.
 
-    GUIDED is take-off, hold and offboard at once. The first setpoint ends the one before, so none
+    GUIDED is take-off and offboard at once. The first setpoint ends the one before, so none
     may leave while it climbs. Which of them it does is told by the guided bit of `base_mode`: it
     says that the position controller runs, and so clears while body rates are obeyed.
     """

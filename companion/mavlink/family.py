@@ -36,6 +36,7 @@ FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
         "SYS_STATUS": 5.0,
         "BATTERY_STATUS": 1.0,
         "GPS_RAW_INT": 5.0,
+        "GLOBAL_POSITION_INT": 5.0,
     }
 )
 """What a flight needs of any autopilot, with the rate to ask for, Hz."""

@@ -2,42 +2,34 @@
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 from companion.attitude.types import BodyRates
-from companion.mavlink.codec import Message, message_id
-from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
-from companion.mavlink.commands import CommandClient
 from companion.mavlink.connection import Connection
+from companion.mavlink.conversation import Conversation
 from companion.mavlink.endpoint import parse_endpoint
-from companion.mavlink.errors import LinkError, LinkTimeout, NotConnected
-from companion.mavlink.family import AutopilotFamily
+from companion.mavlink.errors import LinkError, LinkTimeout
 from companion.mavlink.framing import Frame
 from companion.mavlink.inbox import Inbox, Notice
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.parameters import ParameterClient
-from companion.mavlink.pending import Pending, PendingRegistry
+from companion.mavlink.pending import Pending
 from companion.mavlink.presence import send_heartbeat, send_heartbeats, synchronise
-from companion.mavlink.px4_events import EventReader
 from companion.mavlink.records import Heartbeat
-from companion.mavlink.router import Router, Unsubscribe
+from companion.mavlink.router import Router
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.silence import no_beacon, no_heartbeat
-from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.streams import StreamRate, measure, set_rates
-from companion.mavlink.texts import TextAssembler
 from companion.mavlink.timesync import TimeSync
 from companion.mavlink.transport import Tap
 
 _LOG = logging.getLogger(__name__)
 
 
-class Link:
+class Link(Conversation):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
     It sends a heartbeat, keeps the clocks compared and opens a dropped connection again. It never
@@ -69,19 +61,12 @@ class Link:
     ) -> None:
         endpoint = parse_endpoint(settings.endpoint)
         self._loop = asyncio.get_running_loop()
-        self._registry = PendingRegistry()
         self._tasks: list[asyncio.Task[None]] = []
-        self.settings = settings
-        self.stats = LinkStats()
-        texts = TextAssembler()
-        self._router = router = Router(self.stats)
-        self._inbox = Inbox(settings, self.stats, router, tap, notice)
-        self._outbox = outbox = Outbox(settings, self.stats, tap)
-        self.state = VehicleState(router, self.stats, texts, self._loop.time)
-        router.subscribe_raw("EVENT", EventReader(texts, self._loop.time).take)
+        stats = LinkStats()
+        router, outbox = Router(stats), Outbox(settings, stats, tap)
+        super().__init__(settings, outbox, router, stats, self._loop.time)
+        self._inbox = Inbox(settings, stats, router, tap, notice)
         self.timesync = TimeSync(outbox, router, self._loop.time)
-        self._commands = CommandClient(settings, outbox, router, self._registry, texts)
-        self._parameters = ParameterClient(settings, outbox, router, self._registry)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
@@ -135,15 +120,7 @@ class Link:
         if self.state.unsupported is not None:
             raise self.state.unsupported
         assert self.state.heartbeat is not None
-        self._parameters.bytewise = self.family.bytewise_parameters
         return self.state.heartbeat
-
-    @property
-    def family(self) -> AutopilotFamily:
-        """How to speak to this autopilot. Raises `NotConnected` before its first heartbeat."""
-        if self.state.family is None:
-            raise NotConnected("no heartbeat yet; wait_connected() comes first")
-        return self.state.family
 
     @property
     def local_address(self) -> tuple[str, int] | None:
@@ -200,95 +177,8 @@ class Link:
             return True
         return self._outbox.setpoint(time_boot_ms, rates, thrust)
 
-    # --- conversation
-
-    def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each message of that name; call the result to end it.
-
-        Raises:
-            UnknownMessage: The dialect has no such message.
-        """
-        return self._router.subscribe(name, callback)
-
-    def send(self, message: Message) -> bool:
-        """Send any pymavlink message now; false if it could not leave."""
-        return self._outbox.message(message)
-
-    async def command(
-        self,
-        command: int,
-        *params: float,
-        timeout_s: float = 1.0,
-        retries: int = 3,
-    ) -> None:
-        """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
-
-        Raises:
-            CommandRefused: With the result and the autopilot's own words.
-            CommandTimeout: No answer after `retries` repetitions.
-            LinkLost: The connection dropped meanwhile.
-        """
-        await self._commands.send(command, params, timeout_s, retries)
-
-    async def request_message(self, name: str, *, timeout_s: float = 1.0) -> Message:
-        """Ask once for a message and return it.
-
-        Raises:
-            UnknownMessage: The dialect has no such message.
-            CommandRefused: The autopilot does not give it.
-            LinkTimeout: It was promised but did not come.
-            LinkLost: The connection dropped meanwhile.
-        """
-        with Pending[Message](self._registry) as answers:
-            unsubscribe = self._router.subscribe(name, answers.put)
-            try:
-                await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
-                return await answers.next(timeout_s)
-            except TimeoutError:
-                raise LinkTimeout(f"{name} was promised but did not come") from None
-            finally:
-                unsubscribe()
-
-    async def read_parameter(
-        self, name: str, *, timeout_s: float = 1.0, retries: int = 3
-    ) -> float | int:
-        """Read a parameter of the autopilot.
-
-        Raises:
-            UnknownParameter: It has none of that name.
-            LinkLost: The connection dropped meanwhile.
-        """
-        return await self._parameters.read(name, timeout_s, retries)
-
-    async def write_parameter(
-        self, name: str, value: float, *, timeout_s: float = 1.0, retries: int = 3
-    ) -> float | int:
-        """Write a parameter, in its own type, and return what the autopilot then holds.
-
-        Raises:
-            UnknownParameter: It has none of that name.
-            ParameterRefused: It cannot hold that value, or keeps another.
-            LinkLost: The connection dropped meanwhile.
-        """
-        return await self._parameters.write(name, value, timeout_s, retries)
-
-    async def set_rates(
-        self, rates: Mapping[str, float], *, window_s: float = 1.0
-    ) -> dict[str, StreamRate]:
-        """Ask for message rates in Hz (0 stops one) and count what comes for `window_s`.
-
-        Raises:
-            NotConnected: The autopilot was not heard yet.
-            UnknownMessage: A name is not in the dialect; nothing was sent then.
-            CommandTimeout: The autopilot did not answer a request.
-            LinkLost: The connection dropped meanwhile.
-        """
-        step_us = self.family.interval_step_us
-        return await set_rates(self._commands, self.stats, rates, window_s, step_us)
-
-    async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:
-        """Rates in Hz at which messages arrive, counted over `window_s`."""
-        return await measure(self.stats, names, window_s)
+    def quiet(self) -> None:
+        """See that nothing repeats a setpoint any more; here nothing ever does."""
 
     # --- inside
 

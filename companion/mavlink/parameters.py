@@ -6,6 +6,7 @@ patterns are NaNs that a float would not carry faithfully, so the field is handl
 
 import asyncio
 import struct
+from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
@@ -45,17 +46,26 @@ class _Refusal(NamedTuple):
 class ParameterClient:
     """Reads and writes single parameters.
 
-    Attributes:
-        bytewise: Integers travel as bytes (PX4) rather than as a number in a float (ArduPilot).
+    Args:
+        settings: Where the vehicle is and who we are.
+        outbox: Takes the questions.
+        router: Brings the answers.
+        registry: Ends the waiting when the connection drops.
+        bytewise: Whether integers travel as bytes (PX4) rather than as a number in a float.
     """
 
     def __init__(
-        self, settings: LinkSettings, outbox: Outbox, router: Router, registry: PendingRegistry
+        self,
+        settings: LinkSettings,
+        outbox: Outbox,
+        router: Router,
+        registry: PendingRegistry,
+        bytewise: Callable[[], bool],
     ) -> None:
         self._settings, self._outbox, self._registry = settings, outbox, registry
         self._waiting: dict[str, Pending[_Value | _Refusal]] = {}
         self._locks: dict[str, asyncio.Lock] = {}
-        self.bytewise = True
+        self._bytewise = bytewise
         router.subscribe_raw("PARAM_VALUE", self._on_value)
         router.subscribe("PARAM_ERROR", self._on_error)
 
@@ -132,7 +142,7 @@ class ParameterClient:
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
 
     def _number(self, value: _Value) -> float | int:
-        if self.bytewise and value.kind in _INTEGERS:
+        if self._bytewise() and value.kind in _INTEGERS:
             integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
@@ -148,7 +158,7 @@ class ParameterClient:
                 raise ParameterRefused(f"{name} is an integer and cannot hold {value}")
             # Packed either way, so that the range of the integer type is checked either way.
             packed = struct.pack(_INTEGERS[kind], int(value))
-            return packed if self.bytewise else struct.pack("<f", value)
+            return packed if self._bytewise() else struct.pack("<f", value)
         except (struct.error, OverflowError, ValueError) as error:
             raise ParameterRefused(f"{name} cannot hold {value}: {error}") from error
 

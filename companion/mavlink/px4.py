@@ -47,8 +47,8 @@ _MODES = {
 }
 _NAMES = {number: name for name, number in _MODES.items()}
 _ROLES = {
-    "AUTO.TAKEOFF": frozenset({Role.TAKEOFF}),
-    "AUTO.LOITER": frozenset({Role.HOLD}),
+    "AUTO.TAKEOFF": frozenset({Role.TAKEOFF, Role.READY}),
+    "AUTO.LOITER": frozenset({Role.HOLD, Role.READY}),
     "OFFBOARD": frozenset({Role.OFFBOARD}),
     "AUTO.LAND": frozenset({Role.LAND}),
 }

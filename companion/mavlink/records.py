@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 
+LASTS = 5.0
+"""What is told once a second or more often, and was not for so long, s, is not known any more."""
+
 
 class Heartbeat(NamedTuple):
     """HEARTBEAT of the autopilot.
@@ -41,6 +44,32 @@ class LocalPosition(NamedTuple):
     vehicle_time: float
     position_ned: Vector
     velocity_ned: Vector
+
+
+class Landed(NamedTuple):
+    """EXTENDED_SYS_STATE.
+
+    Attributes:
+        received: Event-loop time, s.
+        state: MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing.
+    """
+
+    received: float
+    state: int
+
+
+class GlobalPosition(NamedTuple):
+    """GLOBAL_POSITION_INT.
+
+    Attributes:
+        received: Event-loop time, s.
+        latitude_deg: WGS84.
+        longitude_deg: WGS84.
+    """
+
+    received: float
+    latitude_deg: float
+    longitude_deg: float
 
 
 class Battery(NamedTuple):
@@ -94,7 +123,6 @@ class Home(NamedTuple):
         longitude_deg: WGS84.
         altitude_m: Above mean sea level, m.
         down: In the local frame of LOCAL_POSITION_NED, m.
-        north, east: The same.
     """
 
     received: float
@@ -102,8 +130,6 @@ class Home(NamedTuple):
     longitude_deg: float
     altitude_m: float
     down: float
-    north: float = 0.0
-    east: float = 0.0
 
 
 class Estimator(NamedTuple):

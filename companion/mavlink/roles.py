@@ -7,6 +7,8 @@ class Role(Enum):
     """What a flight passes through; a mode that plays none of these is somebody else's doing."""
 
     TAKEOFF = "take-off"
+    READY = "ready"
+    """Our rates may be obeyed from here on."""
     HOLD = "hold"
     OFFBOARD = "offboard"
     LAND = "land"

@@ -10,11 +10,14 @@ from companion.mavlink.families import family_for
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
+    LASTS,
     Battery,
     Estimator,
+    GlobalPosition,
     Gps,
     Heartbeat,
     Home,
+    Landed,
     LocalPosition,
     ToldThrust,
     Vector,
@@ -34,10 +37,11 @@ LANDED_ON_GROUND, LANDED_TAKEOFF = 1, 3
 @dataclass
 class _Values:
     heartbeat: Heartbeat | None = None
-    landed_state: int | None = None
+    landed_state: Landed | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
     told_thrust: ToldThrust | None = None
+    global_position: GlobalPosition | None = None
     gps: Gps | None = None
     home: Home | None = None
     estimator: Estimator | None = None
@@ -50,10 +54,11 @@ class VehicleState(_Values):
 
     Attributes:
         heartbeat: See `Heartbeat`.
-        landed_state: MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing.
+        landed_state: See `Landed`; `landed` and `taking_off` heed its age.
         position: See `LocalPosition`.
         battery: See `Battery`.
         told_thrust: See `ToldThrust`.
+        global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
         gps: See `Gps`.
         home: See `Home`.
         estimator: See `Estimator`.
@@ -79,6 +84,7 @@ class VehicleState(_Values):
             "SYS_STATUS": self._on_sys_status,
             "BATTERY_STATUS": self._on_battery,
             "ATTITUDE_TARGET": self._on_attitude_target,
+            "GLOBAL_POSITION_INT": self._on_global_position,
             "GPS_RAW_INT": self._on_gps,
             "HOME_POSITION": self._on_home,
             "ESTIMATOR_STATUS": self._on_estimator,
@@ -106,17 +112,17 @@ class VehicleState(_Values):
     @property
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground; unknown is not landed."""
-        return self.landed_state == LANDED_ON_GROUND
+        return self._landed_state() == LANDED_ON_GROUND
 
     @property
     def taking_off(self) -> bool:
         """Whether the autopilot says that its take-off is not over yet."""
-        return self.landed_state == LANDED_TAKEOFF
+        return self._landed_state() == LANDED_TAKEOFF
 
     @property
-    def battery_remaining(self) -> float | None:
-        """Remaining charge as a share, 0..1; `None` if it is not told."""
-        return self.battery.remaining if self.battery else None
+    def battery_silent(self) -> bool:
+        """Whether the battery was told of, and is not any more."""
+        return self.battery is not None and self._clock() - self.battery.received > LASTS
 
     @property
     def height(self) -> float | None:
@@ -169,7 +175,11 @@ class VehicleState(_Values):
         )
 
     def _on_extended_sys_state(self, message: Message) -> None:
-        self.landed_state = message.landed_state
+        self.landed_state = Landed(self._clock(), message.landed_state)
+
+    def _landed_state(self) -> int | None:
+        told = self.landed_state
+        return None if told is None or self._clock() - told.received > LASTS else told.state
 
     def _on_local_position(self, message: Message) -> None:
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
@@ -206,13 +216,18 @@ class VehicleState(_Values):
         elif not isfinite(message.thrust):
             self._stats.non_finite += 1
 
+    def _on_global_position(self, message: Message) -> None:
+        if message.lat == message.lon == 0:
+            return  # ArduPilot sends zeros until it knows
+        self.global_position = GlobalPosition(self._clock(), message.lat / 1e7, message.lon / 1e7)
+
     def _on_gps(self, message: Message) -> None:
         seen = message.satellites_visible
         satellites = None if seen == 255 else seen
         self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
 
     def _on_home(self, message: Message) -> None:
-        if not all(map(isfinite, (message.x, message.y, message.z))):
+        if not isfinite(message.z):
             self._stats.non_finite += 1
             return
         self.home = Home(
@@ -221,8 +236,6 @@ class VehicleState(_Values):
             message.longitude / 1e7,
             message.altitude / 1000.0,
             message.z,
-            message.x,
-            message.y,
         )
 
     def _on_estimator(self, message: Message) -> None:

@@ -43,24 +43,25 @@ class Deadman:
             self._last = monotonic()
             send()
 
+    def end(self, silence: float = 0.0) -> None:
+        """Stop the repeating now, unless a setpoint was sent in the last `silence` s."""
+        with self._lock:
+            if self._last is None or monotonic() - self._last < silence:
+                return  # one was sent while the lock was waited for
+            self._stop()
+            self._last = None
+
     def close(self) -> None:
         """Stop the repeating, and the thread."""
         self._closing.set()
         self._thread.join()
-        self._stop_sending()
+        self.end()
 
     def _watch(self) -> None:
         while not self._closing.wait(_LOOK_PERIOD_S):
             last = self._last
             if last is not None and monotonic() - last > SILENCE_LIMIT_S:
                 try:
-                    self._stop_sending(SILENCE_LIMIT_S)
+                    self.end(SILENCE_LIMIT_S)
                 except Exception:  # the next look tries again: this thread must not end
                     _LOG.exception("MAVSDK could not be stopped from repeating the last setpoint")
-
-    def _stop_sending(self, silence: float = 0.0) -> None:
-        with self._lock:
-            if self._last is None or monotonic() - self._last < silence:
-                return  # one was sent while the lock was waited for
-            self._stop()
-            self._last = None

@@ -84,6 +84,11 @@ class MavsdkLink(Link):
             return False
         return self._setpoints.send(in_degrees, thrust)
 
+    def quiet(self) -> None:
+        """Have MAVSDK repeat no setpoint any more."""
+        if self._setpoints is not None:
+            self._setpoints.end()
+
     def _vehicle_known(self) -> bool:
         if self._setpoints is None and self._transport is not None:
             system = self._transport.system(self.settings.target_system)

@@ -44,6 +44,10 @@ class OffboardSetpoints:
             return False
         return True
 
+    def end(self) -> None:
+        """Send nothing more until the next `send`."""
+        self._deadman.end()
+
     def close(self) -> None:
         """Stop for good."""
         self._deadman.close()

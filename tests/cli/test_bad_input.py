@@ -46,6 +46,10 @@ def config(tmp_path, text):
         ("link: {source_component: 1}", "the autopilot's own"),
         ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),
         ("limits: {fence_floor_m: 4.8}", "fence_floor_m must be at least 0.5 m below"),
+        (
+            "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
+            "[0, 0], where control begins, lies outside",
+        ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "too fast for circle.radius_m"),
         ("circle: {radius_m: 26}", "leaves limits.fence_radius_m"),

@@ -17,6 +17,7 @@ from companion.mavlink.families import family_for
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.readiness import Readiness
+from companion.mavlink.records import Battery, GlobalPosition
 from companion.mavlink.streams import StreamRate
 from tests.doctor.patients import amiss
 
@@ -32,7 +33,9 @@ def state(**changes):
     told = {
         "armed": False,
         "failsafe": False,
-        "battery_remaining": 0.9,
+        "battery": Battery(0.0, 16.0, 0.9),
+        "battery_silent": False,
+        "global_position": GlobalPosition(0.0, 47.0, 8.0),
         "readiness": READY,
         "estimator": SimpleNamespace(flags=0x3FF),
     }
@@ -162,8 +165,10 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
     ("changes", "expected"),
     [
         ({"armed": True}, {Key.ARMED: UNSAFE}),
-        ({"battery_remaining": None}, {Key.BATTERY: INEFFECTIVE}),
-        ({"battery_remaining": 0.19}, {Key.BATTERY: UNSAFE}),
+        ({"battery": None}, {Key.BATTERY: INEFFECTIVE}),
+        ({"battery": Battery(0.0, 16.0, None)}, {Key.BATTERY: INEFFECTIVE}),
+        ({"battery": Battery(0.0, 16.0, 0.19)}, {Key.BATTERY: UNSAFE}),
+        ({"battery_silent": True}, {Key.BATTERY: UNSAFE}),
         ({"failsafe": True}, {Key.FAILSAFE: UNSAFE}),
         ({"readiness": READY._replace(home=False)}, {Key.READY: INEFFECTIVE}),
     ],
@@ -171,6 +176,26 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
 def test_the_state_of_the_vehicle(changes, expected):
     evidence = replace(GOOD, state=state(**changes))
     assert amiss(examine(CONFIG, evidence)) == expected
+
+
+SQUARE = [(46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999)]
+
+
+@pytest.mark.parametrize(
+    ("place", "verdict"),
+    [
+        (GlobalPosition(0.0, 47.0, 8.0), None),
+        (GlobalPosition(0.0, 8.0, 47.0), UNSAFE),  # latitude and longitude confused
+        (GlobalPosition(0.0, 47.0, 8.0011), UNSAFE),
+        (None, UNSAFE),
+    ],
+)
+def test_a_fence_on_the_map_must_have_the_vehicle_inside(place, verdict):
+    fenced = changed(CONFIG, {"safety": {"fence_polygon_deg": SQUARE}}, "test")
+    evidence = replace(GOOD, state=state(global_position=place))
+    expected = {} if verdict is None else {Key.FENCE: verdict}
+    assert found(vehicle_checks.fence, evidence, fenced) == expected
+    assert found(vehicle_checks.fence, evidence) == {}
 
 
 def test_an_estimate_that_jumps_and_an_autopilot_that_does_not_say_what_it_is():

@@ -99,6 +99,20 @@ def test_the_old_value_is_on_the_disk_before_the_new_one_is_set(tmp_path):
     assert list(told) == ["autopilot", "system", "uid", "time", "parameters"]
 
 
+def test_the_first_value_of_a_parameter_is_kept_and_no_other_runs_file_is_touched(
+    tmp_path,
+):
+    paths = set()
+    for _ in range(3):  # within one second, most likely
+        link = FakeLink(tmp_path, A=5.0)
+        undo = UndoFile(tmp_path, link, Identity())
+        undo.add("A", 5.0)
+        undo.add("A", 1.0)
+        assert load(undo.path, Undo).parameters == {"A": 5.0}
+        paths.add(undo.path)
+    assert len(paths) == 3
+
+
 def test_a_refused_write_and_one_that_does_not_hold_are_told_and_the_rest_goes_on(tmp_path):
     link = FakeLink(tmp_path, A=5.0, B=2.0, C=7.0)
     link.locked.add("A")

@@ -4,7 +4,9 @@ import pytest
 import yaml
 from pymavlink import mavutil
 
+from companion.mavlink.commands import CommandClient
 from tests.flight.fly import CONFIGS, fly, mock_vehicle
+from tests.flight.others import When, station
 
 VEHICLE = yaml.safe_load((CONFIGS / "vehicle-ardupilot.yaml").read_text())
 PROGRAMME = {
@@ -109,6 +111,40 @@ def test_a_pilot_who_takes_over_is_not_fought(tmp_path):
     assert summary.result == "the pilot or another station took over: mode LOITER"
     assert commands(summary) == [SET_MODE, ARM, TAKE_OFF]
     assert (state["armed"], state["mode"]) == (True, "LOITER")
+
+
+def test_a_take_off_whose_answer_was_lost_is_flown_though_its_repetition_is_refused(
+    tmp_path, monkeypatch
+):
+    acks, heard, sent = [], CommandClient._on_ack, CommandClient.send
+
+    def hear(client, message):
+        if message.command == TAKE_OFF[0]:
+            acks.append(message.result)
+            if len(acks) == 1:
+                return
+        heard(client, message)
+
+    def send(client, command, params, timeout_s, retries):
+        # It lifts off 2.3 s after its command; repeated before that, it is accepted again.
+        longer = 4.0 if command == TAKE_OFF[0] else timeout_s
+        return sent(client, command, params, longer, retries)
+
+    monkeypatch.setattr(CommandClient, "_on_ack", hear)
+    monkeypatch.setattr(CommandClient, "send", send)
+    with mock_vehicle(tmp_path, autopilot="ardupilot") as mock:
+        summary = fly(mock, tmp_path / "log")
+    assert acks == [0, 4]  # MAV_RESULT: accepted, failed
+    assert summary.result == "ok", summary.events
+
+
+def test_a_pilot_who_brakes_in_the_climb_is_not_fought(tmp_path):
+    with mock_vehicle(tmp_path, autopilot="ardupilot") as mock:
+        observer = When("takeoff", lambda: station(mock, *SET_MODE, BRAKE), after=1.0)
+        summary = fly(mock, tmp_path / "log", observer)
+        assert mock.state()["mode"] == "BRAKE"
+    assert summary.result == "the pilot or another station took over: mode BRAKE"
+    assert commands(summary) == [SET_MODE, ARM, TAKE_OFF]
 
 
 def test_without_telemetry_nothing_is_sent_and_the_autopilot_levels_by_itself(tmp_path):

@@ -1,10 +1,9 @@
 """Who may do what: the user interrupts, the pilot arms and takes over, the fence holds."""
 
-import socket
+from math import inf
 
 import pytest
 from pymavlink import mavutil
-from pymavlink.dialects.v20 import common
 
 from companion.flight.ending import Exit
 from companion.flight.guide import Guide
@@ -18,28 +17,10 @@ from companion.mavlink.command import (
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.link import Link
 from companion.mavlink.px4 import Px4
+from companion.mavlink.records import Landed
+from companion.mavlink.state import VehicleState
 from tests.flight.fly import fly, mock_vehicle, session_for
-
-
-class When(Silent):
-    """Calls `action` once, when `phase` has been waiting for `after` seconds."""
-
-    def __init__(self, phase, action, after=0.0):
-        self.wanted, self.action, self.after, self.phases = phase, action, after, []
-
-    def phase(self, name, waits_for):
-        self.phases.append(name)
-        if self.after == 0.0:
-            self._act(name)
-
-    def waiting(self, name, detail, elapsed, timeout):
-        if elapsed >= self.after:
-            self._act(name)
-
-    def _act(self, name):
-        if name == self.wanted and self.action is not None:
-            action, self.action = self.action, None
-            action()
+from tests.flight.others import When, station
 
 
 class OnEvent(Silent):
@@ -145,7 +126,7 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
     """An autopilot that calls a flying vehicle landed must not get thrust 0 for it."""
 
     def claim():
-        session._assembled.rig.link.state.landed_state = 1
+        session._assembled.rig.link.state.landed_state = Landed(inf, 1)
 
     with mock_vehicle(tmp_path) as mock:
         observer = When("programme", claim, after=2.0)
@@ -201,6 +182,26 @@ def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
     assert [command for _, command, _ in commands(summary)][-1] == TAKEOFF
 
 
+def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
+    """As if a pilot's switch came between our command and the next heartbeat."""
+    monkeypatch.setattr(Px4, "take_over", Px4.hold)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert mock.state()["mode"] == "LOITER"
+    assert summary.result == "offboard was accepted and left again, not by us: AUTO.LOITER"
+    assert commands(summary)[-1][1] == SET_MODE  # nothing is commanded any more
+
+
+def test_a_vehicle_whose_home_is_elsewhere_is_not_taken_off_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(VehicleState, "height", -12.0)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        state = mock.state()
+    assert "stands -12.0 m above home" in summary.result
+    assert (state["armed"], state["on_ground"]) == (False, True)
+    assert TAKEOFF not in [command for _, command, _ in commands(summary)]
+
+
 def test_a_link_that_is_always_late_is_refused_before_takeoff(tmp_path):
     late = {"kind": "delay", "delay_ms": 300.0, "direction": "to_companion"}
     with mock_vehicle(tmp_path, faults=[late]) as mock:
@@ -208,15 +209,6 @@ def test_a_link_that_is_always_late_is_refused_before_takeoff(tmp_path):
         assert not mock.state()["armed"]
     assert summary.phase == "checks"
     assert "round trip" in summary.result
-
-
-def station(mock, command, *parameters):
-    """Another station commands: a second sender, which the vehicle obeys."""
-    sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
-    padded = [*parameters, *[0] * (7 - len(parameters))]
-    frame = common.MAVLink_command_long_message(1, 1, command, 0, *padded).pack(sender)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
-        channel.sendto(frame, ("127.0.0.1", mock.port + 40))
 
 
 def test_without_being_told_to_it_waits_for_the_pilot_to_arm(tmp_path):

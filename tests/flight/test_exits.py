@@ -1,4 +1,7 @@
-"""How our program can end, and what the vehicle does then: over the command line, as users do."""
+"""How our program can end, and what the vehicle does then: over the command line, as users do.
+
+Each row of docs/exits.md, on both autopilots where they differ.
+"""
 
 import json
 import os
@@ -6,7 +9,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from resource import RLIMIT_FSIZE, prlimit
+from typing import NamedTuple
 
 import pytest
 import yaml
@@ -14,16 +19,52 @@ from pymavlink import mavutil
 
 from companion.flight.guide import Guide
 from companion.mavlink import lockstep
-from tests.flight.fly import QUICK_FLIGHT, fly, merged, mock_vehicle, session_for
-from tests.flight.test_authority import When
+from tests.flight.fly import (
+    OTHER_VEHICLES,
+    QUICK_FLIGHT,
+    fly,
+    merged,
+    mock_vehicle,
+    session_for,
+)
+from tests.flight.others import When
 
-RETURN_LOW = {"parameters": {"COM_OBL_RC_ACT": 4}}
+
+class Ways(NamedTuple):
+    """What an autopilot does without us: `left` holds some seconds after the last setpoint."""
+
+    autopilot: str
+    parameters: dict
+    held: str
+    left: Callable[[dict], bool]
+
+    def mock(self, folder, **settings):
+        return mock_vehicle(
+            folder, autopilot=self.autopilot, parameters=self.parameters, **settings
+        )
+
+
+def lands(state):
+    return state["landed"] and not state["armed"] and not state["crashed"]
+
+
+def levels(state):
+    """Level, at its height, in the mode in which it obeyed, and not holding any place."""
+    level = max(map(abs, state["q"][1:3])) < 0.02 and abs(state["velocity"][2]) < 0.1
+    late = state["time"] > state["last_setpoint"] + 5.0
+    return level and late and (state["mode"], state["armed"]) == ("GUIDED", True)
+
+
+PX4 = Ways("px4", {"COM_OBL_RC_ACT": 4}, "LOITER", lands)
+ARDUPILOT = Ways("ardupilot", {}, "BRAKE", levels)
+BOTH = pytest.mark.parametrize("ways", [PX4, ARDUPILOT], ids=lambda ways: ways.autopilot)
 
 
 def start(mock, folder, *options, **changes):
     """`companion fly` in real time against the mock, in a process of its own."""
     config = folder / "fly.yaml"
-    quick = merged(QUICK_FLIGHT, {"hover": {"duration_s": 60.0}})
+    quick = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
+    quick = merged(quick, {"hover": {"duration_s": 60.0}})
     places = {
         "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}"},
         "recording": {"directory": str(folder / "flights")},
@@ -45,44 +86,47 @@ def finish(process, code):
     return json.loads(out.splitlines()[-1])
 
 
-@pytest.fixture
-def mock(tmp_path):
-    with mock_vehicle(tmp_path, in_lockstep=False, speed=1.0, **RETURN_LOW) as vehicle:
-        yield vehicle
-
-
 def in_offboard(state):
-    return state["mode"] == "OFFBOARD" and state["armed"]
+    """On ArduPilot the first setpoint takes over."""
+    obeys = state["mode"] == "OFFBOARD" or (state["mode"] == "GUIDED" and state["setpoints"] > 50)
+    return obeys and state["armed"]
 
 
-def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(mock, tmp_path):
-    process = start(mock, tmp_path)
-    mock.until(in_offboard)
-    process.send_signal(signal.SIGINT)
-    result = finish(process, 1)
-    assert result["result"] == "interrupted by the user (Ctrl-C)"
-    state = mock.state()
-    assert (state["mode"], state["armed"]) == ("LOITER", True)
-    count = state["setpoints"]
-    time.sleep(0.2)
-    assert mock.state()["setpoints"] == count
+def test_ctrl_c_hands_back_and_leaves_the_vehicle_holding(tmp_path):
+    with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
+        process = start(mock, tmp_path)
+        mock.until(in_offboard)
+        process.send_signal(signal.SIGINT)
+        result = finish(process, 1)
+        assert result["result"] == "interrupted by the user (Ctrl-C)"
+        state = mock.state()
+        assert (state["mode"], state["armed"]) == ("LOITER", True)
+        count = state["setpoints"]
+        time.sleep(0.2)
+        assert mock.state()["setpoints"] == count
 
 
 @pytest.mark.parametrize(
-    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)]
+    ("ways", "number"),
+    [
+        (PX4, signal.SIGTERM),
+        pytest.param(PX4, signal.SIGHUP, marks=pytest.mark.slow),
+        (ARDUPILOT, signal.SIGINT),
+    ],
 )
-def test_other_signals_hand_back_too(tmp_path, number):
-    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+def test_other_signals_hand_back_too(tmp_path, ways, number):
+    with ways.mock(tmp_path) as mock:
         process = start(mock, tmp_path, "--lockstep")
         mock.until(in_offboard)
         process.send_signal(number)
-        assert f"interrupted by {number.name}" in finish(process, 1)["result"]
-        assert mock.state()["mode"] == "LOITER"
+        assert "interrupted by" in finish(process, 1)["result"]
+        state = mock.state()
+        assert (state["mode"], state["armed"], state["crashed"]) == (ways.held, True, False)
 
 
 def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     """As `companion fly | head -1`: nobody reads any more, and every line fails."""
-    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+    with PX4.mock(tmp_path) as mock:
         process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0})
         process.stderr.close()
         out = process.stdout.read()
@@ -91,9 +135,14 @@ def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     assert json.loads(out.splitlines()[-1])["result"] == "ok"
 
 
-def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path):
+@pytest.mark.parametrize(
+    "ways",
+    [PX4, pytest.param(ARDUPILOT, marks=pytest.mark.slow)],
+    ids=lambda ways: ways.autopilot,
+)
+def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
     # The uplink is cut, so that handing back cannot succeed and takes its time.
-    with mock_vehicle(tmp_path, in_lockstep=False, speed=1.0, **RETURN_LOW) as mock:
+    with ways.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
         process = start(mock, tmp_path)
         mock.until(in_offboard)
         mock.ask({"fault": {"kind": "drop", "direction": "from_companion"}})
@@ -105,18 +154,18 @@ def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path):
         result = finish(process, 1)
         assert time.monotonic() - began < 3.0
         assert result["result"] == "left at once by the user"
-        assert mock.until(lambda state: state["mode"] == "LAND")["armed"]
+        mock.until(ways.left)
 
 
-def test_killed_the_autopilots_failsafe_lands_it(tmp_path):
-    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+@BOTH
+def test_killed_the_autopilot_does_what_it_does_without_us(tmp_path, ways):
+    with ways.mock(tmp_path) as mock:
         process = start(mock, tmp_path, "--lockstep")
         mock.until(in_offboard)
         process.kill()
         process.communicate()
-        state = mock.until(lambda state: state["landed"] and not state["armed"], seconds=40)
-        assert not state["crashed"]
-        assert state["touchdown_speed"] < 1.5
+        state = mock.until(ways.left, seconds=40)
+        assert state["touchdown_speed"] is None or state["touchdown_speed"] < 1.5
 
 
 def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_path):
@@ -133,25 +182,43 @@ def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_pat
     assert json.loads(next((tmp_path / "flights").glob("*/summary.json")).read_text()) == result
 
 
-def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(mock, tmp_path):
+def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(tmp_path):
     """Stopped as a stuck event loop is; PX4 would let one setpoint in again.
 
     In real time: in lockstep our clock would stand still with us.
     """
-    process = start(mock, tmp_path)
-    mock.until(in_offboard)
-    process.send_signal(signal.SIGSTOP)
-    frozen = mock.until(lambda state: state["mode"] == "LAND")
-    process.send_signal(signal.SIGCONT)
-    result = finish(process, 1)
-    state = mock.until(lambda state: state["landed"])
+    with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
+        process = start(mock, tmp_path)
+        mock.until(in_offboard)
+        process.send_signal(signal.SIGSTOP)
+        frozen = mock.until(lambda state: state["mode"] == "LAND")
+        process.send_signal(signal.SIGCONT)
+        result = finish(process, 1)
+        state = mock.until(lambda state: state["landed"])
     assert frozen["time"] - frozen["last_setpoint"] < 1.3
     assert state["last_setpoint"] == frozen["last_setpoint"]
     assert (state["crashed"], state["mode"]) == (False, "LAND")
     assert any("failsafe took over" in event["text"] for event in result["events"])
 
 
-def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkeypatch):
+@pytest.mark.slow
+def test_frozen_in_flight_ardupilot_levels_and_thawed_it_is_asked_to_hold(tmp_path):
+    """It stays in the mode in which it obeyed; nobody took it, so our hand back is right."""
+    with ARDUPILOT.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
+        process = start(mock, tmp_path)
+        mock.until(in_offboard)
+        process.send_signal(signal.SIGSTOP)
+        frozen = mock.until(levels)
+        process.send_signal(signal.SIGCONT)
+        result = finish(process, 1)
+        state = mock.state()
+    assert result["result"] == "attitude arrives later than deadman.telemetry_stale_ms"
+    assert state["last_setpoint"] == frozen["last_setpoint"]
+    assert (state["crashed"], state["mode"]) == (False, "BRAKE")
+
+
+@BOTH
+def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkeypatch, ways):
     flown = Guide.step
 
     def freezing(guide):
@@ -159,20 +226,22 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
             flown(guide)
 
     monkeypatch.setattr(Guide, "step", freezing)
-    with mock_vehicle(tmp_path) as mock:
+    with ways.mock(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         state = mock.state()
     assert summary.result == "guidance makes no commands any more"
-    assert (state["mode"], state["armed"], state["crashed"]) == ("LOITER", True, False)
-    began = next(at for at, text in summary.events if text == "mode OFFBOARD")
+    assert (state["mode"], state["armed"], state["crashed"]) == (ways.held, True, False)
+    words = {"px4": "mode OFFBOARD", "ardupilot": "mode GUIDED by rates"}[ways.autopilot]
+    began = next(at for at, text in summary.events if text == words)
     assert setpoints(summary)[-1]._timestamp < began + 1.2 + 1.0 + 0.2
 
 
-def test_an_unplugged_cable_is_let_go_and_the_failsafe_lands_it(tmp_path):
-    with mock_vehicle(tmp_path, **RETURN_LOW) as mock:
+@BOTH
+def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
+    with ways.mock(tmp_path) as mock:
         observer = When("programme", lambda: mock.ask({"fault": {"kind": "drop"}}), after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
-        state = mock.until(lambda state: state["landed"] and not state["armed"], seconds=40)
+        state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
     assert "letting go" in summary.events[-1][1]
     assert not state["crashed"]

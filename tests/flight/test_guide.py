@@ -36,6 +36,9 @@ class HoverSpy:
     def pause(self):
         self.paused += 1
 
+    def stand(self):
+        """The vehicle stands: there is nothing to learn."""
+
 
 class Bench:
     """A guide that flies the doublets, its clock set by hand."""
@@ -104,6 +107,18 @@ def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
     assert bench.guide.off_course is None
     bench.fly(IN_HOLD + 0.3)  # so much later that it is no jump of the estimate
     assert bench.guide.off_course < 1.0
+
+
+def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
+    """A compass or GPS that settles before take-off tells where the vehicle really stands."""
+    bench = Bench()
+    bench.loop.resets.turn, bench.loop.resets.shift = 0.5, (3.0, 0.0, 0.0)
+    bench.state.landed = True
+    bench.fly(IN_HOLD)
+    assert bench.loop.resets.turn == 0.5  # in control "landed" is not believed
+    bench.loop.guarded = False
+    bench.fly(IN_HOLD)
+    assert (bench.loop.resets.turn, bench.loop.resets.shift) == (0.0, (0.0, 0.0, 0.0))
 
 
 def test_position_hold_may_tilt_as_it_must():

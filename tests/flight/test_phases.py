@@ -42,6 +42,8 @@ def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
         (PX4, "takeoff", 157, 0x02040000, True),
         (ARDUPILOT, "takeoff", 217, 4, True),
         (ARDUPILOT, "takeoff", 209, 4, False),  # somebody else's rates are obeyed
+        (ARDUPILOT, "takeoff", 217, 17, False),  # BRAKE is no end of a climb
+        (ARDUPILOT, "offboard", 217, 17, False),
         (ARDUPILOT, "offboard", 217, 4, True),
         (ARDUPILOT, "offboard", 209, 4, True),
         (ARDUPILOT, "programme", 209, 4, True),

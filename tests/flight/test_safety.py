@@ -6,17 +6,16 @@ import pytest
 
 from companion.config import Config
 from companion.flight.safety import Action, SafetyLadder, monitors
-from companion.flight.safety.fence import inside, local_polygon
 from companion.flight.safety.monitor import Alarm, Monitor
 from companion.flight.safety.snapshot import (
     Autopilot,
     Control,
     Health,
     Motion,
-    Place,
     Resets,
     Snapshot,
 )
+from companion.guidance.fence import Place, inside, local_polygon
 from companion.mavlink.records import Battery, Estimator, Gps
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
@@ -33,7 +32,7 @@ def roll(angle_deg):
 FINE = Snapshot(
     NOW,
     Autopilot(
-        battery=Battery(inf, 16.0, 0.9), gps=Gps(NOW, 3, 12, 500.0), estimator=Estimator(NOW, GOOD)
+        battery=Battery(inf, 16.0, 0.9), gps=Gps(inf, 3, 12, 500.0), estimator=Estimator(inf, GOOD)
     ),
     Motion(
         LEVEL, (0.1, 0.0, 0.0), (1.0, 2.0, -1.0), (1.0, 1.0, 0.0), 6.0, 0.2, 0.5, Place(47.0, 8.0)
@@ -76,9 +75,11 @@ BREACHES = [
     ("disarmed", autopilot(armed=False), LET_GO, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
     ("failsafe", autopilot(failsafe=True), LET_GO, 0.0, "failsafe"),
-    ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.0, "battery at 15 %"),
-    ("battery", autopilot(battery=Battery(NOW - 6.0, 16.0, 0.9)), LAND, 0.0, "not reported"),
-    ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.0, "GPS position lost"),
+    ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.2, "battery at 15 %"),
+    ("battery", autopilot(battery=Battery(NOW - 6.0, 16.0, 0.9)), LAND, 0.2, "not reported"),
+    ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.2, "GPS position lost"),
+    ("gps", autopilot(gps=Gps(NOW - 6.0, 3, 12, 500.0)), LAND, 0.2, "GPS is not reported"),
+    ("estimator", autopilot(estimator=Estimator(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),
     ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x1)), LAND, 0.5, "0x1)"),
     ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x18)), LAND, 0.5, "0x18)"),
     ("reset", FINE._replace(resets=Resets(1, 0.5, 0.3)), WARN, 0.1, "0.5 m and 17°"),
@@ -213,7 +214,7 @@ def test_in_silence_nothing_is_sent_any_more():
     assert not verdict.mutes
 
 
-L_SHAPE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, 0.0), (0.0, 0.0), (0.0, -10.0))
+L_SHAPE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -1.0), (1.0, -1.0), (1.0, -10.0))
 
 
 @pytest.mark.parametrize(

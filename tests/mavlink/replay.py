@@ -17,17 +17,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SetpointEncoder
-from companion.mavlink.commands import CommandClient
+from companion.mavlink.conversation import Conversation
 from companion.mavlink.errors import CommandRefused, CommandTimeout, UnknownParameter
 from companion.mavlink.inbox import Inbox
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.parameters import ParameterClient
-from companion.mavlink.pending import PendingRegistry
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.texts import TextAssembler
 
 VEHICLE = (1, 1)
 STAMP, OVERHEAD, SIGNATURE, MAVLINK_2 = 8, 12, 13, 0xFD
@@ -143,17 +140,15 @@ class _Player:
         """The parts of a link, without its own heartbeat and clock questions."""
         ours = next(source(frame) for _, frame in self._log if source(frame) != VEHICLE)
         settings = LinkSettings("udpout://nowhere:1", 1, 1, *ours)
-        stats, texts, registry = LinkStats(), TextAssembler(), PendingRegistry()
+        stats = LinkStats()
         router = Router(stats)
         self._inbox = Inbox(settings, stats, router, None, self.out.notices.append)
         self._inbox.on_attitude = self.out.samples.append
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
-        self._commands = CommandClient(settings, outbox, router, registry, texts)
-        self._parameters = ParameterClient(settings, outbox, router, registry)
-        self.out.stats = stats
-        self.out.state = VehicleState(router, stats, texts, self._loop.time)
+        self._conversation = Conversation(settings, outbox, router, stats, self._loop.time)
+        self.out.stats, self.out.state = stats, self._conversation.state
 
     async def _until(self, time):
         """Let the log's time pass, and what is due on our side happen."""
@@ -173,8 +168,6 @@ class _Player:
         if number(frame) == dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION:
             out.attitudes.append(message)
         self._inbox.receive(frame, 0)
-        if out.state.family is not None:
-            self._parameters.bytewise = out.state.family.bytewise_parameters
         now = (out.state.mode, out.state.armed)
         if out.state.mode is not None and (not out.story or out.story[-1][1:] != now):
             out.story.append((self._loop.now, *now))
@@ -190,13 +183,14 @@ class _Player:
                 self.out.setpoints.append((frame, ours))
             case "COMMAND_LONG" if (message.target_system, message.target_component) == VEHICLE:
                 params = [getattr(message, f"param{place}") for place in range(1, 8)]
-                asked = (message.command, *params[:3])
-                await self._ask(
-                    frame, asked, self._commands.send(message.command, params, _PATIENCE_S, 0)
+                question = self._conversation.command(
+                    message.command, *params, timeout_s=_PATIENCE_S, retries=0
                 )
+                await self._ask(frame, (message.command, *params[:3]), question)
             case "PARAM_REQUEST_READ":
                 name = message.param_id
-                await self._ask(frame, name, self._parameters.read(name, _PATIENCE_S, 0))
+                question = self._conversation.read_parameter(name, timeout_s=_PATIENCE_S, retries=0)
+                await self._ask(frame, name, question)
 
     async def _ask(self, frame, asked, question):
         """Let our side ask, too; the recorded vehicle's answer is what it will get."""

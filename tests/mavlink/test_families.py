@@ -20,16 +20,16 @@ EVERY_FAMILY = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: fa
 @pytest.mark.parametrize(
     ("family", "base_mode", "custom_mode", "name", "roles"),
     [
-        (PX4, 29, 0x03040000, "AUTO.LOITER", {Role.HOLD}),
-        (PX4, 157, 0x02040000, "AUTO.TAKEOFF", {Role.TAKEOFF}),
+        (PX4, 29, 0x03040000, "AUTO.LOITER", {Role.HOLD, Role.READY}),
+        (PX4, 157, 0x02040000, "AUTO.TAKEOFF", {Role.TAKEOFF, Role.READY}),
         (PX4, 157, 0x05040000, "AUTO.RTL", set()),
         (PX4, 157, 0x06040000, "AUTO.LAND", {Role.LAND}),
         (PX4, 129, 0x00060000, "OFFBOARD", {Role.OFFBOARD}),
         (PX4, 129, 0x00630000, "mode 0x00630000", set()),
         (ARDUPILOT, 81, 0, "STABILIZE", set()),
-        (ARDUPILOT, 89, 4, "GUIDED", {Role.TAKEOFF, Role.HOLD}),
-        (ARDUPILOT, 81, 4, "GUIDED", {Role.TAKEOFF, Role.HOLD}),  # disarmed: it obeys nothing
-        (ARDUPILOT, 217, 4, "GUIDED", {Role.TAKEOFF, Role.HOLD}),
+        (ARDUPILOT, 89, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),
+        (ARDUPILOT, 81, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),  # disarmed: it obeys nothing
+        (ARDUPILOT, 217, 4, "GUIDED", {Role.TAKEOFF, Role.READY}),
         (ARDUPILOT, 209, 4, "GUIDED by rates", {Role.OFFBOARD}),
         (ARDUPILOT, 217, 17, "BRAKE", {Role.HOLD}),
         (ARDUPILOT, 209, 9, "LAND", {Role.LAND}),
@@ -69,7 +69,7 @@ def test_a_family_is_complete(family):
     for name, number in family.modes.items():
         assert family.mode_name(128 | 8, number) == name
     assert family.ready_mode in family.modes
-    assert Role.HOLD in family.roles(family.ready_mode)
+    assert Role.READY in family.roles(family.ready_mode)
     with pytest.raises(KeyError):
         family.set_mode("WARP")
     for name in family.wanted_rates:

@@ -108,6 +108,26 @@ def test_landed_gps_home_estimator(bench):
     )
     state = bench.take(home)
     assert (state.home.latitude_deg, state.home.altitude_m) == (47.3977418, 488.0)
+
+
+def test_what_was_not_told_for_long_is_not_known_any_more(bench):
+    bench.take(dialect.MAVLink_extended_sys_state_message(0, 1))
+    assert not bench.take(sys_status(15800, 73)).battery_silent
+    bench.now += 5.1
+    assert (bench.state.landed, bench.state.battery_silent) == (False, True)
+    assert bench.take(dialect.MAVLink_extended_sys_state_message(0, 3)).taking_off
+    bench.now += 5.1
+    assert not bench.state.taking_off
+
+
+def global_position(latitude, longitude):
+    return dialect.MAVLink_global_position_int_message(0, latitude, longitude, 0, 0, 0, 0, 0, 0)
+
+
+def test_a_place_is_known_once_it_is_not_all_zeros(bench):
+    assert bench.take(global_position(0, 0)).global_position is None
+    state = bench.take(global_position(473977418, 85455939))
+    assert state.global_position == (10.0, 47.3977418, 8.5455939)
     estimator = dialect.MAVLink_estimator_status_message(0, 0x33F, 0, 0, 0, 0, 0, 0, 0, 0)
     assert bench.take(estimator).estimator == (10.0, 0x33F)
 

@@ -4,6 +4,7 @@ from math import degrees
 
 from companion.flight.safety.monitor import Judge
 from companion.flight.safety.snapshot import Snapshot
+from companion.mavlink.records import LASTS
 
 GPS_FIX_3D = 3
 """Of GPS_FIX_TYPE, this and above."""
@@ -13,17 +14,22 @@ HORIZONTAL = 0x8 | 0x10
 
 
 def gps(snapshot: Snapshot, _: bool) -> str | None:
-    """A vehicle that flew by GPS has lost it."""
+    """A vehicle that flew by GPS has lost it, or does not tell of it any more."""
     fix = snapshot.autopilot.gps
-    lost = snapshot.had_gps and fix is not None and fix.fix_type < GPS_FIX_3D
-    return "GPS position lost" if lost else None
+    if not snapshot.had_gps or fix is None:
+        return None
+    if snapshot.now - fix.received > LASTS:
+        return "GPS is not reported any more"
+    return "GPS position lost" if fix.fix_type < GPS_FIX_3D else None
 
 
 def flags(snapshot: Snapshot, _: bool) -> str | None:
-    """ESTIMATOR_STATUS has lost what it had when control began."""
+    """ESTIMATOR_STATUS has lost what it had when control began, or does not come any more."""
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
+    if snapshot.now - estimator.received > LASTS:
+        return "the estimator's state is not reported any more"
     missing = good & (ATTITUDE | VELOCITY) & ~estimator.flags
     if good & HORIZONTAL and not estimator.flags & HORIZONTAL:
         missing |= good & HORIZONTAL

@@ -1,23 +1,22 @@
 """Makes the snapshots: newest telemetry, our own counters, and shares over the last second."""
 
 from collections import deque
-from math import cos, degrees, dist, inf, radians
+from math import dist, inf
 from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
 from companion.flight.safety.estimate import GPS_FIX_3D
-from companion.flight.safety.fence import EARTH_RADIUS
 from companion.flight.safety.snapshot import (
     Autopilot,
     Control,
     Health,
     Motion,
-    Place,
     Resets,
     Snapshot,
 )
+from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.mavlink.link import Link
 
@@ -27,6 +26,8 @@ _EARLY = 0.9
 """Of the window; before so much of it is known there are no shares."""
 _LATE = 0.03
 """Between two looks, s; the timer's period is 0.02 s."""
+_PLACE_LASTS = 1.0
+"""The vehicle hovers where control begins: where it was so long ago, s, is the same place."""
 _WHILE = 30.0
 """Within so long, s, resets of the estimator are counted together."""
 
@@ -71,7 +72,7 @@ class Lookout:
         state, resets = self._link.state, self._loop.resets
         motion = self._guide.motion
         self._start = None if motion is None else motion.position_ned
-        self._origin = self._geodetic(self._start)
+        self._origin = self._place(now)
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
@@ -168,14 +169,9 @@ class Lookout:
             resets.largest_tilt,
         )
 
-    def _geodetic(self, start: Vector | None) -> Place | None:
-        """Latitude and longitude of where control begins, degrees; the earth is flat here."""
-        home = self._link.state.home
-        if start is None or home is None:
+    def _place(self, now: float) -> Place | None:
+        """Latitude and longitude of where the vehicle is, if they were told lately."""
+        told = self._link.state.global_position
+        if told is None or now - told.received > _PLACE_LASTS:
             return None
-        raw = [a + b for a, b in zip(start, self._loop.resets.shift, strict=True)]
-        north, east = raw[0] - home.north, raw[1] - home.east
-        return Place(
-            home.latitude_deg + degrees(north / EARTH_RADIUS),
-            home.longitude_deg + degrees(east / (EARTH_RADIUS * cos(radians(home.latitude_deg)))),
-        )
+        return Place(told.latitude_deg, told.longitude_deg)

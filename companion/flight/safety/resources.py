@@ -2,9 +2,7 @@
 
 from companion.flight.safety.monitor import Judge, released
 from companion.flight.safety.snapshot import Snapshot
-
-_STATUS_STALE = 5.0
-"""The battery is reported at 1 Hz at least; silence this long, in s, hides an empty one."""
+from companion.mavlink.records import LASTS
 
 
 def battery(least: float) -> Judge:
@@ -14,7 +12,7 @@ def battery(least: float) -> Judge:
         told = snapshot.autopilot.battery
         if told is None:
             return None
-        if snapshot.now - told.received > _STATUS_STALE:
+        if snapshot.now - told.received > LASTS:  # silence hides an empty one
             return "the battery's state is not reported any more"
         if told.remaining is None or told.remaining >= least:
             return None

@@ -4,15 +4,9 @@ from math import inf
 from typing import NamedTuple
 
 from companion.attitude import Quaternion
+from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.mavlink.records import Battery, Estimator, Gps
-
-
-class Place(NamedTuple):
-    """WGS84, degrees."""
-
-    latitude: float
-    longitude: float
 
 
 class Autopilot(NamedTuple):
@@ -34,7 +28,7 @@ class Motion(NamedTuple):
         body_rates: rad/s.
         offset: position from where control began, m, or None.
         velocity: m/s.
-        height: above home, m, or None.
+        height: above home, m, or None; as the autopilot tells it, jumps included.
         off_course: distance from the reference, m; None where none is followed.
         thrust: as it was last sent, 0..1, or None.
         origin: where control began, or None where that is not known.

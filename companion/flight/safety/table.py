@@ -4,11 +4,14 @@ from math import radians
 
 from companion.config import Config
 from companion.flight.safety import authority, envelope, estimate, resources
-from companion.flight.safety.fence import Fence, braking, outside
+from companion.flight.safety.fence import braking, outside
 from companion.flight.safety.monitor import Action, Monitor
 from companion.flight.safety.silence import silence
+from companion.guidance.fence import Fence
 
 _MS = 1e-3
+_READ = 0.2
+"""After a pause of ours what came meanwhile is read within so long, s; until then it looks old."""
 _LET_GO, _HAND_BACK, _HOLD, _LAND = Action.LET_GO, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
@@ -38,11 +41,11 @@ def _vehicle(config: Config) -> tuple[Monitor, ...]:
     """Its battery, and what it knows of itself."""
     safety = config.safety
     resets = estimate.resets(safety.max_resets, safety.max_reset_m, radians(safety.max_reset_deg))
-    least = config.limits.min_battery_percent / 100.0
+    battery = resources.battery(config.limits.min_battery_percent / 100.0)
     position = Action(safety.position_action)
     return (
-        Monitor("battery", resources.battery(least), Action(safety.battery_action), calm=5.0),
-        Monitor("gps", estimate.gps, position),
+        Monitor("battery", battery, Action(safety.battery_action), lasts=_READ, calm=5.0),
+        Monitor("gps", estimate.gps, position, lasts=_READ),
         Monitor("estimator", estimate.flags, position, lasts=0.5),
         Monitor("reset", estimate.reset, Action.WARN, lasts=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
