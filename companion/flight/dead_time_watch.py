@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +21,8 @@ _UNSURE = 1.5
 """So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
 _LONGEST = 75_000
 """The measurement at the end is over so many rows at most, the newest: 5 min at 250 Hz."""
-_AGES = 150
-"""Sample ages are kept for so many looks: of the newest 5 min, too."""
+_OFFSETS = 1000
+"""The clocks' offset is kept for so many looks: as long as so many rows take at 40 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED = 2, 6
 """Columns of `FlightTrace.rates` at which roll, pitch and yaw begin."""
@@ -70,7 +70,7 @@ class DeadTimeWatch:
         self._due = -inf
         self._looks = 0
         self._row_counts = deque([0], maxlen=_LOOKS + 1)  # at the last looks
-        self._ages: deque[NDArray[np.float32]] = deque(maxlen=_AGES)
+        self._offsets: deque[tuple[int, float]] = deque(maxlen=_OFFSETS)  # until which row, s
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -88,7 +88,7 @@ class DeadTimeWatch:
             self._note(f"the dead time is watched no more: {internal(error)}")
 
     def _look(self) -> None:
-        self._note_ages()
+        self._note_offset()
         if len(self._row_counts) > _LOOKS:
             name = _AXES[self._looks % len(_AXES)]
             self._looks += 1
@@ -96,8 +96,9 @@ class DeadTimeWatch:
 
     def over_the_flight(self) -> DeadTimes:
         """Measure over all that was flown, and warn if that is still to be done."""
-        rows = self._trace.rates_rows(max(0, len(self._trace.rates) - _LONGEST))
-        ages = np.concatenate(self._ages) if self._ages else np.empty(0)
+        first = max(0, len(self._trace.rates) - _LONGEST)
+        rows = self._trace.rates_rows(first)
+        ages = self._ages(rows, first)
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
             SampleAge(*np.percentile(ages, (50, 99)).tolist()) if ages.size else SampleAge(),
@@ -106,13 +107,24 @@ class DeadTimeWatch:
         self._warn(measured)
         return measured
 
-    def _note_ages(self) -> None:
-        """How old the samples since the last look were when they arrived."""
-        rows = self._trace.rates_rows(self._row_counts[-1])
-        self._row_counts.append(len(self._trace.rates))
-        offset = self._clock_offset()
-        if offset is not None:
-            self._ages.append((rows[:, 1] + offset - rows[:, 0]).astype(np.float32))
+    def _note_offset(self) -> None:
+        """By how much the clocks differed for the samples since the last look."""
+        count, offset = len(self._trace.rates), self._clock_offset()
+        self._row_counts.append(count)
+        self._offsets.append((count, nan if offset is None else offset))
+
+    def _ages(self, rows: NDArray[np.float64], first: int) -> NDArray[np.float64]:
+        """How old the samples were when they arrived, s, where that is known.
+
+        Args:
+            rows: of the flight.
+            first: number of the first of them.
+        """
+        until, offsets = np.array([*self._offsets, (np.inf, nan)]).T
+        look = np.searchsorted(until, first + np.arange(len(rows)), side="right")
+        ages = rows[:, 1] + offsets[look] - rows[:, 0]
+        known: NDArray[np.float64] = ages[np.isfinite(ages)]
+        return known
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """What the rows say of one axis."""
