@@ -17,7 +17,8 @@ $(VENV)/.test: $(VENV)/.fly
 demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 	$(BIN)/companion demo
 
-PYTEST := $(BIN)/python -m pytest -n 3 --dist loadscope
+# In the order of the files: sorted by their number of tests, the long flights would come last.
+PYTEST := $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder
 
 test: lint  ## style, types, import rules, then the tests
 	$(PYTEST) -m 'not slow'
