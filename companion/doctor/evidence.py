@@ -24,6 +24,10 @@ class Identity(NamedTuple):
     uid: str | None = None
 
 
+SOME_LOST = 0.02
+"""This share of messages may be lost before anything comes of it."""
+
+
 class LinkQuality(NamedTuple):
     """The link while we listened.
 
@@ -46,6 +50,11 @@ class LinkQuality(NamedTuple):
     round_trip: float | None
     jitter: float | None
     notices: tuple[str, ...] = ()
+
+    @property
+    def loss(self) -> float:
+        """Share of the vehicle's messages that did not come."""
+        return self.lost / max(1, self.lost + self.frames)
 
 
 class SampleTimes(NamedTuple):

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from companion.config import Config
-from companion.doctor.evidence import Evidence
+from companion.doctor.evidence import SOME_LOST, Evidence
 from companion.doctor.finding import Finding, Key
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.streams import StreamRate
@@ -14,7 +14,7 @@ _REACHED = 0.7
 """PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
 _COUNTABLE = 5.0
 """So many must be due while we listen for a rate to be told from a count."""
-_SOME_LOST, _MANY_LOST = 0.02, 0.2
+_MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
 _CLOCKS_APART = 0.02
 """By this share the two clocks may differ in rate; crystals differ by less than 0.0002, while a
@@ -76,8 +76,8 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """What does not arrive, or not as it was sent."""
     link = evidence.link
-    share = link.lost / max(1, link.lost + link.frames)
-    verdict = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > _SOME_LOST else SAFE
+    share = link.loss
+    verdict = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
     bad = verdict is not SAFE
     yield Finding(
         Key.LOSS,

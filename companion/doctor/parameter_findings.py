@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.doctor.evidence import Evidence
+from companion.doctor.evidence import SOME_LOST, Evidence
 from companion.doctor.finding import Change, Finding, Key
 from companion.doctor.setup import autopilot_setup
 from companion.mavlink.parameter_rules import ParameterFinding, ParameterRule, Verdict, judge
@@ -22,9 +22,20 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "PARAM_REQUEST_READ",
         )
         return
-    for rule in rules:
-        if rule.vital and rule.name not in survey.values:
+    unread = [rule for rule in rules if rule.name not in survey.values]
+    for rule in unread:
+        if rule.vital:
             yield _missing(rule, evidence.family.name)
+    if unread and evidence.link.loss > SOME_LOST:
+        yield Finding(
+            Key.PARAMETERS,
+            Verdict.INEFFECTIVE,
+            f"not told: {', '.join(rule.name for rule in unread)}",
+            "the autopilot has none of that name, or the link lost the answer; so what they decide "
+            "was not looked at",
+            "mend the link, or look at them with a ground station",
+            "PARAM_REQUEST_READ",
+        )
     for found in judge(rules, survey.values, autopilot_setup(config)):
         yield _finding(found, survey.names[found.rule.name])
 

@@ -215,6 +215,16 @@ def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
     assert without == {"GUID_OPTIONS": UNSAFE, "ATC_ANGLE_BOOST": UNSAFE}
 
 
+def test_a_parameter_that_was_not_told_is_named_where_the_link_loses_frames():
+    """Without losses it is one that this version of the autopilot has not."""
+    lossy = replace(GOOD, link=QUALITY._replace(lost=30))
+    assert found(parameters) == {}
+    assert found(parameters, lossy) == {Key.PARAMETERS: INEFFECTIVE}
+    whole = {rule.name: GOOD.survey.values.get(rule.name, 0.0) for rule in PX4.parameters}
+    told = replace(lossy, survey=Survey(whole, {name: name for name in whole}))
+    assert Key.PARAMETERS not in found(parameters, told)
+
+
 def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
     old = Survey({"MAV_GCS_SYSID": 1.0, "FS_GCS_ENABLE": 1.0}, {"MAV_GCS_SYSID": "SYSID_MYGCS"})
     old = old._replace(names={**old.names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
