@@ -61,6 +61,8 @@ def test_memory_does_not_grow_with_the_flight(tmp_path, monkeypatch):
         for _ in range(2):
             for number in range(20_000):
                 series.add([float(number), 0.0])
+                if number % 10_000 == 0:
+                    spool.flush()  # or more would wait than may
             spool.flush()
             sizes.append(tracemalloc.get_traced_memory()[0])
     finally:
