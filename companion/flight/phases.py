@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from companion.config_sections import FlightConfig
-from companion.flight import preparation, procedures
+from companion.flight import departure, preparation, procedures
 from companion.flight.ending import Exit
 from companion.flight.rig import Rig
 from companion.mavlink.family import AutopilotFamily
@@ -64,7 +64,7 @@ def flight_phases(
         Phase(
             "takeoff",
             "the height",
-            procedures.takeoff,
+            departure.takeoff,
             config.takeoff_timeout_s,
             Exit.LAND,
             on_failure_landed=Exit.DISARM,
@@ -73,7 +73,7 @@ def flight_phases(
         Phase(
             "offboard",
             "the autopilot to take our rates",
-            procedures.offboard,
+            departure.offboard,
             _SHORT,
             Exit.LAND,
             modes=_RISING | {Role.OFFBOARD},

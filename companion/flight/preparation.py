@@ -5,8 +5,11 @@ from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
+from companion.flight.orders import order
 from companion.flight.rig import Rig
+from companion.flight.roles import in_role
 from companion.mavlink.parameter_rules import Values, Verdict
+from companion.mavlink.roles import Role
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -50,22 +53,12 @@ async def stream(rig: Rig) -> None:
 async def arm(rig: Rig) -> None:
     """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
     if rig.config.flight.arm:
-        # What was good at the checks may not be so any more.
-        await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
-        _check_battery(rig)
-        await rig.fresh_heartbeat()
-        if rig.link.state.mode != rig.mode_at_checks:
-            raise FlightEnded(
-                f"the pilot or another station took over before arming: mode {rig.link.state.mode}"
-            )
-        rig.detail = "the autopilot to accept arming"
-        rig.arm_sent = True
-        for command in rig.link.family.arm():
-            await rig.link.command(*command)
-        await rig.until(rig.armed, "the vehicle to be armed")
+        await _arm(rig)
         return
-    await rig.until(rig.armed, "the pilot to arm (flight.arm is false, --arm was not given)")
     ready = rig.link.family.ready_mode
+    if rig.link.state.mode == ready:
+        rig.note(f"the vehicle is in {ready} already: arming it starts the flight")
+    await rig.until(rig.armed, "the pilot to arm (flight.arm is false, --arm was not given)")
     await rig.until(
         lambda: _handed_over(rig), f"the pilot to hand over, by switching to {ready} on the ground"
     )
@@ -78,9 +71,39 @@ async def undo_arming(rig: Rig) -> None:
         return
     rig.detail = "the autopilot to accept disarming"
     # The heartbeat may be older than our arming, so it is not asked whether this is needed.
-    await rig.link.command(*rig.link.family.disarm())
+    ours = {Role.READY, Role.TAKEOFF}
+    await order(rig, rig.link.family.disarm(), ours, lambda: not rig.armed())
     await rig.fresh_heartbeat()
     await rig.until(lambda: not rig.armed())
+
+
+async def _arm(rig: Rig) -> None:
+    """Arm; what was good at the checks may not be so any more."""
+    state = rig.link.state
+    await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
+    await rig.until(lambda: state.landed, "the autopilot to say that it stands on the ground")
+    _check_battery(rig)
+    await rig.fresh_heartbeat()
+    _refuse(vehicle_checks.armed(state))
+    if state.mode != rig.mode_at_checks:
+        raise FlightEnded(
+            f"the pilot or another station took over before arming: mode {state.mode}"
+        )
+    rig.detail = "the autopilot to accept arming"
+    *before, command = rig.link.family.arm()
+    for each in before:
+        await rig.link.command(*each)
+    await rig.until(lambda: in_role(rig.link, Role.READY))
+    armings = state.armings
+
+    def armed() -> bool:
+        if state.armings > armings and not rig.armed():
+            raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
+        return rig.armed()
+
+    rig.arm_sent = True
+    await order(rig, command, {Role.READY}, armed)
+    await rig.until(armed, "the vehicle to be armed")
 
 
 def _ready(rig: Rig) -> bool:

@@ -10,6 +10,7 @@ from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
 from companion.flight.safety import Lookout
 from companion.guidance import Sequence
+from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
 from companion.mavlink.records import LocalPosition
@@ -18,6 +19,12 @@ _POLL = 0.02
 """How often a condition is looked at, s; telemetry that changes it is slower."""
 
 _SLOWEST_HEARTBEAT = 3.0
+
+_BACKLOG = 0.5
+"""What waited to be read while we stood still has been read so long, s, after we go on."""
+
+_HEARTBEAT = 0.0
+"""Number of the message."""
 
 
 @dataclass(slots=True)
@@ -62,23 +69,30 @@ class Rig:
             await asyncio.sleep(_POLL)
 
     async def fresh_heartbeat(self) -> None:
-        """Wait for a heartbeat that is newer than this call; asked for, or the next one due."""
-        began = asyncio.get_running_loop().time()
+        """Wait for a heartbeat that left the vehicle after this call.
 
-        def newer() -> bool:
+        What we read now may have waited long, if we stood still. The answer to a question does not
+        come before what was sent before it was asked, so the next heartbeat after it is fresh; and
+        so is one that comes when all that waited must have been read, should no answer come.
+        """
+        clock = asyncio.get_running_loop().time
+        since = clock() + _BACKLOG
+
+        async def ask() -> None:
+            nonlocal since
+            with suppress(LinkError):
+                await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT, retries=0)
+                since = min(since, clock())
+
+        def fresh() -> bool:
             heartbeat = self.link.state.heartbeat
-            return heartbeat is not None and heartbeat.received >= began
+            return heartbeat is not None and heartbeat.received >= since
 
-        # One that comes by itself is as good: a lost answer must not keep us waiting.
-        question = asyncio.create_task(self._ask_heartbeat())
+        question = asyncio.create_task(ask())
         try:
-            await self.until(newer)
+            await self.until(fresh)
         finally:
             question.cancel()
-
-    async def _ask_heartbeat(self) -> None:
-        with suppress(LinkError):  # an autopilot that does not send it on demand sends it anyway
-            await self.link.request_message("HEARTBEAT")
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, unless it is stale."""

@@ -13,6 +13,11 @@ def roles_of(link: Link) -> frozenset[Role]:
     return frozenset() if mode is None else link.family.roles(mode)
 
 
+def in_role(link: Link, role: Role) -> bool:
+    """Whether the present mode is that to a flight."""
+    return role in roles_of(link)
+
+
 def require_role(link: Link, allowed: Set[Role]) -> None:
     """Let the vehicle go if it is in a mode that is not ours.
 

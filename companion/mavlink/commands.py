@@ -67,17 +67,13 @@ class CommandClient:
             with Pending[int](self._registry) as answers:
                 self._waiting[command] = answers
                 try:
-                    result, repeated = await self._exchange(
-                        command, params, timeout_s, retries, answers
-                    )
+                    result = await self._exchange(command, params, timeout_s, retries, answers)
                 finally:
                     del self._waiting[command]
             if result != _ACCEPTED:
                 await asyncio.sleep(_WORDS_WINDOW_S)
                 words = self._texts.since(began)
-                raise CommandRefused(
-                    command_name(command), result, result_name(result), words, repeated=repeated
-                )
+                raise CommandRefused(command_name(command), result, result_name(result), words)
 
     async def _exchange(
         self,
@@ -86,8 +82,7 @@ class CommandClient:
         timeout_s: float,
         retries: int,
         answers: Pending[int],
-    ) -> tuple[int, bool]:
-        """The result, and whether it was asked for more than once."""
+    ) -> int:
         for confirmation in range(retries + 1):
             self._send_once(command, params, confirmation)
             try:
@@ -96,7 +91,7 @@ class CommandClient:
                     result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
             except TimeoutError:
                 continue
-            return result, confirmation > 0
+            return result
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"

@@ -57,23 +57,13 @@ class CommandRefused(LinkError):  # noqa: N818
         result: MAV_RESULT number of the ACK.
         result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
         words: The autopilot's own STATUSTEXTs around the refusal, oldest first; may be empty.
-        repeated: It was sent more than once; an answer to the first may have been lost.
     """
 
-    def __init__(
-        self,
-        command: str,
-        result: int,
-        result_name: str,
-        words: tuple[str, ...],
-        *,
-        repeated: bool = False,
-    ) -> None:
+    def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:
         self.command = command
         self.result = result
         self.result_name = result_name
         self.words = words
-        self.repeated = repeated
         said = "; ".join(words) if words else "the autopilot gave no reason"
         super().__init__(f"{command} was refused ({result_name}): {said}")
 

@@ -31,7 +31,7 @@ _UNKNOWN_U16 = 65535
 _AUTOPILOT_INVALID = 8
 _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
-LANDED_ON_GROUND, LANDED_TAKEOFF = 1, 3
+_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 
 
 @dataclass
@@ -45,6 +45,7 @@ class _Values:
     gps: Gps | None = None
     home: Home | None = None
     estimator: Estimator | None = None
+    armings: int = 0
     prearm_good: bool | None = None
     reset_counter: int | None = None
 
@@ -62,6 +63,7 @@ class VehicleState(_Values):
         gps: See `Gps`.
         home: See `Home`.
         estimator: See `Estimator`.
+        armings: How often it was seen to become armed.
         prearm_good: SYS_STATUS: whether the autopilot's own pre-arm checks pass.
         reset_counter: ODOMETRY: rises whenever the estimator jumps.
         family: The autopilot's family, once its first heartbeat was heard.
@@ -115,6 +117,11 @@ class VehicleState(_Values):
         return self._landed_state() == LANDED_ON_GROUND
 
     @property
+    def flying(self) -> bool:
+        """Whether the autopilot says that it is in the air; unknown is not flying."""
+        return self._landed_state() not in (None, _UNDEFINED, LANDED_ON_GROUND)
+
+    @property
     def taking_off(self) -> bool:
         """Whether the autopilot says that its take-off is not over yet."""
         return self._landed_state() == LANDED_TAKEOFF
@@ -161,6 +168,8 @@ class VehicleState(_Values):
                 self.family, self.unsupported = family_for(message.autopilot, message.type), None
             except UnsupportedAutopilot as error:
                 self.family, self.unsupported = None, error
+        armed = bool(message.base_mode & _ARMED)
+        self.armings += armed and not self.armed
         mode = str(message.custom_mode)
         if self.family is not None:
             mode = self.family.mode_name(message.base_mode, message.custom_mode)
@@ -170,7 +179,7 @@ class VehicleState(_Values):
             message.type,
             mode,
             message.custom_mode,
-            bool(message.base_mode & _ARMED),
+            armed,
             message.system_status,
         )
 

@@ -1,10 +1,12 @@
 """Who may do what: the user interrupts, the pilot arms and takes over, the fence holds."""
 
+import asyncio
 from math import inf
 
 import pytest
 from pymavlink import mavutil
 
+from companion.flight import departure, procedures
 from companion.flight.ending import Exit
 from companion.flight.guide import Guide
 from companion.flight.observer import Silent
@@ -12,8 +14,10 @@ from companion.mavlink import lockstep
 from companion.mavlink.command import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
+    MAV_CMD_REQUEST_MESSAGE,
     Command,
 )
+from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.link import Link
 from companion.mavlink.px4 import Px4
@@ -188,8 +192,109 @@ def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert mock.state()["mode"] == "LOITER"
-    assert summary.result == "offboard was accepted and left again, not by us: AUTO.LOITER"
+    assert summary.result == "the mode was accepted and left again, not by us: AUTO.LOITER"
     assert commands(summary)[-1][1] == SET_MODE  # nothing is commanded any more
+
+
+class LostAnswer:
+    """The first answer to a command is lost, and then something happens."""
+
+    def __init__(self, monkeypatch, command, then):
+        heard, lost = CommandClient._on_ack, []
+
+        def hear(client, message):
+            if message.command == command and not lost:
+                lost.append(message)
+                then()
+                return
+            heard(client, message)
+
+        monkeypatch.setattr(CommandClient, "_on_ack", hear)
+
+
+def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monkeypatch):
+    def disarm_soon():
+        asyncio.get_running_loop().call_later(0.5, station, mock, ARM, 0)
+
+    with mock_vehicle(tmp_path) as mock:
+        LostAnswer(monkeypatch, ARM, disarm_soon)
+        summary = fly(mock, tmp_path / "log")
+        assert not mock.state()["armed"]
+    assert summary.result == "the pilot disarmed again", summary.events
+    assert [command for _, command, _ in commands(summary)].count(ARM) == 1
+
+
+def test_a_landing_is_not_repeated_over_a_pilot(tmp_path, monkeypatch):
+    def take():
+        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+
+    with mock_vehicle(tmp_path) as mock:
+        LostAnswer(monkeypatch, LAND, take)
+        summary = fly(mock, tmp_path / "log")
+        assert mock.state()["mode"] == "POSCTL"
+    assert [command for _, command, _ in commands(summary)].count(LAND) == 1
+    assert "took over: mode POSCTL" in summary.result
+
+
+def test_a_pilot_who_keeps_it_armed_after_our_landing_is_not_disarmed(tmp_path):
+    with mock_vehicle(tmp_path, parameters={"COM_DISARM_LAND": -1.0}) as mock:
+        takeover = {"fault": {"kind": "pilot_takeover", "mode": "STABILIZED"}}
+        observer = When("disarm", lambda: mock.ask(takeover), after=1.0)
+        summary = fly(mock, tmp_path / "log", observer)
+        state = mock.state()
+    assert "took over: mode STABILIZED" in summary.result
+    assert (state["mode"], state["armed"]) == ("STABILIZED", True)
+    assert ARM not in [command for _, command, first in commands(summary) if first == 0.0]
+
+
+def test_a_vehicle_that_somebody_arms_after_the_checks_is_not_taken(tmp_path):
+    with mock_vehicle(tmp_path) as mock:
+        observer = When("stream", lambda: station(mock, ARM, 1))
+        summary = fly(mock, tmp_path / "log", observer)
+        assert mock.state()["on_ground"]
+    assert "already armed" in summary.result
+    assert TAKEOFF not in [command for _, command, _ in commands(summary)]
+
+
+def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
+    silent = {"kind": "stop_telemetry", "messages": ["EXTENDED_SYS_STATE"]}
+    with mock_vehicle(tmp_path, faults=[silent]) as mock:
+        summary = fly(mock, tmp_path / "log", flight={"arming_timeout_s": 3.0})
+        assert not mock.state()["armed"]
+    assert "stands on the ground" in summary.result
+    assert ARM not in [command for _, command, _ in commands(summary)]
+
+
+def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
+    over, held = departure._Climb.over, []
+
+    def holding(climb):
+        if climb._rig.link.state.height > 3.3 and not held:
+            held.append(station(mock, SET_MODE, 1, 4, 3))
+        return over(climb)
+
+    monkeypatch.setattr(departure._Climb, "over", holding)
+    with mock_vehicle(tmp_path, parameters={"MPC_TKO_SPEED": 1.0}) as mock:
+        summary = fly(mock, tmp_path / "log", flight={"takeoff_height_m": 5.0})
+        assert mock.state()["mode"] == "LOITER"
+    assert "the climb was stopped" in summary.result
+    assert LAND not in [command for _, command, _ in commands(summary)]
+
+
+def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path, monkeypatch):
+    """The newest heartbeat is a tenth of a second old, and we know better only if we ask."""
+    hand_back = procedures.hand_back
+
+    async def taking(rig):
+        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        await asyncio.sleep(0.01)  # faults begin with the vehicle's next step
+        await hand_back(rig)
+
+    monkeypatch.setattr(procedures, "hand_back", taking)
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log")
+        assert mock.state()["mode"] == "POSCTL"
+    assert "took over: mode POSCTL" in summary.result
 
 
 def test_a_vehicle_whose_home_is_elsewhere_is_not_taken_off_with(tmp_path, monkeypatch):
@@ -279,10 +384,14 @@ def test_leaving_the_fence_hands_back_and_lands(tmp_path):
 
 
 def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, monkeypatch):
-    async def refuse(link, name, *, timeout_s=1.0):
-        raise CommandRefused("MAV_CMD_REQUEST_MESSAGE", 3, "UNSUPPORTED", ())
+    command = Link.command
 
-    monkeypatch.setattr(Link, "request_message", refuse)
+    async def refuse(link, number, *parameters, **options):
+        if number == MAV_CMD_REQUEST_MESSAGE:
+            raise CommandRefused("MAV_CMD_REQUEST_MESSAGE", 3, "UNSUPPORTED", ())
+        await command(link, number, *parameters, **options)
+
+    monkeypatch.setattr(Link, "command", refuse)
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert not mock.state()["crashed"]

@@ -201,6 +201,24 @@ def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(
     assert any("failsafe took over" in event["text"] for event in result["events"])
 
 
+def test_frozen_and_thawed_it_does_not_take_the_vehicle_from_a_pilot_who_took_it_meanwhile(
+    tmp_path,
+):
+    """What waited to be read says OFFBOARD, and looks new."""
+    with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
+        process = start(mock, tmp_path)
+        mock.until(in_offboard)
+        mock.ask({"fault": {"kind": "delay", "delay_ms": 40.0}})
+        process.send_signal(signal.SIGSTOP)
+        stopped = mock.state()["time"]
+        mock.until(lambda state: state["time"] > stopped + 0.8)
+        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        mock.until(lambda state: state["time"] > stopped + 2.0)
+        process.send_signal(signal.SIGCONT)
+        finish(process, 1)
+        assert mock.state()["mode"] == "POSCTL"
+
+
 @pytest.mark.slow
 def test_frozen_in_flight_ardupilot_levels_and_thawed_it_is_asked_to_hold(tmp_path):
     """It stays in the mode in which it obeyed; nobody took it, so our hand back is right."""

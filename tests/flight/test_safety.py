@@ -74,7 +74,7 @@ BREACHES = [
     ("silence", control(answered=OLD), HAND_BACK, 0.0, "cannot be used"),
     ("disarmed", autopilot(armed=False), LET_GO, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
-    ("failsafe", autopilot(failsafe=True), LET_GO, 0.0, "failsafe"),
+    ("failsafe", autopilot(failsafe=True), HAND_BACK, 0.0, "failsafe"),
     ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.2, "battery at 15 %"),
     ("battery", autopilot(battery=Battery(NOW - 6.0, 16.0, 0.9)), LAND, 0.2, "not reported"),
     ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.2, "GPS position lost"),
@@ -182,11 +182,11 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
     climb = Climb()
     climb.see(motion(off_course=6.0), 2.0)
-    both = autopilot(failsafe=True, battery=Battery(inf, 14.0, 0.1))
+    both = autopilot(armed=False, failsafe=True)
     verdict, after = climb.see(both, 1.0)
     assert (verdict.action, verdict.reason, after) == (
         LET_GO,
-        "the autopilot reports a failsafe",
+        "the vehicle disarmed in flight",
         0.0,
     )
 

@@ -33,7 +33,9 @@ def _authority(config: Config) -> tuple[Monitor, ...]:
         Monitor("silence", still, _HAND_BACK, mutes=True),
         Monitor("disarmed", authority.disarmed, _LET_GO),
         Monitor("landed", authority.landed, _LAND),
-        Monitor("failsafe", authority.failsafe, _LET_GO),
+        # Where it acts, the mode is not ours any more, and that is seen first. ArduPilot tells of
+        # one without an action, too, in which nobody would fly.
+        Monitor("failsafe", authority.failsafe, _HAND_BACK),
     )
 
 

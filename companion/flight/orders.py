@@ -1,0 +1,90 @@
+"""Commands to a vehicle that somebody else may take at any moment."""
+
+import asyncio
+from collections.abc import Callable, Set
+
+from companion.flight.ending import Exit, FlightEnded
+from companion.flight.rig import Rig
+from companion.flight.roles import require_role
+from companion.mavlink.command import Command
+from companion.mavlink.commands import command_name
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.roles import Role
+
+_TRIES = 4
+_SHOWS = 3.0
+"""After its first command a take-off shows within so long, s; it takes longer than a mode does."""
+_ENTERED = 1.0
+"""A mode whose command was accepted shows in a heartbeat within so long, s, or was left again."""
+
+Done = Callable[[], bool]
+"""Whether the vehicle does what was ordered; may end the flight instead."""
+
+
+async def order(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> None:
+    """Command until it is answered, and ask each time before whose the vehicle is.
+
+    A command is never repeated blindly: the first one may have been obeyed, only its answer lost,
+    and a pilot may have decided otherwise since.
+
+    Args:
+        rig: The parts of the flight.
+        command: It.
+        allowed: What the vehicle may be doing; else it is left alone.
+        done: See `Done`; looked at before a repetition.
+
+    Raises:
+        FlightEnded: The vehicle is somebody else's.
+        CommandRefused: The autopilot does not want to.
+        CommandTimeout: It never answered.
+    """
+    for given in range(_TRIES):
+        await rig.fresh_heartbeat()
+        if given > 0 and done():
+            return
+        require_role(rig.link, allowed)
+        try:
+            await rig.link.command(*command, retries=0)
+            return
+        except CommandTimeout:
+            continue
+        except CommandRefused:
+            # What does it already refuses to be told again.
+            if given == 0 or not await _comes(rig, done):
+                raise
+            return
+    await rig.fresh_heartbeat()
+    if not done():
+        name = command_name(command.command)
+        raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
+
+
+async def enter(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> None:
+    """`order`, and wait until it shows; as there.
+
+    Raises:
+        FlightEnded: Also if it was accepted and somebody decided otherwise at once.
+    """
+    await order(rig, command, allowed, done)
+    accepted = asyncio.get_running_loop().time()
+
+    def entered() -> bool:
+        heartbeat = rig.link.state.heartbeat
+        if done():
+            return True
+        if heartbeat is not None and heartbeat.received > accepted + _ENTERED:
+            raise FlightEnded(
+                f"the mode was accepted and left again, not by us: {heartbeat.mode}", Exit.LET_GO
+            )
+        return False
+
+    await rig.until(entered)
+
+
+async def _comes(rig: Rig, done: Done) -> bool:
+    try:
+        async with asyncio.timeout(_SHOWS):
+            await rig.until(done)
+    except TimeoutError:
+        return False
+    return True

@@ -1,0 +1,91 @@
+"""Orders: repeated only after asking whose the vehicle is, and never without need."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from companion.flight.ending import Exit, FlightEnded
+from companion.flight.orders import enter, order
+from companion.mavlink.command import Command
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.roles import Role
+
+LAND = Command(21)
+LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
+
+
+class Vehicle:
+    """Answers as it is told to, one answer a command, and is in one mode after each of them."""
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+        self.mode, self.failsafe, self.sent = Role.OFFBOARD, False, 0
+        self.link = self.family = self.state = self
+        self.now = 0.0
+
+    @property
+    def heartbeat(self):
+        return SimpleNamespace(received=asyncio.get_running_loop().time(), mode=self.mode.value)
+
+    def roles(self, mode):
+        return frozenset({mode})
+
+    async def fresh_heartbeat(self):
+        await asyncio.sleep(0)
+
+    async def until(self, condition):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+
+    async def command(self, number, *_, retries):
+        assert retries == 0
+        self.sent += 1
+        answer, self.mode = self.answers.pop(0)
+        if answer is not None:
+            raise answer
+
+
+def run(vehicle, work=order):
+    landing = asyncio.run(
+        work(vehicle, LAND, {Role.OFFBOARD, Role.LAND}, lambda: vehicle.mode is Role.LAND)
+    )
+    return landing, vehicle.sent
+
+
+@pytest.mark.parametrize(
+    ("answers", "sent"),
+    [
+        ([(None, Role.LAND)], 1),
+        ([(LOST, Role.OFFBOARD), (None, Role.LAND)], 2),
+        ([(LOST, Role.LAND)], 1),  # only the answer was lost
+        ([(LOST, Role.OFFBOARD), (REFUSED, Role.LAND)], 2),  # it does so already
+    ],
+)
+def test_it_is_given_until_it_is_answered_or_shows(answers, sent):
+    assert run(Vehicle(*answers)) == (None, sent)
+
+
+def test_it_is_not_repeated_over_a_mode_that_is_not_ours():
+    vehicle = Vehicle((LOST, Role.HOLD))
+    with pytest.raises(FlightEnded, match="took over") as ended:
+        run(vehicle)
+    assert (ended.value.exit, vehicle.sent) == (Exit.LET_GO, 1)
+
+
+def test_a_refusal_is_one():
+    with pytest.raises(CommandRefused):
+        run(Vehicle((REFUSED, Role.OFFBOARD)))
+
+
+def test_it_is_given_four_times_at_most():
+    vehicle = Vehicle(*[(LOST, Role.OFFBOARD)] * 9)
+    with pytest.raises(CommandTimeout, match="no answer to 4 tries"):
+        run(vehicle)
+    assert vehicle.sent == 4
+
+
+def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
+    monkeypatch.setattr("companion.flight.orders._ENTERED", 0.01)
+    with pytest.raises(FlightEnded, match="left again, not by us: hold"):
+        run(Vehicle((None, Role.HOLD)), enter)
