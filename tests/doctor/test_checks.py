@@ -231,15 +231,10 @@ def untold(*names, family=PX4, values=GOOD.survey.values, **link):
 def test_where_the_link_loses_frames_an_unsafe_value_may_have_been_lost(link):
     """The vehicle's frames or ours; and where the autopilot says that it has none, nothing was."""
     assert untold(**link) == {}
-    assert untold("COM_OBL_RC_ACT", "GF_ACTION", **link) == {
-        "COM_OBL_RC_ACT": UNSAFE,
-        "GF_ACTION": UNSAFE,
-    }
-    assert untold("MAN_OVERRIDE_SPD", **link) == {Key.PARAMETERS: INEFFECTIVE}
-    assert untold("NAV_RCL_ACT", "MAN_OVERRIDE_SPD", **link) == {
-        "NAV_RCL_ACT": UNSAFE,
-        Key.PARAMETERS: INEFFECTIVE,
-    }
+    unsafe, named = {"COM_OBL_RC_ACT": UNSAFE}, {Key.PARAMETERS: INEFFECTIVE}
+    assert untold("COM_OBL_RC_ACT", **link) == unsafe
+    assert untold("MAN_OVERRIDE_SPD", **link) == named
+    assert untold("COM_OBL_RC_ACT", "MAN_OVERRIDE_SPD", **link) == {**unsafe, **named}
 
 
 def test_on_a_good_link_what_every_version_has_is_named_and_nothing_else():
