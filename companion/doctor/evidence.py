@@ -7,6 +7,7 @@ from typing import NamedTuple
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
+from companion.mavlink.stats import share_lost
 from companion.mavlink.streams import StreamRate
 
 
@@ -22,10 +23,6 @@ class Identity(NamedTuple):
     version: str | None = None
     capabilities: int | None = None
     uid: str | None = None
-
-
-SOME_LOST = 0.02
-"""This share of messages may be lost before anything comes of it."""
 
 
 class LinkQuality(NamedTuple):
@@ -54,7 +51,7 @@ class LinkQuality(NamedTuple):
     @property
     def loss(self) -> float:
         """Share of the vehicle's messages that did not come."""
-        return self.lost / max(1, self.lost + self.frames)
+        return share_lost(self.frames, self.lost)
 
 
 class SampleTimes(NamedTuple):

@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Iterator
 
 from companion.config import Config
-from companion.doctor.evidence import SOME_LOST, Evidence
+from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
 from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.stats import SOME_LOST
 from companion.mavlink.streams import StreamRate
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.doctor.evidence import SOME_LOST, Evidence
+from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Change, Finding, Key
 from companion.doctor.setup import autopilot_setup
 from companion.mavlink.parameter_rules import ParameterFinding, ParameterRule, Verdict, judge
+from companion.mavlink.parameter_survey import Survey
+from companion.mavlink.stats import SOME_LOST
 
 
 def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -22,20 +24,10 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "PARAM_REQUEST_READ",
         )
         return
-    unread = [rule for rule in rules if rule.name not in survey.values]
-    for rule in unread:
-        if rule.vital:
+    for rule in rules:
+        if rule.vital and rule.name not in survey.values:
             yield _missing(rule, evidence.family.name)
-    if unread and evidence.link.loss > SOME_LOST:
-        yield Finding(
-            Key.PARAMETERS,
-            Verdict.INEFFECTIVE,
-            f"not told: {', '.join(rule.name for rule in unread)}",
-            "the autopilot has none of that name, or the link lost the answer; so what they decide "
-            "was not looked at",
-            "mend the link, or look at them with a ground station",
-            "PARAM_REQUEST_READ",
-        )
+    yield from _untold(evidence)
     for found in judge(rules, survey.values, autopilot_setup(config)):
         yield _finding(found, survey.names[found.rule.name])
 
@@ -49,6 +41,43 @@ def _missing(rule: ParameterRule, family: str) -> Finding:
         f"mend the link; where it has none, this needs a newer version of {family}",
         rule.source,
     )
+
+
+def _untold(evidence: Evidence) -> Iterator[Finding]:
+    """What may have been lost on the way; on a good link it is what this version has not."""
+    survey = evidence.survey
+    lossy = survey.lossy or evidence.link.loss > SOME_LOST
+    rules = [rule for rule in evidence.family.parameters if not rule.vital]
+    hidden = [rule for rule in rules if rule.universal and _hidden(rule, survey)]
+    unread = [rule.name for rule in hidden]
+    if lossy:
+        for rule in hidden:
+            yield Finding(
+                rule.name,
+                Verdict.UNSAFE,
+                f"{rule.name} was not told, and the link loses frames",
+                f"it cannot be known {rule.meaning}",
+                "mend the link",
+                rule.source,
+            )
+        others = (rule.name for rule in rules if rule.name in survey.untold)
+        unread = [name for name in others if name not in unread]
+    if unread:
+        yield Finding(
+            Key.PARAMETERS,
+            Verdict.INEFFECTIVE,
+            f"not told: {', '.join(unread)}",
+            "the autopilot has none of that name, or the link lost the answer; so what they decide "
+            "was not looked at",
+            "mend the link, or look at them with a ground station",
+            "PARAM_REQUEST_READ",
+        )
+
+
+def _hidden(rule: ParameterRule, survey: Survey) -> bool:
+    """Whether it, or what other versions have in its place, exists for all we know, unread."""
+    places = {rule.name, rule.instead}
+    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
 
 
 def _finding(found: ParameterFinding, name: str) -> Finding:

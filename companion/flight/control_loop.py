@@ -6,7 +6,15 @@ from math import inf
 from time import perf_counter_ns
 from typing import NamedTuple
 
-from companion.attitude import AttitudeError, BodyRates, Limits, Planner, Target
+from companion.attitude import (
+    AttitudeError,
+    BodyRates,
+    InvalidQuaternionError,
+    Limits,
+    Planner,
+    Target,
+    is_unit,
+)
 from companion.attitude.rotation import within_limits
 from companion.flight.estimator_resets import EstimatorResets
 from companion.flight.freshness import SampleClock
@@ -131,13 +139,7 @@ class ControlLoop:
             self.stale += 1
             return
         try:
-            if command.idle:
-                rates, thrust = BodyRates(0.0, 0.0, 0.0), 0.0
-            else:
-                rates = self._rates(sample, command, dt)
-                thrust = self._hover_thrust.normalised(
-                    command.acceleration_down, sample.q, sample.body_rates
-                )
+            rates, thrust = self._answer(sample, command, dt)
             left = self._send(sample.time_boot_ms, rates, thrust)
         except (AttitudeError, InvalidSetpoint):
             left = False
@@ -145,6 +147,19 @@ class ControlLoop:
             self.refused += 1
             return
         self._account(sample, command, rates, thrust)
+
+    def _answer(
+        self, sample: AttitudeSample, command: Command, dt: float
+    ) -> tuple[BodyRates, float]:
+        """Rates and thrust for a sample; raises `AttitudeError` where there are none."""
+        if command.idle:
+            return BodyRates(0.0, 0.0, 0.0), 0.0
+        # Not left to the planner: rates by guidance do not ask it, and the thrust does not look.
+        if not is_unit(sample.q):
+            raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
+        return self._rates(sample, command, dt), self._hover_thrust.normalised(
+            command.acceleration_down, sample.q, sample.body_rates
+        )
 
     def _rates(self, sample: AttitudeSample, command: Command, dt: float) -> BodyRates:
         """The planner's answer, or the rates that guidance asks for within the same limits."""

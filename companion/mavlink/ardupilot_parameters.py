@@ -180,6 +180,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "what ArduPilot does when the pilot's transmitter is lost",
         _transmitter_failsafe,
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("FS_OPTIONS",),
@@ -205,6 +206,8 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "which checks before arming are left out",
         required(UNSAFE, 0.0, "checks before arming are left out"),
         _REFERENCE,
+        universal=True,
+        instead="ARMING_CHECK",
     ),
     ParameterRule(
         ("ARMING_CHECK",),
@@ -217,6 +220,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "after how long on the ground ArduPilot disarms itself",
         positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("SCHED_LOOP_RATE",), "how often ArduPilot's main loop runs, Hz", _loop_rate, _MEASURED
@@ -233,6 +237,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
             1.0,
         ),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("FENCE_ACTION",),
@@ -251,11 +256,13 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "what ArduPilot does about a low battery",
         forbidden(UNSAFE, {5.0: _STOPS_MOTORS}, 2.0),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("BATT_FS_CRT_ACT",),
         "what ArduPilot does about a battery that is nearly empty",
         _battery_failsafe,
         _REFERENCE,
+        universal=True,
     ),
 )

@@ -115,7 +115,9 @@ class Conversation:
 
         Raises:
             NotConnected: It was not heard yet, so its manners are not known.
-            UnknownParameter: It has none of that name.
+            UnansweredParameter: It never answered; some say nothing of names that they have not.
+            UnknownParameter: It says that it has none of that name.
+            ParameterRefused: It has, and does not tell.
             LinkLost: The connection dropped meanwhile.
         """
         return await self._parameters.read(name, timeout_s, retries)

@@ -76,5 +76,9 @@ class UnknownParameter(ParameterError):  # noqa: N818
     """The autopilot has no parameter of that name, or never answered for it."""
 
 
+class UnansweredParameter(UnknownParameter):
+    """The autopilot never answered for it: it has none of that name, or the link lost it."""
+
+
 class ParameterRefused(ParameterError):  # noqa: N818
     """The autopilot kept another value than the one written."""

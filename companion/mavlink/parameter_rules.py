@@ -7,6 +7,7 @@ writes a parameter.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from typing import NamedTuple
 
 Values = Mapping[str, float]
@@ -83,6 +84,9 @@ class ParameterRule:
         source: Where this is known from.
         vital: Without it nobody can know how a setpoint is obeyed, or for how long, so a vehicle
             that does not tell it is not flown.
+        universal: Every supported version has it, and some value of it is unsafe: where it was not
+            told on a link that loses frames, such a value may have been lost.
+        instead: Another rule's name, of the parameter that other versions have in its place.
         reboot: A change counts only after the autopilot was started anew.
     """
 
@@ -91,12 +95,19 @@ class ParameterRule:
     check: Check
     source: str
     vital: bool = False
+    universal: bool = False
+    instead: str = ""
     reboot: bool = False
 
     @property
     def name(self) -> str:
         """The newest name."""
         return self.names[0]
+
+
+_NO_NUMBER = Complaint(
+    Verdict.UNSAFE, "that is no number, and nobody knows what the autopilot makes of it"
+)
 
 
 class ParameterFinding(NamedTuple):
@@ -118,13 +129,17 @@ class ParameterFinding(NamedTuple):
 
 
 def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[ParameterFinding]:
-    """What the rules find, in their order; a parameter that the autopilot has not is left out."""
+    """What the rules find, in their order; a parameter that the autopilot has not is left out.
+
+    One that is NaN or infinite is unsafe whatever its rule says, and tells other rules nothing.
+    """
     findings = []
+    finite = {name: value for name, value in values.items() if isfinite(value)}
     for rule in rules:
         if rule.name not in values:
             continue
         value = values[rule.name]
-        complaint = rule.check(value, values, setup)
+        complaint = rule.check(value, finite, setup) if isfinite(value) else _NO_NUMBER
         if complaint is None:
             findings.append(ParameterFinding(rule, value, Verdict.SAFE))
         else:

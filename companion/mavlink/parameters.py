@@ -11,7 +11,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from companion.mavlink.codec import MESSAGE_IDS, Message
-from companion.mavlink.errors import ParameterRefused, UnknownParameter
+from companion.mavlink.errors import ParameterRefused, UnansweredParameter, UnknownParameter
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.router import Router
@@ -73,7 +73,9 @@ class ParameterClient:
         """Read one.
 
         Raises:
-            UnknownParameter: The autopilot says so, or never answers.
+            UnansweredParameter: The autopilot never answers.
+            UnknownParameter: It says that it has none.
+            ParameterRefused: It says that it has, and does not tell.
             LinkLost: The connection dropped meanwhile.
         """
         self._check(name)
@@ -84,7 +86,7 @@ class ParameterClient:
         """Write one, in the type that the autopilot has for it; return what it then holds.
 
         Raises:
-            UnknownParameter: As for `read`.
+            UnansweredParameter, UnknownParameter: As for `read`.
             ParameterRefused: The value does not fit the type, or the autopilot keeps another.
             LinkLost: The connection dropped meanwhile.
         """
@@ -132,7 +134,7 @@ class ParameterClient:
                     return answer
             finally:
                 del self._waiting[name]
-        raise UnknownParameter(
+        raise UnansweredParameter(
             f"{name}: no answer after {retries + 1} tries of {timeout_s:g} s; the autopilot "
             "probably has no parameter of that name (names change between versions)"
         )
@@ -146,7 +148,8 @@ class ParameterClient:
             integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
-        return int(number) if value.kind in _INTEGERS else number
+        # NaN and infinity are no integers; whoever asked is to see them as they came.
+        return int(number) if value.kind in _INTEGERS and isfinite(number) else number
 
     def _bytes(self, name: str, value: float, kind: int) -> bytes:
         if not isfinite(value):

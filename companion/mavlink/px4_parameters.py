@@ -28,6 +28,8 @@ _STOPS_MOTORS = "the motors stop in the air"
 _STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
 _INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
 _TERMINATION_OFF = 121212
+_FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
+_NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
 _OVERSHOOT = 15.0
 """By which a gust or a step may carry the tilt over its limit, degrees."""
 
@@ -47,14 +49,20 @@ def _attitude_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
 
 def _termination(value: float, values: Values, setup: Setup) -> Complaint | None:
     """Flight termination is only to be armed where our own tilt cannot set it off."""
-    angles = [values[name] for name in ("FD_FAIL_R", "FD_FAIL_P") if values.get(name, 0.0) > 0.0]
-    if value == _TERMINATION_OFF or not angles:
+    if value == _TERMINATION_OFF:
         return None
-    if min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
+    if not all(name in values for name in _FAILURE_ANGLES):
+        return Complaint(
+            UNSAFE,
+            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; mend the link, or "
+            f"switch termination off ({_TERMINATION_OFF})",
+        )
+    angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
+    if not angles or min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
         return None
     return Complaint(
         UNSAFE,
-        f"a tilt of {min(angles):g}° (FD_FAIL_R, FD_FAIL_P) stops the motors, and "
+        f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
         f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; raise them, lower it, or switch "
         f"termination off ({_TERMINATION_OFF})",
     )
@@ -102,6 +110,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             set_to=5.0,
         ),
         f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
     ),
     ParameterRule(
         ("COM_RC_OVERRIDE",),
@@ -128,6 +137,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             UNSAFE, {4.0: "stick input is disabled, so that no pilot can take over"}, set_to=0.0
         ),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("MAV_FWDEXTSP",),
@@ -140,12 +150,14 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "what PX4 does when the ground station's heartbeat stops, although our setpoints continue",
         forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
         "what PX4 does when the pilot's transmitter is lost",
         forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("COM_RCL_EXCEPT",),
@@ -170,6 +182,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "after how long on the ground PX4 disarms itself",
         positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
         f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
     ),
     ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
     ParameterRule(
@@ -191,6 +204,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "what PX4 does at its own geofence",
         forbidden(UNSAFE, {4.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
+        universal=True,
     ),
     ParameterRule(
         ("COM_LOW_BAT_ACT",),
@@ -214,6 +228,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "whether the failure detector stops motors",
         _termination,
         _REFERENCE,
+        universal=True,
         reboot=True,
     ),
     ParameterRule(

@@ -2,6 +2,14 @@
 
 from dataclasses import dataclass, field
 
+SOME_LOST = 0.02
+"""This share of messages may be lost before anything comes of it."""
+
+
+def share_lost(frames: int, lost: int) -> float:
+    """Share of what was sent that did not come, of what came and what is missing."""
+    return lost / max(1, lost + frames)
+
 
 @dataclass
 class LinkStats:

@@ -1,6 +1,7 @@
 """Each check by itself, on evidence made up: what it finds, and where it begins to."""
 
 import json
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -215,14 +216,51 @@ def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
     assert without == {"GUID_OPTIONS": UNSAFE, "ATC_ANGLE_BOOST": UNSAFE}
 
 
-def test_a_parameter_that_was_not_told_is_named_where_the_link_loses_frames():
-    """Without losses it is one that this version of the autopilot has not."""
-    lossy = replace(GOOD, link=QUALITY._replace(lost=30))
-    assert found(parameters) == {}
-    assert found(parameters, lossy) == {Key.PARAMETERS: INEFFECTIVE}
-    whole = {rule.name: GOOD.survey.values.get(rule.name, 0.0) for rule in PX4.parameters}
-    told = replace(lossy, survey=Survey(whole, {name: name for name in whole}))
-    assert Key.PARAMETERS not in found(parameters, told)
+LOSSY_LINK = {"link": QUALITY._replace(lost=30)}
+LOSSY_SURVEY = {"survey": GOOD.survey._replace(lossy=True)}
+
+
+def untold(*names, family=PX4, values=GOOD.survey.values, **link):
+    """What is found where the link lost what it was told of these."""
+    evidence = replace(GOOD, family=family, **link)
+    read = evidence.survey._replace(values=values, names={name: name for name in values})
+    return found(parameters, replace(evidence, survey=read._replace(untold=frozenset(names))))
+
+
+@pytest.mark.parametrize("link", [LOSSY_LINK, LOSSY_SURVEY])
+def test_where_the_link_loses_frames_an_unsafe_value_may_have_been_lost(link):
+    """The vehicle's frames or ours; and where the autopilot says that it has none, nothing was."""
+    assert untold(**link) == {}
+    unsafe, named = {"COM_OBL_RC_ACT": UNSAFE}, {Key.PARAMETERS: INEFFECTIVE}
+    assert untold("COM_OBL_RC_ACT", **link) == unsafe
+    assert untold("MAN_OVERRIDE_SPD", **link) == named
+    assert untold("COM_OBL_RC_ACT", "MAN_OVERRIDE_SPD", **link) == {**unsafe, **named}
+
+
+def test_on_a_good_link_what_every_version_has_is_named_and_nothing_else():
+    """The others are those that this version has not."""
+    assert untold("MAN_OVERRIDE_SPD", "COM_RC_OVERRIDE") == {}
+    assert untold("COM_RC_IN_MODE") == {Key.PARAMETERS: INEFFECTIVE}
+
+
+def test_what_other_versions_have_in_its_place_stands_for_it():
+    vital = {"GUID_OPTIONS": 8.0, "ATC_ANGLE_BOOST": 0.0, "GUID_TIMEOUT": 1.0}
+    old, new = {**vital, "ARMING_CHECK": 1.0}, {**vital, "ARMING_SKIPCHK": 0.0}
+    rest = {"family": ARDUPILOT, **LOSSY_LINK}
+    named = {Key.PARAMETERS: INEFFECTIVE}
+    assert untold("ARMING_SKIPCHK", values=old, **rest) == named
+    assert untold("ARMING_CHECK", values=new, **rest) == named
+    lost = {"ARMING_SKIPCHK": UNSAFE}
+    assert untold("ARMING_SKIPCHK", values=vital, **rest) == lost  # it has no ARMING_CHECK, it says
+    assert untold("ARMING_CHECK", values=vital, **rest) == {**lost, **named}
+    assert untold(values=vital, **rest) == {}
+
+
+def test_a_parameter_that_is_no_number_is_told_and_nothing_is_proposed():
+    evidence = replace(GOOD, survey=GOOD.survey._replace(values={"COM_OF_LOSS_T": math.nan}))
+    (finding,) = parameters(CONFIG, evidence)
+    assert (finding.verdict, finding.change) == (UNSAFE, None)
+    assert "COM_OF_LOSS_T is nan" in finding.sentence()
 
 
 def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():

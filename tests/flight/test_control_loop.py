@@ -126,11 +126,25 @@ def test_a_sample_that_was_long_under_way_is_not_answered():
     assert (len(bench.sent), bench.loop.stale) == (10, 1)
 
 
-@pytest.mark.parametrize("q", [(1.01, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)])
-def test_an_unusable_attitude_is_refused_and_counted(q):
+@pytest.mark.parametrize("rates", [None, BodyRates(0.3, -0.4, 0.5)])
+@pytest.mark.parametrize(
+    "q",
+    [
+        (1.01, 0.0, 0.0, 0.0),
+        (math.nan, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0),
+        (0.5, 9.0, 0.0, 0.0),
+        (math.inf, 0.0, 0.0, 0.0),
+    ],
+)
+def test_an_unusable_attitude_is_refused_and_counted(q, rates):
+    """Whether the planner was to answer it or guidance asks for rates."""
     bench = Bench()
-    bench.run(3, q=q)
-    assert (bench.sent, bench.loop.refused) == ([], 3)
+    for _ in range(3):
+        bench.time += 0.004
+        bench.refresh(body_rates=rates)
+        bench.sample(q=q)
+    assert (bench.sent, bench.loop.refused, bench.loop.setpoints) == ([], 3, 0)
 
 
 def test_a_setpoint_that_could_not_leave_is_no_answer():
@@ -148,7 +162,9 @@ def test_idle_sends_neither_rates_nor_thrust():
     bench.time += 0.004
     bench.refresh(idle=True)
     bench.sample(q=(0.8, 0.6, 0.0, 0.0))
-    assert bench.sent[0][1:] == (BodyRates(0.0, 0.0, 0.0), 0.0)
+    bench.time += 0.004
+    bench.sample(q=(0.0, 0.0, 0.0, 0.0))  # on the ground it asks for nothing, whatever the attitude
+    assert [answer[1:] for answer in bench.sent] == 2 * [(BodyRates(0.0, 0.0, 0.0), 0.0)]
 
 
 def test_after_a_gap_it_waits_for_the_mode_once_guarded():

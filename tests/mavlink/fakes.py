@@ -102,13 +102,15 @@ class FakeVehicle:
 
 
 @asynccontextmanager
-async def linked(tap: Any = None, **settings: Any) -> AsyncIterator[tuple[Link, FakeVehicle]]:
+async def linked(
+    tap: Any = None, *, autopilot: int = PX4, **settings: Any
+) -> AsyncIterator[tuple[Link, FakeVehicle]]:
     """An open UDP link whose vehicle has been heard."""
     settings.setdefault("endpoint", "udpin://127.0.0.1:0")
     async with Link(LinkSettings(**settings), tap) as link:
         vehicle = await FakeVehicle(link.local_address).open_udp()
         try:
-            vehicle.send(heartbeat())
+            vehicle.send(heartbeat(autopilot=autopilot))
             await link.wait_connected(5.0)
             yield link, vehicle
         finally:

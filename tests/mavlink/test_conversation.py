@@ -1,6 +1,7 @@
 """Commands, parameters, rates and clocks, against a vehicle that answers well and badly."""
 
 import asyncio
+import math
 import struct
 
 import pytest
@@ -12,6 +13,7 @@ from companion.mavlink import (
     LinkLost,
     LinkTimeout,
     ParameterRefused,
+    UnansweredParameter,
     UnknownMessage,
     UnknownParameter,
 )
@@ -20,6 +22,7 @@ from companion.mavlink.px4 import Px4
 from tests.mavlink.fakes import attitude, linked, until
 
 ARM = 400
+ARDUPILOT = 3
 INT32, REAL32 = 6, 9
 
 
@@ -228,15 +231,16 @@ def test_unknown_parameters_by_silence_and_by_error(run):
     async def scene():
         async with linked() as (link, vehicle):
             parameters = ParameterVehicle(vehicle)
-            with pytest.raises(UnknownParameter, match="COM_OF_LOST: no answer after 2 tries"):
+            with pytest.raises(UnansweredParameter, match="COM_OF_LOST: no answer after 2 tries"):
                 await link.read_parameter("COM_OF_LOST", timeout_s=0.01, retries=1)
             with pytest.raises(UnknownParameter, match="1 to 16"):
                 await link.read_parameter("A_NAME_THAT_IS_TOO_LONG")
             parameters.value = lambda name: [
                 dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1)
             ]
-            with pytest.raises(UnknownParameter, match="has no such parameter"):
+            with pytest.raises(UnknownParameter, match="has no such parameter") as told:
                 await link.read_parameter("COM_OF_LOST")
+            assert not isinstance(told.value, UnansweredParameter)
             parameters.value = lambda name: [
                 dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 5)
             ]
@@ -258,6 +262,21 @@ def test_a_value_that_cannot_be_held_is_refused(run):
             parameters.locked = True
             with pytest.raises(ParameterRefused, match="keeps 0 instead of 4"):
                 await link.write_parameter("COM_OBL_RC_ACT", 4)
+
+    run(scene())
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_read_as_it_came_even_of_an_integer(run, number):
+    """ArduPilot sends integers as numbers in a float."""
+
+    async def scene():
+        async with linked(autopilot=ARDUPILOT) as (link, vehicle):
+            told = dialect.MAVLink_param_value_message(b"GUID_OPTIONS", number, INT32, 1, 0)
+            vehicle.answers["PARAM_REQUEST_READ"] = lambda _: [told]
+            read = await link.read_parameter("GUID_OPTIONS")
+            assert isinstance(read, float)
+            assert str(read) == str(number)
 
     run(scene())
 

@@ -5,7 +5,8 @@ import asyncio
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.mavlink.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from companion.mavlink.parameter_survey import survey
+from companion.mavlink.parameter_survey import Patience, survey
+from companion.mavlink.px4_parameters import PX4_PARAMETERS
 from tests.mavlink.fakes import linked
 
 OLD = {"SYSID_MYGCS": 255.0, "FS_OPTIONS": 16.0}
@@ -26,10 +27,98 @@ def test_an_old_version_answers_to_the_old_names():
     async def scene():
         async with linked() as (link, vehicle):
             vehicle.answers["PARAM_REQUEST_READ"] = answer
-            return await survey(link, rules, timeout_s=0.05, retries=0)
+            return await survey(link, rules, at_first=Patience(0.05, 1))
 
-    values, names = asyncio.run(scene())
+    values, names, untold, lossy = asyncio.run(scene())
+    assert (untold, lossy) == ({"ARMING_SKIPCHK"}, False)
     assert values == {"MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
     assert names == {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
     # All are asked for before the first has an answer; the old name only after the new had none.
     assert asked == ["MAV_GCS_SYSID", "FS_OPTIONS", "ARMING_SKIPCHK", "SYSID_MYGCS"]
+
+
+class Lossy:
+    """A vehicle that has `VALUES` on a link that loses the first questions for some of them.
+
+    Args:
+        lost: How many, by name.
+        says_no: Whether it says of other names that it has none.
+        gaps: Whether frames of its own are lost, too.
+    """
+
+    VALUES = ("COM_OF_LOSS_T", "COM_OBL_RC_ACT")
+
+    def __init__(self, lost, *, says_no=False, gaps=False):
+        self.lost, self.says_no, self.gaps = dict(lost), says_no, gaps
+        self.asked = []
+
+    def answer(self, vehicle, request):
+        name = request.param_id
+        self.asked.append(name)
+        if self.gaps:
+            vehicle.mav.seq = (vehicle.mav.seq + 3) & 0xFF
+        if self.lost.get(name, 0) > 0:
+            self.lost[name] -= 1
+            return []
+        if name in self.VALUES:
+            return [dialect.MAVLink_param_value_message(name.encode(), 1.0, 9, 2, 0)]
+        if self.says_no:
+            return [dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1)]
+        return []
+
+    def survey(self):
+        """COM_OF_LOSS_T, COM_OBL_RC_ACT and MAN_OVERRIDE_SPD; twice first, then three times."""
+        wanted = (*self.VALUES, "MAN_OVERRIDE_SPD")
+        rules = [rule for rule in PX4_PARAMETERS if rule.name in wanted]
+
+        async def scene():
+            async with linked() as (link, vehicle):
+                vehicle.answers["PARAM_REQUEST_READ"] = lambda request: self.answer(
+                    vehicle, request
+                )
+                patience = {"at_first": Patience(0.05, 2), "once_more": Patience(0.05, 3)}
+                return await survey(link, rules, **patience)
+
+        return asyncio.run(scene())
+
+
+def test_on_a_good_link_what_gets_no_answer_is_not_asked_for_once_more():
+    """An older PX4 says nothing of what it has not, and that must not cost time twice."""
+    vehicle = Lossy({})
+    read = vehicle.survey()
+    assert (set(read.values), read.untold, read.lossy) == (
+        set(Lossy.VALUES),
+        {"MAN_OVERRIDE_SPD"},
+        False,
+    )
+    assert vehicle.asked.count("MAN_OVERRIDE_SPD") == 2
+
+
+def test_where_a_question_was_lost_the_others_are_asked_for_once_more_after_all():
+    vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 4})
+    read = vehicle.survey()
+    assert read.values == {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 1.0}
+    assert (read.untold, read.lossy) == ({"MAN_OVERRIDE_SPD"}, True)
+    assert vehicle.asked.count("COM_OF_LOSS_T") == 2
+    assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3
+
+
+def test_where_the_vehicles_frames_are_lost_they_are_too():
+    vehicle = Lossy({"COM_OBL_RC_ACT": 2}, gaps=True)
+    read = vehicle.survey()
+    assert (set(read.values), read.lossy) == (set(Lossy.VALUES), True)
+
+
+def test_what_the_autopilot_says_it_has_not_is_neither_untold_nor_asked_for_again():
+    vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 9}, says_no=True)
+    read = vehicle.survey()
+    assert (read.untold, read.lossy) == ({"COM_OBL_RC_ACT"}, True)
+    assert vehicle.asked.count("MAN_OVERRIDE_SPD") == 1
+    assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3  # and no more: it is bounded
+
+
+def test_who_answers_nothing_is_not_asked_for_long():
+    vehicle = Lossy(dict.fromkeys(Lossy.VALUES, 99), gaps=True)
+    read = vehicle.survey()
+    assert (read.values, len(read.untold)) == ({}, 3)
+    assert len(vehicle.asked) == 3 * 2
