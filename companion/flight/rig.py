@@ -75,24 +75,29 @@ class Rig:
         come before what was sent before it was asked, so the next heartbeat after it is fresh; and
         so is one that comes when all that waited must have been read, should no answer come.
         """
-        clock = asyncio.get_running_loop().time
-        since = clock() + _BACKLOG
+        loop = asyncio.get_running_loop()
+        since = loop.time() + _BACKLOG
+        fresh = loop.create_future()
 
         async def ask() -> None:
             nonlocal since
             with suppress(LinkError):
-                await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT, retries=0)
-                since = min(since, clock())
+                for _ in range(2):  # PX4 sends it before its answer, so only the second one counts
+                    await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT, retries=0)
+                    since = min(since, loop.time())
 
-        def fresh() -> bool:
+        def look(_: object) -> None:
             heartbeat = self.link.state.heartbeat
-            return heartbeat is not None and heartbeat.received >= since
+            if heartbeat is not None and heartbeat.received >= since and not fresh.done():
+                fresh.set_result(None)
 
+        unsubscribe = self.link.subscribe("HEARTBEAT", look)
         question = asyncio.create_task(ask())
         try:
-            await self.until(fresh)
+            await fresh
         finally:
             question.cancel()
+            unsubscribe()
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, unless it is stale."""

@@ -69,7 +69,6 @@ ELSE = {
     ("ardupilot", "stream", "freeze clock"): LANDED,
     ("ardupilot", "stream", "NaN attitude"): LANDED,
     ("ardupilot", "stream", "low battery"): LANDED,
-    ("ardupilot", "stream", "pilot takeover"): OK,  # in the instant in which we command GUIDED
 }
 """Where a family differs."""
 SHORT = {
