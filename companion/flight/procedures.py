@@ -93,6 +93,7 @@ async def hand_back(rig: Rig) -> None:
     if not rig.loop.guarded:
         # Control stood still, and what was heard since may be old: who has the vehicle now?
         rig.detail = "the autopilot's mode"
+        await rig.caught_up()
         await rig.fresh_heartbeat()
         require_role(rig.link, {Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
     rig.detail = "the autopilot to hold"

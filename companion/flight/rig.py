@@ -51,7 +51,6 @@ class Rig:
         """Stop answering samples: from here on nothing is sent that steers."""
         self.loop.on = False
         self.loop.guarded = False
-        self.link.quiet()
         self.guide.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
@@ -60,6 +59,13 @@ class Rig:
             self.detail = detail
         while not condition():  # noqa: ASYNC110 - telemetry sets no events
             await asyncio.sleep(_POLL)
+
+    async def caught_up(self) -> None:
+        """Wait until all is read that waited for us while we stood still.
+
+        An old heartbeat that is read late looks fresh; but what is asked now is answered behind it.
+        """
+        await self._ask_heartbeat()
 
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that is newer than this call; asked for, or the next one due."""
