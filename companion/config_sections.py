@@ -22,7 +22,7 @@ class LinkConfig(Section):
     """How to reach the autopilot."""
 
     backend: Literal["direct", "mavsdk"] = "direct"
-    """direct, or mavsdk: MAVSDK holds the connection and sends the setpoints (extra `mavsdk`)."""
+    """direct, or mavsdk: MAVSDK holds the connection, and our frames go by it (extra `mavsdk`)."""
     endpoint: str = "udpin://0.0.0.0:14540"
     """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1

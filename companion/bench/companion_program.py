@@ -7,7 +7,7 @@ from typing import NoReturn
 from companion.attitude import Target
 from companion.config import Config
 from companion.flight.assembly import hover_thrust, planner, rate_limits
-from companion.flight.control_loop import Command, ControlLoop, Deadlines, SendSetpoint
+from companion.flight.control_loop import Command, ControlLoop, Deadlines
 from companion.mavlink import Link, LinkSettings
 from companion.mavlink import loop as link_loop
 from companion.recording.trace import FlightTrace
@@ -18,17 +18,17 @@ _GUIDANCE_PERIOD_S = 0.02
 async def fly(port: int) -> None:
     """Answer each sample until killed."""
     async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
-        await answer(link, link.send_setpoint)
+        await answer(link)
 
 
-async def answer(link: Link, send: SendSetpoint) -> NoReturn:
+async def answer(link: Link) -> NoReturn:
     """Have the control loop answer; guidance leaves a fresh target 50 times a second."""
     config = Config()
     now = asyncio.get_running_loop().time
     loop = ControlLoop(
         planner(config),
         hover_thrust(config),
-        send,
+        link.send_setpoint,
         Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
         FlightTrace(),
         rate_limits(config),

@@ -37,9 +37,7 @@ _ENTRIES = (
     _Entry("echo", "blocking echo", "companion.bench.echo_program", stamp_by_time, _NO_WRAP),
     _Entry("companion", "companion", "companion.bench.companion_program", stamp_by_time, _NO_WRAP),
     _Entry("pymavlink", "blocking pymavlink", _OWN_LOOP, stamp_by_time, _NO_WRAP),
-    _Entry(
-        "companion_mavsdk", "companion, backend mavsdk", _BACKEND, stamp_by_yaw_rate, _YAW_RATE_WRAP
-    ),
+    _Entry("companion_mavsdk", "companion by MAVSDK", _BACKEND, stamp_by_time, _NO_WRAP),
     _Entry("mavsdk", "MAVSDK", "companion.bench.mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 

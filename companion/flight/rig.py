@@ -58,7 +58,6 @@ class Rig:
         """Stop answering samples: from here on nothing is sent that steers."""
         self.loop.on = False
         self.loop.guarded = False
-        self.link.quiet()
         self.guide.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:

@@ -177,9 +177,6 @@ class Link(Conversation):
             return True
         return self._outbox.setpoint(time_boot_ms, rates, thrust)
 
-    def quiet(self) -> None:
-        """See that nothing repeats a setpoint any more; here nothing ever does."""
-
     # --- inside
 
     def _on_dropped(self, reason: str) -> None:

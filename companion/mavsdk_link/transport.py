@@ -1,21 +1,21 @@
 """MAVSDK as a transport: it holds the connection to the vehicle, frames pass through it whole.
 
 MAVSDK forwards between its connections. One is the vehicle's; the other is of its kind `raw`, which
-is this process itself. So the rest of the link sees each frame as the vehicle sent it, with the
-vehicle's own time stamp, and MAVSDK's own frames, setpoints included, beside them.
+is this process itself. So each side sees each frame as the other sent it, time stamp included.
+
+What we send MAVSDK hands to a thread of its own, which has it at the kernel 0.1 ms later. It does
+not say whether the frame left, and it queues what a serial line or a TCP connection does not take.
 """
 
 import asyncio
 import os
 from collections import deque
-from collections.abc import Callable
 from time import perf_counter_ns
 
 from mavsdk.enums import ForwardingOption
 from mavsdk.exceptions import MavsdkError
 from mavsdk.logging import log_subscribe
 from mavsdk.mavsdk import Configuration, Mavsdk
-from mavsdk.system import System
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.framing import V2
@@ -40,8 +40,9 @@ class MavsdkTransport:
     Args:
         settings: Where the vehicle is and who we are. MAVSDK itself is the component above ours:
             what is addressed to it alone, it would not forward.
-        receive: Called for each frame of others, in the event loop.
-        sent: Called for each frame that MAVSDK sent on its own account, in the event loop.
+        receive: Called in the event loop for each frame but those of MAVSDK's own.
+        speaks_first: Whether a frame can leave before one was heard; over UDP in, where to is not
+            known before.
 
     Raises:
         EndpointError: With the reason.
@@ -49,13 +50,12 @@ class MavsdkTransport:
 
     reconnects = False
 
-    def __init__(
-        self, settings: LinkSettings, receive: Receive, sent: Callable[[bytes], None]
-    ) -> None:
+    def __init__(self, settings: LinkSettings, receive: Receive, *, speaks_first: bool) -> None:
         log_subscribe(lambda *_: True)  # it would print to standard output
         component = settings.source_component % 255 + 1
         self._own = bytes((settings.source_system, component))
-        self._receive, self._sent = receive, sent
+        self._receive = receive
+        self._has_peer = speaks_first
         self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -70,15 +70,10 @@ class MavsdkTransport:
             raise EndpointError(_why(settings.endpoint, str(error))) from error
         watch(self._loop, self._bell, self._read)
 
-    def system(self, number: int) -> System | None:
-        """The vehicle of that system id, once MAVSDK knows its autopilot."""
-        for system in self._mavsdk.get_systems():
-            if system.get_system_id() == number and system.has_autopilot():
-                return system
-        return None
-
     def send(self, frame: bytes) -> bool:
-        """Have MAVSDK forward one frame to the vehicle."""
+        """Have MAVSDK forward one frame to the vehicle, once; false if there is no peer yet."""
+        if not self._has_peer:
+            return False
         self._mavsdk.pass_received_raw_bytes(frame)
         return True
 
@@ -100,9 +95,8 @@ class MavsdkTransport:
         os.eventfd_read(self._bell)
         while self._waiting:
             frame, received_ns = self._waiting.popleft()
-            if frame[0] == V2 and frame[_SOURCE] == self._own:
-                self._sent(frame)
-            else:
+            if frame[0] != V2 or frame[_SOURCE] != self._own:
+                self._has_peer = True
                 self._receive(frame, received_ns)
 
 
