@@ -112,7 +112,7 @@ class TerminalObserver:
             return False
         self._speaker.say(self._stop_status)
         self._speaker.say(
-            lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C leaves) ")
+            lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C again leaves) ")
         )
         return (await read_line()).strip().lower() in ("y", "yes")
 

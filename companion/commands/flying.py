@@ -1,9 +1,7 @@
 """What the commands that fly have in common: what they change, where they record, how they end."""
 
 import argparse
-import asyncio
 import shutil
-import signal
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from datetime import UTC, datetime
@@ -11,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion import demo
+from companion.commands.signals import fly_interruptibly
 from companion.config import Config
 from companion.config_file import changed, load
 from companion.extras import require
@@ -95,7 +94,7 @@ def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
     with ExitStack() as stack:
         stack.callback(observer.close)
         try:
-            summary = run(_interruptible(session))
+            summary = run(fly_interruptibly(session))
         except (EndpointError, RealtimeError, SigningError):
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
@@ -129,21 +128,3 @@ def fly_bundled(
         folder = flight_folder(config)
         with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
             return fly(config, folder, console)
-
-
-async def _interruptible(session: Session) -> Summary:
-    """Fly; the first Ctrl-C, SIGTERM or SIGHUP hands back, the second leaves at once."""
-    loop = asyncio.get_running_loop()
-    flight = asyncio.ensure_future(session.fly())
-    interrupts = 0
-
-    def interrupt(name: str) -> None:
-        nonlocal interrupts
-        interrupts += 1
-        if interrupts > 1 or not session.interrupt(f"interrupted by {name}"):
-            flight.cancel()
-
-    loop.add_signal_handler(signal.SIGINT, interrupt, "the user (Ctrl-C)")
-    loop.add_signal_handler(signal.SIGTERM, interrupt, "SIGTERM")
-    loop.add_signal_handler(signal.SIGHUP, interrupt, "SIGHUP (the terminal went away)")
-    return await flight

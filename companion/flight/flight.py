@@ -45,6 +45,7 @@ class Flight:
         self._began = self._clock()
         self._entered = self._began
         self._interrupted = False
+        self._asking = False
         self._end = self._new_end()
 
     async def run(self) -> str:
@@ -90,12 +91,15 @@ class Flight:
     def interrupt(self, reason: str) -> None:
         """The user wants out: hold if we fly, else whatever the phase needs.
 
-        An ending that is under way goes on: it does what the vehicle needs.
+        An ending that is under way goes on: it does what the vehicle needs. While the user is asked
+        whether to land, it is a no.
         """
         self._interrupted = True
         if self.failed_in is None:
             usual = self._usual_exit()
             self.end(FlightEnded(reason, Exit.HOLD if usual is Exit.LAND else usual))
+        elif self._asking:
+            self.end(FlightEnded(reason))
 
     def on_heartbeat(self) -> None:
         """Judge at once what the heartbeat that just came says."""
@@ -179,7 +183,11 @@ class Flight:
 
     async def _told_to_land(self) -> bool:
         """Ask the user; somebody else may take the vehicle while the answer is thought over."""
-        return bool(await self._race(_called(self._ask_landing), None))
+        self._asking = True
+        try:
+            return bool(await self._race(_called(self._ask_landing), None))
+        finally:
+            self._asking = False
 
     async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run what runs beside the phases; a fault of ours there must not go unseen."""

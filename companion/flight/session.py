@@ -20,7 +20,9 @@ from companion.recording.tlog import TlogWriter
 
 
 class Session:
-    """Flies once. `interrupt` may be called from a signal handler of the event loop.
+    """Flies once. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
+
+    They end the flight, not the session: whatever comes meanwhile, what was recorded is written.
 
     Args:
         config: what to fly.
@@ -41,6 +43,7 @@ class Session:
         self._observer = observer
         self._ask_landing = ask_landing
         self._assembled: Assembled | None = None
+        self._flying: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
@@ -49,6 +52,18 @@ class Session:
             return False
         self._assembled.flight.interrupt(reason)
         return True
+
+    def leave(self) -> None:
+        """Send nothing any more, and end the flight at once; where none is under way, nothing."""
+        if self._flying is not None and not self._flying.cancelling():
+            self._flying.cancel()
+
+    def note(self, text: str) -> None:
+        """Write down and show that something happened."""
+        if self._assembled is None:
+            self._early_notes.append(text)
+        else:
+            self._assembled.flight.note(text)
 
     async def fly(self) -> Summary:
         """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
@@ -64,13 +79,13 @@ class Session:
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 
         def on_failure(text: str) -> None:  # called in the writing thread
-            loop.call_soon_threadsafe(self._note, text)
+            loop.call_soon_threadsafe(self.note, text)
 
         with (
             realtime.asked_for(realtime_wishes(self._config)) as grants,
             TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
         ):
-            async with open_link(self._config, tlog, self._note) as link:
+            async with open_link(self._config, tlog, self.note) as link:
                 self._assembled = assemble(
                     self._config, link, self._observer, self._ask_landing, self._folder
                 )
@@ -82,12 +97,6 @@ class Session:
                     self._assembled.close()
         await asyncio.sleep(0)  # a last word of the writing thread
         return self._finish(link, self._assembled, result, tlog.dropped, grants)
-
-    def _note(self, text: str) -> None:
-        if self._assembled is None:
-            self._early_notes.append(text)
-        else:
-            self._assembled.flight.note(text)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
@@ -109,10 +118,11 @@ class Session:
             flight.on_heartbeat()
 
         link.subscribe("HEARTBEAT", on_heartbeat)
+        # A task of its own, which `leave` can end without ending what writes the record.
+        self._flying = asyncio.ensure_future(flight.run())
         try:
-            return await flight.run()
+            return await self._flying
         except asyncio.CancelledError:
-            # The second Ctrl-C: nothing more is sent, but what was recorded is kept.
             flight.failed_in = flight.failed_in or flight.phase
             return "left at once by the user"
         finally:

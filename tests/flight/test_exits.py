@@ -17,6 +17,7 @@ import pytest
 import yaml
 from pymavlink import mavutil
 
+from companion.commands.signals import HOW_TO_LEAVE, LEAVE_AFTER
 from companion.flight.guide import Guide
 from companion.mavlink import lockstep
 from tests.flight.fly import (
@@ -56,6 +57,7 @@ def levels(state):
 
 
 PX4 = Ways("px4", {"COM_OBL_RC_ACT": 4}, "LOITER", lands)
+PATIENT_PX4 = PX4._replace(parameters=PX4.parameters | {"COM_OF_LOSS_T": 5.0})
 ARDUPILOT = Ways("ardupilot", {}, "BRAKE", levels)
 BOTH = pytest.mark.parametrize("ways", [PX4, ARDUPILOT], ids=lambda ways: ways.autopilot)
 
@@ -137,23 +139,27 @@ def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
 
 @pytest.mark.parametrize(
     "ways",
-    [PX4, pytest.param(ARDUPILOT, marks=pytest.mark.slow)],
+    [PATIENT_PX4, pytest.param(ARDUPILOT, marks=pytest.mark.slow)],
     ids=lambda ways: ways.autopilot,
 )
 def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
     # The uplink is cut, so that handing back cannot succeed and takes its time.
     with ways.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
-        process = start(mock, tmp_path)
+        process = start(mock, tmp_path, flight={"accept": ["COM_OF_LOSS_T"]})
         mock.until(in_offboard)
         mock.ask({"fault": {"kind": "drop", "direction": "from_companion"}})
         time.sleep(0.1)  # faults begin with the vehicle's next step
-        process.send_signal(signal.SIGINT)
-        time.sleep(0.3)
+        for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            process.send_signal(number)  # none of these leaves
+            time.sleep(0.1)
+        time.sleep(LEAVE_AFTER)
+        assert process.poll() is None
         process.send_signal(signal.SIGINT)
         began = time.monotonic()
         result = finish(process, 1)
         assert time.monotonic() - began < 3.0
         assert result["result"] == "left at once by the user"
+        assert [event["text"] for event in result["events"]].count(HOW_TO_LEAVE) == 1
         mock.until(ways.left)
 
 

@@ -1,0 +1,78 @@
+"""What signals do to a flight: each hands the vehicle back, and only a Ctrl-C again leaves it."""
+
+import asyncio
+import signal
+import time
+from collections.abc import Callable
+
+from companion.flight.session import Session
+from companion.recording.summary import Summary
+
+LEAVE_AFTER = 1.0
+"""A Ctrl-C so long after the one before, s, leaves; a key that bounces or is held down does not."""
+
+HOW_TO_LEAVE = f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, leaves at once"
+
+
+class Signals:
+    """Judges the signals that come while a session flies.
+
+    A terminal that closes sends more than one: its shell and the kernel each send SIGHUP, and
+    SIGTERM may follow. So repeats of these two change nothing: who wants the vehicle left while it
+    is being handed back has to say so with the keyboard.
+
+    Args:
+        session: that flies.
+        give_up: ends the session before there is a flight to interrupt.
+        clock: the user's, not the vehicle's, s.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        give_up: Callable[[], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._session = session
+        self._give_up = give_up
+        self._clock = clock
+        self._gave_up = False
+        self._ctrl_c_at: float | None = None
+
+    def take(self, number: signal.Signals) -> None:
+        """A signal came."""
+        match number:
+            case signal.SIGINT:
+                self._take_ctrl_c()
+            case signal.SIGHUP:
+                self._hand_back("SIGHUP (the terminal went away)")
+            case _:
+                self._hand_back(number.name)
+
+    def _take_ctrl_c(self) -> None:
+        before, self._ctrl_c_at = self._ctrl_c_at, self._clock()
+        if before is None:
+            self._hand_back("the user (Ctrl-C)")
+            self._session.note(HOW_TO_LEAVE)
+        elif self._ctrl_c_at - before >= LEAVE_AFTER:
+            self._session.leave()
+
+    def _hand_back(self, name: str) -> None:
+        if not self._session.interrupt(f"interrupted by {name}") and not self._gave_up:
+            self._gave_up = True  # once: what is being closed then must not be torn off
+            self._give_up()
+
+
+async def fly_interruptibly(session: Session) -> Summary:
+    """Fly; SIGINT (Ctrl-C), SIGTERM and SIGHUP are judged by `Signals`.
+
+    Raises:
+        CancelledError: interrupted before there was a flight; nothing was sent.
+        LinkError, OSError, RealtimeError: as `Session.fly`.
+    """
+    flight = asyncio.ensure_future(session.fly())
+    signals = Signals(session, flight.cancel)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, signals.take, number)
+    return await flight
