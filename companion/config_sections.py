@@ -163,7 +163,8 @@ class DeadmanConfig(Section):
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
     """Guidance older than this is not answered."""
     position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
-    """Position older than this stops guidance, and so the setpoints."""
+    """Position older than this, by its arrival or by how far its time stamp lags the attitude's,
+    stops guidance, and so the setpoints."""
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
     """Control that stood still this long is not taken up again: hand back. Keep it below the
     autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""

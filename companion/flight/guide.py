@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from math import acos, degrees, dist, nan
+from math import acos, degrees, dist, inf, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import cos_tilt
@@ -22,6 +22,7 @@ from companion.guidance import (
     VehicleMotion,
 )
 from companion.guidance.linear import ReferenceAt
+from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.state import VehicleState
 from companion.recording.trace import FlightTrace
@@ -87,12 +88,25 @@ class Guide:
         self._clock = clock
         self._programme: Sequence | None = None
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._attitude_time = -inf
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Keep the newest attitude that has a heading."""
-        if is_unit(sample.q):
+        """Keep an attitude that has a heading, if it is newer than the last."""
+        if is_unit(sample.q) and sample.vehicle_time > self._attitude_time:
+            self._attitude_time = sample.vehicle_time
             self._q = sample.q
             self.estimate.note_attitude(sample)
+
+    def fresh_position(self) -> LocalPosition | None:
+        """The newest position, unless it is stale: nothing came since, or it was long under way.
+
+        The latter is told by the attitude, which the same clock stamped: what lags it by more than
+        the limit is as old, however lately it came.
+        """
+        position, limit = self._state.position, self._position_stale
+        if position is None or self._clock() - position.received > limit:
+            return None
+        return None if self._attitude_time - position.vehicle_time > limit else position
 
     def stand_by(self) -> None:
         """Hold nothing: idle on the ground, damp the motion in the air."""
@@ -135,8 +149,8 @@ class Guide:
     def step(self) -> None:
         """Make one command, unless position is too old to make it from."""
         now = self._clock()
-        position = self._state.position
-        if position is None or now - position.received > self._position_stale:
+        position = self.fresh_position()
+        if position is None:
             self.learning.pause()
             return
         # In control a vehicle that says it has landed is the watch's matter: no thrust would make
@@ -170,7 +184,7 @@ class Guide:
             now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
         )
         if self._loop.guarded:
-            measured_at = position.vehicle_time + (now - position.received)
+            measured_at = self.estimate.vehicle_time(now, position)
             self._note_tracking(measured_at, reference, situation.now)
 
     def _heading(self) -> float:

@@ -1,6 +1,7 @@
 """What guidance knows of the motion: measured positions, carried on by the measured attitude."""
 
 from collections.abc import Callable
+from math import inf
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
@@ -16,7 +17,7 @@ _LEAST_COSINE = 0.2
 _LONGEST = 0.2
 """Between two positions, s: further apart they say nothing of what happened between."""
 _OLDEST = 0.1
-"""On its way no position is longer, s; clocks that say so do not belong together."""
+"""On its way no sample is longer, s; clocks that say so do not belong together."""
 _WORTH_TELLING = 0.15
 """By so much the drag must be off to be told, 1/s."""
 
@@ -48,11 +49,13 @@ class MotionEstimate:
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
+        self._ahead = -inf
         self._turn = 0.0
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude; it tells where the thrust points."""
         self._q, self._body_rates = sample.q, sample.body_rates
+        self._ahead = sample.vehicle_time - sample.received
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
@@ -93,7 +96,7 @@ class MotionEstimate:
         """
         if self._position is None:
             raise RuntimeError("guidance was asked to hold before any position came")
-        time = self._vehicle_time(now, self._position)
+        time = self.vehicle_time(now, self._position)
         still = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
         motion = self._observer.at(time, self._known(slope, still)) or still
@@ -115,12 +118,16 @@ class MotionEstimate:
             (*situation.disturbance, 0.0),
         )
 
-    def _vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """Our time as the vehicle's, s."""
-        at_least = position.vehicle_time + now - position.received
+    def vehicle_time(self, now: float, position: LocalPosition) -> float:
+        """Our time `now` as the vehicle's, s.
+
+        Each sample tells by how much its clock is ahead of ours at least: it cannot have come
+        before it was stamped. So a position that came late is known by the newest attitude.
+        """
+        at_least = max(position.vehicle_time - position.received, self._ahead)
         offset = self._offset()
-        if offset is None or not at_least <= now + offset <= at_least + _OLDEST:
-            return at_least
+        if offset is None or not at_least <= offset <= at_least + _OLDEST:
+            return now + at_least
         return now + offset
 
     def surprise(self) -> str | None:

@@ -81,10 +81,8 @@ class Rig:
             await self.link.request_message("HEARTBEAT")
 
     def fresh_position(self) -> LocalPosition | None:
-        """The newest position, unless it is stale."""
-        position, now = self.link.state.position, asyncio.get_running_loop().time()
-        limit = self.config.deadman.position_stale_ms / 1e3
-        return None if position is None or now - position.received > limit else position
+        """The newest position, unless guidance finds it stale."""
+        return self.guide.fresh_position()
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

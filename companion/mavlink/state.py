@@ -33,6 +33,11 @@ _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
 LANDED_ON_GROUND, LANDED_TAKEOFF = 1, 3
 
+_BOOT_TAKES = 2.0
+"""An autopilot that starts anew says nothing of its position for so long, s."""
+_LATEST_COPY = 5.0
+"""What another path brings is not later than this, s; time stamps further back are a new boot's."""
+
 
 @dataclass
 class _Values:
@@ -55,7 +60,7 @@ class VehicleState(_Values):
     Attributes:
         heartbeat: See `Heartbeat`.
         landed_state: See `Landed`; `landed` and `taking_off` heed its age.
-        position: See `LocalPosition`.
+        position: See `LocalPosition`; the newest by its own time stamp.
         battery: See `Battery`.
         told_thrust: See `ToldThrust`.
         global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
@@ -186,8 +191,19 @@ class VehicleState(_Values):
         if not all(map(isfinite, values)):
             self._stats.non_finite += 1
             return
-        stamp = message.time_boot_ms / 1000.0
-        self.position = LocalPosition(self._clock(), stamp, values[:3], values[3:])
+        now, stamp = self._clock(), message.time_boot_ms / 1000.0
+        if self._is_outdated(stamp, now):
+            self._stats.outdated += 1
+            return
+        self.position = LocalPosition(now, stamp, values[:3], values[3:])
+
+    def _is_outdated(self, stamp: float, now: float) -> bool:
+        """Whether a position stamped so, s since boot, is no news; after a new boot it is."""
+        last = self.position
+        if last is None or stamp > last.vehicle_time:
+            return False
+        booted = last.vehicle_time - stamp > _LATEST_COPY and now - last.received > _BOOT_TAKES
+        return not booted
 
     def _on_sys_status(self, message: Message) -> None:
         millivolts = message.voltage_battery

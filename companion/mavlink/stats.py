@@ -16,6 +16,7 @@ class LinkStats:
         bad_signature: Unsigned, wrongly signed or replayed while signing is on.
         ignored_foreign: From systems or components we do not listen to.
         non_finite: Messages refused for a NaN or infinity.
+        outdated: Positions refused because one with the same or a later time stamp had come.
         malformed: Messages whose fields make no sense.
         sent: Handed to the kernel.
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
@@ -32,6 +33,7 @@ class LinkStats:
     bad_signature: int = 0
     ignored_foreign: int = 0
     non_finite: int = 0
+    outdated: int = 0
     malformed: int = 0
     sent: int = 0
     not_sent: int = 0

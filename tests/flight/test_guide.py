@@ -12,10 +12,11 @@ from companion.flight.guide import Guide
 from companion.flight.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
 from companion.mavlink.records import LocalPosition
+from companion.mavlink.samples import AttitudeSample
 from companion.recording.trace import FlightTrace
 
 DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
-IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 0.5, DOUBLETS.duration - 1.5
+IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5
 HERE = (3.0, 4.0, -5.0)
 
 
@@ -70,7 +71,7 @@ class Bench:
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
         q, still = (cos(half), sin(half), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
-        sample = SimpleNamespace(vehicle_time=self.now, q=q, body_rates=still)
+        sample = AttitudeSample(0, self.now, self.now, 0, q, still)
         self.guide.note_attitude(sample)
         self.guide.step()
         return self.loop.command
@@ -119,6 +120,29 @@ def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
     bench.loop.guarded = False
     bench.fly(IN_HOLD)
     assert (bench.loop.resets.turn, bench.loop.resets.shift) == (0.0, (0.0, 0.0, 0.0))
+
+
+def test_a_position_that_lags_the_attitude_is_as_old_as_it_says():
+    bench = Bench()
+    bench.fly(IN_HOLD)
+    late = LocalPosition(bench.now, bench.now - 0.31, HERE, (0.0, 0.0, 0.0))
+    bench.state.position, made_at = late, bench.loop.command.made_at
+    bench.now += 0.01
+    bench.guide.step()
+    assert bench.guide.fresh_position() is None
+    assert bench.loop.command.made_at == made_at
+    bench.state.position = late._replace(vehicle_time=bench.now - 0.29)
+    bench.guide.step()
+    assert bench.loop.command.made_at == bench.now
+
+
+def test_an_old_attitude_does_not_replace_a_newer_one():
+    bench = Bench()
+    bench.fly(IN_FIRST_DOUBLET)
+    tilted, still = (cos(0.5), sin(0.5), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+    bench.guide.note_attitude(AttitudeSample(0, bench.now - 0.1, bench.now, 0, tilted, still))
+    bench.guide.step()
+    assert bench.guide.given_up is None
 
 
 def test_position_hold_may_tilt_as_it_must():

@@ -69,6 +69,13 @@ BREACHES = [
     ("silence", control(answered=OLD, newer=OLD), HAND_BACK, 0.0, "clock stands still"),
     ("silence", control(answered=OLD, fresh=OLD), HAND_BACK, 0.0, "telemetry_stale_ms"),
     ("silence", control(answered=OLD, commanded=OLD, placed=OLD), HAND_BACK, 0.0, "no position"),
+    (
+        "silence",
+        control(answered=OLD, commanded=OLD, position_fresh=False),
+        HAND_BACK,
+        0.0,
+        "position_stale_ms",
+    ),
     ("silence", control(answered=OLD, commanded=OLD), HAND_BACK, 0.0, "guidance makes no"),
     ("silence", control(answered=OLD, held_back=True), HAND_BACK, 0.0, "did not confirm"),
     ("silence", control(answered=OLD), HAND_BACK, 0.0, "cannot be used"),

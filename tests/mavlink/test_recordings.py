@@ -95,6 +95,7 @@ def test_every_frame_is_counted_and_every_sample_is_the_recorded_one(name):
         assert ours.time_boot_ms == theirs.time_boot_ms
         assert ours.q == (theirs.q1, theirs.q2, theirs.q3, theirs.q4)
         assert ours.body_rates == (theirs.rollspeed, theirs.pitchspeed, theirs.yawspeed)
+    assert out.stats.outdated == 0
     for message, rate in RATES_HZ[name].items():
         count = out.stats.by_message[MESSAGE_IDS[message]]
         assert count == pytest.approx(rate * WHOLE_S, abs=2), message

@@ -78,6 +78,31 @@ def test_positions_that_are_not_finite_are_counted_never_stored(bench, bad):
     assert bench.stats.non_finite == 6
 
 
+def position(bench, seconds, north=0.0):
+    """The position that is known once one with this stamp came."""
+    stamp = round(1e3 * seconds)
+    message = dialect.MAVLink_local_position_ned_message(stamp, north, 0, 0, 0, 0, 0)
+    return bench.take(message).position
+
+
+def test_a_position_stamped_no_later_than_the_last_is_counted_never_stored(bench):
+    kept = position(bench, 60.0, 1.0)
+    for bench.now, stamp in ((10.1, 60.0), (10.2, 59.9), (10.3, 50.0), (20.0, 60.0), (21.0, 57.0)):
+        assert position(bench, stamp, 2.0) == kept
+    assert bench.stats.outdated == 5
+    assert position(bench, 60.1, 3.0).position_ned == (3.0, 0.0, 0.0)
+
+
+def test_after_a_new_boot_positions_are_news_again(bench):
+    position(bench, 60.0)
+    bench.now = 11.9
+    assert position(bench, 1.0).vehicle_time == 60.0  # so quickly none boots
+    bench.now = 12.1
+    assert position(bench, 1.2).vehicle_time == 1.2
+    assert position(bench, 1.3).received == 12.1
+    assert bench.stats.outdated == 1
+
+
 def sys_status(voltage, remaining, health=0):
     return dialect.MAVLink_sys_status_message(
         0, 0, health, 0, voltage, -1, remaining, 0, 0, 0, 0, 0, 0

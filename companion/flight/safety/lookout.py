@@ -117,6 +117,7 @@ class Lookout:
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
                 loop.held_back,
+                self._guide.fresh_position() is not None,
             ),
             self._health(),
             self._resets(now),

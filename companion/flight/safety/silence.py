@@ -27,8 +27,15 @@ def _why(now: float, control: Control, limit: float) -> str:
     if now - control.fresh > limit:
         return "attitude arrives later than deadman.telemetry_stale_ms"
     if now - control.commanded > limit:
-        stale = now - control.placed > limit
-        return "no position from the vehicle" if stale else "guidance makes no commands any more"
+        return _why_no_command(now, control, limit)
     if control.held_back:
         return "after a gap in telemetry the autopilot did not confirm offboard"
     return "attitude from the vehicle cannot be used, or setpoints cannot leave"
+
+
+def _why_no_command(now: float, control: Control, limit: float) -> str:
+    if now - control.placed > limit:
+        return "no position from the vehicle"
+    if not control.position_fresh:
+        return "position arrives later than deadman.position_stale_ms"
+    return "guidance makes no commands any more"

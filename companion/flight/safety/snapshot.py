@@ -53,9 +53,10 @@ class Control(NamedTuple):
         newer: one came that was newer than those before.
         fresh: one came that was not late.
         commanded: guidance made a command.
-        placed: a position came.
+        placed: a position came, newer than those before.
         heard: anything at all came from the vehicle.
         held_back: after a gap the mode was not confirmed yet.
+        position_fresh: the newest position is one to fly by.
     """
 
     answered: float = inf
@@ -66,6 +67,7 @@ class Control(NamedTuple):
     placed: float = inf
     heard: float = inf
     held_back: bool = False
+    position_fresh: bool = True
 
 
 class Health(NamedTuple):

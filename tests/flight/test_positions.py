@@ -1,0 +1,62 @@
+"""Positions that come late, twice or standing are not flown as if they were of now."""
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
+from tests.flight.position_relay import PositionRelay
+
+
+def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
+    """Summary and truth of a flight in whose programme positions begin to come so."""
+    folder.mkdir(exist_ok=True)
+    with mock_vehicle(folder) as mock, PositionRelay(mock.port) as relay:
+
+        def begin():
+            relay.way, relay.delay_ms = way, delay_ms
+
+        if from_the_start:
+            begin()
+        link = {"endpoint": relay.endpoint}
+        summary = fly(
+            mock, folder / "log", When("programme", begin, after=1.0), link=link, **changes
+        )
+        return summary, mock.state()
+
+
+def test_positions_that_come_late_end_control(tmp_path):
+    summary, truth = flown(tmp_path, "late", 400)
+    assert summary.result == "position arrives later than deadman.position_stale_ms"
+    assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
+
+
+def test_a_standing_position_is_silence(tmp_path):
+    summary, truth = flown(tmp_path, "standing")
+    assert summary.result == "no position from the vehicle"
+    assert summary.link["outdated"] > 10
+    assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
+
+
+@pytest.mark.parametrize("delay_ms", [100, 2000, 8000])
+def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
+    way = {"from_the_start": True, "flight": {"programme": ["circle"]}}
+    plain, _ = flown(tmp_path / "plain", "at once", **way)
+    copied, _ = flown(tmp_path / "copied", "twice", delay_ms, **way)
+    assert copied.result == "ok", copied.events
+    assert copied.link["outdated"] > 100
+    assert plain.link["outdated"] == 0
+    tracked = [(s.log / "tracking.csv").read_text() for s in (plain, copied)]
+    assert tracked[0] == tracked[1]
+
+
+def test_positions_a_little_late_are_carried_on_to_now(tmp_path):
+    summary, _ = flown(tmp_path, "late", 200, flight={"programme": ["circle"]})
+    assert summary.result == "ok", summary.events
+    time, north, east = np.loadtxt(summary.log / "tracking.csv", delimiter=",", skiprows=1)[:, :3].T
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    told = iter(lambda: log.recv_match(type=["LOCAL_POSITION_NED"]), None)
+    stamps, x, y = np.array([(m.time_boot_ms / 1e3, m.x, m.y) for m in told]).T
+    off = np.hypot(np.interp(time, stamps, x) - north, np.interp(time, stamps, y) - east)
+    assert off.max() < 0.1  # the circle's speed is 1 m/s and more
