@@ -38,11 +38,6 @@ _BOOT_TAKES = 2.0
 _LATEST_COPY = 5.0
 """What another path brings is not later than this, s; time stamps further back are a new boot's."""
 
-_BOOT_TAKES = 2.0
-"""An autopilot that starts anew says nothing of its position for so long, s."""
-_LATEST_COPY = 5.0
-"""What another path brings is not later than this, s; time stamps further back are a new boot's."""
-
 
 @dataclass
 class _Values:
