@@ -39,7 +39,10 @@ def test_a_standing_position_is_silence(tmp_path):
     assert (truth["mode"], truth["crashed"]) == ("LOITER", False)
 
 
-@pytest.mark.parametrize("delay_ms", [100, 2000, 8000])
+@pytest.mark.parametrize(
+    "delay_ms",
+    [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))],
+)
 def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
     way = {"from_the_start": True, "flight": {"programme": ["circle"]}}
     plain, _ = flown(tmp_path / "plain", "at once", **way)

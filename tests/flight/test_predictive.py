@@ -39,6 +39,7 @@ def flown(folder, name, disturb=None, **changes):
     return summary
 
 
+@pytest.mark.slow
 def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
     pids = []
 
