@@ -69,8 +69,8 @@ class DeadTimeWatch:
         self._note = note
         self._due = -inf
         self._looks = 0
-        self._row_counts = deque([0], maxlen=_LOOKS + 1)  # at the last looks
-        self._offsets: deque[tuple[int, float]] = deque(maxlen=_OFFSETS)  # until which row, s
+        # At each look: how many rows there were, and the offset until then, s.
+        self._offsets = deque([(0, nan)], maxlen=_OFFSETS)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -89,10 +89,11 @@ class DeadTimeWatch:
 
     def _look(self) -> None:
         self._note_offset()
-        if len(self._row_counts) > _LOOKS:
+        if len(self._offsets) > _LOOKS:
+            first, _ = self._offsets[-1 - _LOOKS]
             name = _AXES[self._looks % len(_AXES)]
             self._looks += 1
-            self._judge(name, self._dead_time(name, self._trace.rates_rows(self._row_counts[0])))
+            self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:
         """Measure over all that was flown, and warn if that is still to be done."""
@@ -109,9 +110,8 @@ class DeadTimeWatch:
 
     def _note_offset(self) -> None:
         """By how much the clocks differed for the samples since the last look."""
-        count, offset = len(self._trace.rates), self._clock_offset()
-        self._row_counts.append(count)
-        self._offsets.append((count, nan if offset is None else offset))
+        offset = self._clock_offset()
+        self._offsets.append((len(self._trace.rates), nan if offset is None else offset))
 
     def _ages(self, rows: NDArray[np.float64], first: int) -> NDArray[np.float64]:
         """How old the samples were when they arrived, s, where that is known.

@@ -39,9 +39,6 @@ async def offboard(rig: Rig) -> None:
     """Hand control over to our stream, and settle."""
     rig.guide.hold_here()
     rig.lookout.begin(asyncio.get_running_loop().time())
-    # The mode we know may be a second old; never take the vehicle from a pilot who took it.
-    await rig.fresh_heartbeat()
-    require_role(rig.link, {Role.READY})
     await _take_over(rig)
     rig.guide.hold_here()
     rig.loop.guarded = True
@@ -102,6 +99,9 @@ async def _take_over(rig: Rig) -> None:
     rig.detail = "the autopilot to obey our rates"
     command = rig.link.family.take_over()
     if command is None:
+        # The mode we know may be a second old; never take the vehicle from a pilot who took it.
+        await rig.fresh_heartbeat()
+        require_role(rig.link, {Role.READY})
         rig.loop.on = True
         await rig.until(lambda: in_role(rig.link, Role.OFFBOARD))
         return

@@ -4,8 +4,13 @@ from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 
-LASTS = 5.0
+_LASTS = 5.0
 """What is told once a second or more often, and was not for so long, s, is not known any more."""
+
+
+def outdated(received: float, now: float) -> bool:
+    """Whether a status that came at `received` does not count any more; both in s of our clock."""
+    return now - received > _LASTS
 
 
 class Heartbeat(NamedTuple):

@@ -10,7 +10,6 @@ from companion.mavlink.families import family_for
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
-    LASTS,
     Battery,
     Estimator,
     GlobalPosition,
@@ -21,6 +20,7 @@ from companion.mavlink.records import (
     LocalPosition,
     ToldThrust,
     Vector,
+    outdated,
 )
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
@@ -134,7 +134,7 @@ class VehicleState(_Values):
     @property
     def battery_silent(self) -> bool:
         """Whether the battery was told of, and is not any more."""
-        return self.battery is not None and self._clock() - self.battery.received > LASTS
+        return self.battery is not None and outdated(self.battery.received, self._clock())
 
     @property
     def height(self) -> float | None:
@@ -193,7 +193,7 @@ class VehicleState(_Values):
 
     def _landed_state(self) -> int | None:
         told = self.landed_state
-        return None if told is None or self._clock() - told.received > LASTS else told.state
+        return None if told is None or outdated(told.received, self._clock()) else told.state
 
     def _on_local_position(self, message: Message) -> None:
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)

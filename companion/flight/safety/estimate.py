@@ -4,7 +4,7 @@ from math import degrees
 
 from companion.flight.safety.monitor import Judge
 from companion.flight.safety.snapshot import Snapshot
-from companion.mavlink.records import LASTS
+from companion.mavlink.records import outdated
 
 GPS_FIX_3D = 3
 """Of GPS_FIX_TYPE, this and above."""
@@ -18,7 +18,7 @@ def gps(snapshot: Snapshot, _: bool) -> str | None:
     fix = snapshot.autopilot.gps
     if not snapshot.had_gps or fix is None:
         return None
-    if snapshot.now - fix.received > LASTS:
+    if outdated(fix.received, snapshot.now):
         return "GPS is not reported any more"
     return "GPS position lost" if fix.fix_type < GPS_FIX_3D else None
 
@@ -28,7 +28,7 @@ def flags(snapshot: Snapshot, _: bool) -> str | None:
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
-    if snapshot.now - estimator.received > LASTS:
+    if outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
     missing = good & (ATTITUDE | VELOCITY) & ~estimator.flags
     if good & HORIZONTAL and not estimator.flags & HORIZONTAL:

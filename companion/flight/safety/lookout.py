@@ -19,6 +19,7 @@ from companion.flight.safety.snapshot import (
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.mavlink.link import Link
+from companion.mavlink.stats import share_lost
 
 _WINDOW = 1.0
 """Shares are over the last of this, s."""
@@ -152,7 +153,7 @@ class Lookout:
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost
         return Health(
-            lost / max(1, lost + last.frames - first.frames),
+            share_lost(last.frames - first.frames, lost),
             self._link.timesync.round_trip_s,
             (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
             if self._real_time

@@ -2,7 +2,7 @@
 
 from companion.flight.safety.monitor import Judge, released
 from companion.flight.safety.snapshot import Snapshot
-from companion.mavlink.records import LASTS
+from companion.mavlink.records import outdated
 
 
 def battery(least: float) -> Judge:
@@ -12,7 +12,7 @@ def battery(least: float) -> Judge:
         told = snapshot.autopilot.battery
         if told is None:
             return None
-        if snapshot.now - told.received > LASTS:  # silence hides an empty one
+        if outdated(told.received, snapshot.now):  # silence hides an empty one
             return "the battery's state is not reported any more"
         if told.remaining is None or told.remaining >= least:
             return None
