@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from companion.mavlink.family import AutopilotFamily
@@ -9,6 +10,17 @@ from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import share_lost
 from companion.mavlink.streams import StreamRate
+
+
+class Stage(Enum):
+    """What the vehicle is about to do; the value is said of it."""
+
+    GROUND = "to be armed"
+    """It stands disarmed."""
+    ARMED = "to take off"
+    """It stands armed."""
+    AIRBORNE = "to be taken over"
+    """It holds in the air, flown by its autopilot."""
 
 
 class Identity(NamedTuple):
@@ -101,7 +113,8 @@ class Evidence:
         samples: The attitude samples' times.
         company: Who else is there.
         resets: How often the estimator jumped meanwhile.
-        identity: `None` where it was not asked for.
+        identity: What the autopilot is.
+        stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
     """
 
@@ -115,5 +128,6 @@ class Evidence:
     samples: SampleTimes
     company: Company
     resets: int
-    identity: Identity | None = None
+    identity: Identity
+    stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()

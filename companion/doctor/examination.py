@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from companion.config import Config
 from companion.doctor import configuration_checks, link_checks, vehicle_checks
 from companion.doctor.evidence import Evidence
-from companion.doctor.finding import Finding
+from companion.doctor.finding import Finding, Key
 from companion.doctor.parameter_findings import parameters
 from companion.mavlink.parameter_rules import Verdict
 
@@ -13,8 +13,11 @@ Check = Callable[[Config, Evidence], Iterator[Finding]]
 
 CHECKS: tuple[Check, ...] = (
     vehicle_checks.version,
+    vehicle_checks.motors,
     vehicle_checks.power,
     vehicle_checks.readiness,
+    vehicle_checks.gps,
+    vehicle_checks.ground,
     vehicle_checks.estimator,
     vehicle_checks.fence,
     link_checks.company,
@@ -38,6 +41,15 @@ def examine(config: Config, evidence: Evidence) -> list[Finding]:
 def forbidding(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """What is unsafe and not excepted by `flight.accept`: with any of these nothing is flown."""
     return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
+
+
+def lacking(findings: Iterable[Finding]) -> list[Finding]:
+    """What a flight cannot begin without, though the doctor need not call it unsafe to lack it."""
+    return [
+        finding
+        for finding in findings
+        if finding.key in (Key.READY, Key.LANDED) and finding.verdict is Verdict.INEFFECTIVE
+    ]
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
