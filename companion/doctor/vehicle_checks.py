@@ -12,6 +12,7 @@ from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.state import VehicleState
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
 
 GROUND_HEIGHT = 1.5
 """Height above home that may be read on the ground, m: the estimate drifts."""
@@ -72,12 +73,14 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """The battery."""
-    yield battery(config, evidence.state)
+    if evidence.booting and evidence.state.battery is None:
+        yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
+    else:
+        yield battery(config, evidence.state)
 
 
-def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the autopilot would arm, and why not, in its own words."""
-    state, stage = evidence.state, evidence.stage
+def failsafe(state: VehicleState) -> Iterator[Finding]:
+    """Whether the autopilot is in a failsafe."""
     if state.failsafe:
         yield Finding(
             Key.FAILSAFE,
@@ -87,18 +90,26 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "clear its cause first",
             "HEARTBEAT system_status",
         )
+
+
+def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot would arm, and why not, in its own words."""
+    state, stage = evidence.state, evidence.stage
+    yield from failsafe(state)
     ready = state.readiness
     if stage is Stage.AIRBORNE:  # its checks before arming are over
         ready = ready._replace(prearm_good=True)
     missing = evidence.family.not_ready(ready)
     said = "; ".join(dict.fromkeys(evidence.words))
     if missing is not None:
+        silent = evidence.awaited
+        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
         yield Finding(
             Key.READY,
-            INEFFECTIVE,
-            f"not ready {stage.value}, it lacks {missing}",
-            f"the autopilot says: {said}" if said else "the flight would wait for it",
-            "wait, or put right what it says",
+            NOT_READY,
+            f"not ready {stage.value}, it lacks {missing}{unsent}",
+            f"the autopilot says: {said}" if said else "",
+            "wait, or put right what it says, and try again",
             "SYS_STATUS, estimator flags",
         )
         return
@@ -131,7 +142,7 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
     if not state.landed:
         yield Finding(
             Key.LANDED,
-            UNSAFE if state.flying else INEFFECTIVE,
+            UNSAFE if state.flying else NOT_READY,
             "the vehicle says that it flies"
             if state.flying
             else "the autopilot does not say that it stands on the ground",
@@ -173,10 +184,10 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if told is None:
         yield Finding(
             Key.FENCE,
-            UNSAFE,
+            NOT_READY if evidence.awaits_position else UNSAFE,
             "the vehicle does not tell its latitude and longitude",
             "whether it is inside safety.fence_polygon_deg cannot be known",
-            "wait for GPS, or give safety.fence_polygon_m instead",
+            "wait for GPS",
             source,
         )
         return

@@ -7,7 +7,7 @@ from math import inf
 
 from companion.config import Config
 from companion.doctor.evidence import Evidence, Stage
-from companion.doctor.examination import examine, forbidding, lacking, unsafe
+from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import FlightEnded
@@ -72,7 +72,7 @@ class Preflight:
 
     def _heed(self, findings: list[Finding]) -> None:
         """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""
-        refused = [*forbidding(self._config, findings), *lacking(findings)]
+        refused = forbidding(self._config, findings)
         amiss = [
             finding.key
             for finding in findings
