@@ -56,7 +56,7 @@ def doctor(options: argparse.Namespace) -> int:
         visit.say("Interrupted; every parameter that was set is told above.")
         return EXIT_FLIGHT
     if options.json:
-        print(json.dumps(visit.result, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(visit.result, allow_nan=False))
     return code
 
 
