@@ -1,7 +1,7 @@
 """What is known of the vehicle, from its telemetry. Values that are not finite are never kept."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import isfinite
 
 from companion.mavlink.codec import Message
@@ -105,6 +105,12 @@ class VehicleState(_Values):
             "STATUSTEXT": self._on_text,
         }.items():
             router.subscribe(name, callback)
+
+    def forget(self) -> None:
+        """Know nothing but the newest heartbeat: another vehicle may have told the rest."""
+        fresh = _Values(heartbeat=self.heartbeat)
+        for field in fields(_Values):
+            setattr(self, field.name, getattr(fresh, field.name))
 
     @property
     def mode(self) -> str | None:
