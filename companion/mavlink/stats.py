@@ -25,6 +25,7 @@ class LinkStats:
         ignored_foreign: From systems or components we do not listen to.
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
+        stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages whose fields make no sense.
         sent: Handed to the kernel.
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
@@ -42,6 +43,7 @@ class LinkStats:
     ignored_foreign: int = 0
     non_finite: int = 0
     outdated: int = 0
+    stamped_ahead: int = 0
     malformed: int = 0
     sent: int = 0
     not_sent: int = 0
