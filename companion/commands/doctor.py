@@ -24,6 +24,7 @@ from companion.doctor.undo import Undo, UndoFile
 from companion.flight.assembly import open_link
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_survey import survey
@@ -55,7 +56,7 @@ def doctor(options: argparse.Namespace) -> int:
         visit.say("Interrupted; every parameter that was set is told above.")
         return EXIT_FLIGHT
     if options.json:
-        print(json.dumps(visit.result, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(visit.result, allow_nan=False))
     return code
 
 
@@ -82,7 +83,10 @@ class _Visit:
             findings = await vehicle.met()
             if findings:
                 return self._told(findings)
-            evidence = await vehicle.evidence(wait)
+            try:
+                evidence = await vehicle.evidence(wait)
+            except (LinkTimeout, LinkLost) as error:
+                return self._told(vehicle.silent(error))
             findings = examine(config, evidence)
             code = self._told(findings)
             if fix:

@@ -68,7 +68,9 @@ class Link(Conversation):
         router, outbox = Router(stats), Outbox(settings, stats, tap)
         self.clock = VehicleClock(lockstep=settings.lockstep)
         super().__init__(settings, outbox, router, stats, self._loop.time, self.clock)
-        self._inbox = Inbox(settings, stats, router, tap, notice, self.clock)
+        self._inbox = Inbox(
+            settings, stats, router, tap, notice, self.clock, lambda: outbox.setpoint_at
+        )
         self.timesync = TimeSync(outbox, router, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
