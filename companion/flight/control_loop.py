@@ -77,6 +77,7 @@ class ControlLoop:
         held_back: a gap happened and `resume` has not come yet.
         resets: jumps of the estimate, which the planner does not see.
         ask_mode: called once a gap, when telemetry is back.
+        is_same_vehicle: asked at each sample: whether it is of the vehicle that was checked.
         thrust: as it was last sent, 0..1.
         last_answer, last_sample: when a setpoint last left, and when a sample last came, s on our
             clock.
@@ -101,6 +102,7 @@ class ControlLoop:
         self.resets = EstimatorResets()
         self.thrust = 0.0
         self.ask_mode: Callable[[], None] = lambda: None
+        self.is_same_vehicle: Callable[[], bool] = lambda: True
         self.last_answer = self.last_sample = -inf
         self.samples = self.setpoints = self.missed_deadlines = 0
         self.unanswered = dict.fromkeys(Unanswered, 0)
@@ -134,8 +136,11 @@ class ControlLoop:
             return
         self.samples += 1
         command = self.command
-        if sample.misfit is not None:
-            reason: Unanswered | None = _MISFITS[sample.misfit]
+        reason: Unanswered | None
+        if not self.is_same_vehicle():
+            reason = Unanswered.ANOTHER_VEHICLE
+        elif sample.misfit is not None:
+            reason = _MISFITS[sample.misfit]
         elif not sample.age <= self._deadlines.telemetry_stale:
             reason = Unanswered.LATE
         elif command is None:

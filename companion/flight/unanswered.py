@@ -6,6 +6,7 @@ from enum import Enum
 class Unanswered(Enum):
     """A reason; its value is its name in `summary.json`."""
 
+    ANOTHER_VEHICLE = "another_vehicle"
     NOT_NEWER = "not_newer"
     AHEAD = "stamped_ahead"
     LATE = "late"
@@ -28,6 +29,7 @@ class Unanswered(Enum):
 
 
 _WORDS = {
+    Unanswered.ANOTHER_VEHICLE: "another vehicle may be there than was checked",
     Unanswered.NOT_NEWER: "the vehicle's clock stands still: attitude is stamped no later than "
     "before",
     Unanswered.AHEAD: "attitude is stamped far ahead of the vehicle's clock",
