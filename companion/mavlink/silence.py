@@ -36,5 +36,8 @@ def _refused(start: str, stats: LinkStats) -> str | None:
             f"{source}; is link.target_system right?"
         )
     if stats.bad_signature:
-        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+        return (
+            f"{start}, but {stats.bad_signature} frames not signed with our key, or with a time "
+            "stamp that is not believed"
+        )
     return None
