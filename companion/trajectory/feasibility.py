@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.trajectory.computable import computable
 from companion.trajectory.demand import Floats, Motion, demand, sampled
 from companion.trajectory.retimed import Slowed
 from companion.trajectory.sample import Trajectory, TrajectoryError
-
-_STEP = 0.005
-"""How finely a trajectory is looked at, s."""
 
 _ROUNDING = 1e-9
 """Share of a limit by which it may be missed: the fastest place may be meant to lie on it."""
@@ -102,7 +100,8 @@ class _Need(NamedTuple):
 
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a trajectory breaks, in the order of time; none if it can be flown."""
-    return _broken(sampled(trajectory, _STEP), envelope)
+    with computable():
+        return _broken(sampled(trajectory), envelope)
 
 
 def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, float]:
@@ -114,7 +113,13 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, f
     Raises:
         TrajectoryError: however slowly it is flown, it breaks a limit.
     """
-    motion = sampled(trajectory, _STEP)
+    with computable():
+        return _slowed_down(trajectory, sampled(trajectory), envelope)
+
+
+def _slowed_down(
+    trajectory: Trajectory, motion: Motion, envelope: Envelope
+) -> tuple[Trajectory, float]:
     if not _broken(motion, envelope):
         return trajectory, 1.0
     too_fast, slow = 1.0, 2.0
