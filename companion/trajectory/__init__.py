@@ -3,8 +3,9 @@
 from companion.trajectory.computable import computable
 from companion.trajectory.csv_file import Table
 from companion.trajectory.csv_file import read as read_csv
+from companion.trajectory.demand import Motion
 from companion.trajectory.facing import turned_first
-from companion.trajectory.feasibility import Envelope, Violation, slow_down, violations
+from companion.trajectory.feasibility import Envelope, Violation, judge, slow_down, violations
 from companion.trajectory.figures import (
     Hover,
     Laps,
@@ -36,6 +37,7 @@ __all__ = [
     "HeadingFrom",
     "Hover",
     "Laps",
+    "Motion",
     "Sample",
     "SampleOptions",
     "Slowed",
@@ -50,6 +52,7 @@ __all__ = [
     "from_samples",
     "gerono_eight",
     "helix",
+    "judge",
     "line",
     "read_csv",
     "slow_down",
