@@ -22,10 +22,14 @@ def read_text(path: Path, most: int) -> str:
         FileRefusedError: it cannot be read, is no regular file, is larger, or is no text.
     """
     try:
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        try:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
                 raise FileRefusedError("not a regular file")
-            data = file.read(most + 1)
+            with os.fdopen(descriptor, "rb", closefd=False) as file:
+                data = file.read(most + 1)
+        finally:
+            os.close(descriptor)
     except OSError as error:
         raise FileRefusedError(f"cannot read it: {error.strerror}") from error
     except ValueError as error:

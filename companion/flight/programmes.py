@@ -62,7 +62,7 @@ def require_inside(config: Config, parts: Iterable[Programme], origin: Place | N
     """
     check = _fence_check(config, origin)
     for part in parts:
-        for motion in _motions(part):
+        for motion in _motions(part, config.guidance.drag_per_s):
             _refuse(part.name, check(motion))
 
 
@@ -72,7 +72,7 @@ def _part(config: Config, name: str) -> Programme:
     part = _simple(config, name)
     require_inside(config, [part], None)
     if isinstance(part, Circle):
-        (motion,) = _motions(part)
+        (motion,) = _motions(part, config.guidance.drag_per_s)
         for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
             _refuse(part.name, broken)
     return part
@@ -98,11 +98,11 @@ def _simple(config: Config, name: str) -> Programme:
             return _doublets(config.identify)
 
 
-def _motions(part: Programme) -> Iterator[Motion]:
+def _motions(part: Programme, drag: float) -> Iterator[Motion]:
     """How the vehicle moves in it; with rates of the body, whatever its heading is."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
-        moments = list(predicted(part, tau * k / turns))
+        moments = list(predicted(part, tau * k / turns, drag))
         times, offset, velocity, acceleration = (
             np.array(column) for column in zip(*moments, strict=True)
         )

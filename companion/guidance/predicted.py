@@ -25,10 +25,16 @@ class Moment(NamedTuple):
     acceleration: Vector
 
 
-def predicted(part: Programme, heading: float = 0.0) -> Iterator[Moment]:
-    """The maneuver at its `check_times`, begun at rest with a heading in rad."""
+def predicted(part: Programme, heading: float = 0.0, drag: float = 0.0) -> Iterator[Moment]:
+    """The maneuver at its `check_times`, begun at rest.
+
+    Args:
+        part: the maneuver.
+        heading: at its beginning, rad.
+        drag: linear, per mass, 1/s; against still air.
+    """
     start = Pose((0.0, 0.0, 0.0), heading)
-    before, open_loop = 0.0, _OpenLoop(heading)
+    before, open_loop = 0.0, _OpenLoop(heading, drag)
     for time in part.check_times():
         reference = part.at(time, start)
         between = part.at(0.5 * (before + time), start)
@@ -37,22 +43,23 @@ def predicted(part: Programme, heading: float = 0.0) -> Iterator[Moment]:
         )
         yield moment if between.closed_loop else open_loop.carried(moment, between, time - before)
         if reference.closed_loop:
-            open_loop = _OpenLoop(heading)
+            open_loop = _OpenLoop(heading, drag)
         before = time
 
 
 class _OpenLoop:
     """Horizontal motion by commanded tilt, from rest."""
 
-    def __init__(self, heading: float) -> None:
-        self._heading = heading
+    def __init__(self, heading: float, drag: float) -> None:
+        self._heading, self._drag = heading, drag
         self._place = self._speed = (0.0, 0.0)
         self._roll = self._pitch = 0.0
 
     def carried(self, moment: Moment, reference: Reference, span: float) -> Moment:
         """The moment `span` seconds later, with what the reference commands between."""
-        pushed = self._acceleration(reference, span)
         (north, east), (fast_north, fast_east) = self._place, self._speed
+        by_tilt = self._acceleration(reference, span)
+        pushed = by_tilt[0] - self._drag * fast_north, by_tilt[1] - self._drag * fast_east
         self._place = (
             north + span * (fast_north + 0.5 * span * pushed[0]),
             east + span * (fast_east + 0.5 * span * pushed[1]),
@@ -61,7 +68,7 @@ class _OpenLoop:
         return moment._replace(
             offset=(*self._place, moment.offset[2]),
             velocity=(*self._speed, moment.velocity[2]),
-            acceleration=(*pushed, moment.acceleration[2]),
+            acceleration=(*by_tilt, moment.acceleration[2]),
         )
 
     def _acceleration(self, reference: Reference, span: float) -> Horizontal:

@@ -64,7 +64,7 @@ def yaml_of(tmp_path, text):
         (rows(step=1e-12), "line 3: 1e-12 s after the sample before; from 0.0001 to 10 s"),
         (rows(step=3600.0), "line 3: 3.6e+03 s after the sample before"),
         (rows(step=5.0, count=1000), "lasts 4995 s, and 3600 s is the longest"),
-        (rows(step=1.0, count=1000), "600 s is the longest with cutoff_hz 5"),
+        (rows(step=1.0, count=1000, scale=100.0), "600 s is the longest with cutoff_hz 5"),
         (rows(count=5, step=2e-4), "lasts less than 0.1 s"),
         (rows(scale=1e300), "x is 8e+294, more than 10000 m"),
         (rows(scale=-1e5), "more than 10000 m from where it begins"),
@@ -133,8 +133,8 @@ def test_a_large_file_is_not_read_whole(tmp_path, monkeypatch):
     sizes = []
     real = os.fdopen
 
-    def watched(*args):
-        file = real(*args)
+    def watched(*args, **options):
+        file = real(*args, **options)
         read = file.read
         return _Watched(file, lambda size: sizes.append(size) or read(size))
 
