@@ -24,6 +24,7 @@ from companion.doctor.undo import Undo, UndoFile
 from companion.flight.assembly import open_link
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_survey import survey
@@ -82,7 +83,10 @@ class _Visit:
             findings = await vehicle.met()
             if findings:
                 return self._told(findings)
-            evidence = await vehicle.evidence(wait)
+            try:
+                evidence = await vehicle.evidence(wait)
+            except (LinkTimeout, LinkLost) as error:
+                return self._told(vehicle.silent(error))
             findings = examine(config, evidence)
             code = self._told(findings)
             if fix:

@@ -10,6 +10,11 @@ from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import share_lost
 from companion.mavlink.streams import StreamRate
 
+_ABOUT_POSITION = frozenset(
+    {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
+)
+"""Autopilots send none of these before their estimator has a position."""
+
 
 class Identity(NamedTuple):
     """AUTOPILOT_VERSION; `None` where it was not told.
@@ -117,3 +122,28 @@ class Evidence:
     resets: int
     identity: Identity | None = None
     words: tuple[str, ...] = ()
+
+    @property
+    def awaits_position(self) -> bool:
+        """Whether the vehicle has no position yet, so that nothing about it can be told."""
+        readiness = self.state.readiness
+        estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
+        return not readiness.position or self.family.not_ready(estimator_only) is not None
+
+    @property
+    def booting(self) -> bool:
+        """Whether nothing was told of the estimator yet: ArduPilot sends nothing else then."""
+        return self.state.readiness.estimator_flags is None
+
+    @property
+    def awaited(self) -> tuple[str, ...]:
+        """Messages that do not come as long as the vehicle is not ready to send them."""
+        if not self.awaits_position:
+            return ()
+        return tuple(
+            name
+            for name, rate in self.streams.items()
+            if rate.achieved == 0.0
+            and not rate.refusal
+            and (self.booting or name in _ABOUT_POSITION)
+        )

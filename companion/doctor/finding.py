@@ -14,6 +14,7 @@ class Key(StrEnum):
     """What findings that are not about one parameter are called, in `flight.accept`, say."""
 
     HEARTBEAT = "vehicle.heartbeat"
+    ANSWERS = "vehicle.answers"
     SUPPORTED = "vehicle.supported"
     ARMED = "vehicle.armed"
     FAILSAFE = "vehicle.failsafe"

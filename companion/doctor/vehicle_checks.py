@@ -12,6 +12,7 @@ from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.state import VehicleState
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
 
 
 def armed(state: VehicleState) -> Finding:
@@ -64,12 +65,14 @@ def battery(config: Config, state: VehicleState) -> Finding:
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Motors and battery."""
     yield armed(evidence.state)
-    yield battery(config, evidence.state)
+    if evidence.booting and evidence.state.battery is None:
+        yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
+    else:
+        yield battery(config, evidence.state)
 
 
-def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the autopilot would arm, and why not, in its own words."""
-    state = evidence.state
+def failsafe(state: VehicleState) -> Iterator[Finding]:
+    """Whether the autopilot is in a failsafe."""
     if state.failsafe:
         yield Finding(
             Key.FAILSAFE,
@@ -79,15 +82,23 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "clear its cause first",
             "HEARTBEAT system_status",
         )
+
+
+def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot would arm, and why not, in its own words."""
+    state = evidence.state
+    yield from failsafe(state)
     missing = evidence.family.not_ready(state.readiness)
     said = "; ".join(dict.fromkeys(evidence.words))
     if missing is not None:
+        silent = evidence.awaited
+        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
         yield Finding(
             Key.READY,
-            INEFFECTIVE,
-            f"not ready to be armed, it lacks {missing}",
-            f"the autopilot says: {said}" if said else "the flight would wait for it",
-            "wait, or put right what it says",
+            NOT_READY,
+            f"not ready to be armed, it lacks {missing}{unsent}",
+            f"the autopilot says: {said}" if said else "`companion fly` would wait for it",
+            "wait, or put right what it says, and ask again",
             "SYS_STATUS, estimator flags",
         )
         return
@@ -120,10 +131,10 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if told is None:
         yield Finding(
             Key.FENCE,
-            UNSAFE,
+            NOT_READY if evidence.awaits_position else UNSAFE,
             "the vehicle does not tell its latitude and longitude",
             "whether it is inside safety.fence_polygon_deg cannot be known",
-            "wait for GPS, or give safety.fence_polygon_m instead",
+            "wait for GPS",
             source,
         )
         return

@@ -5,7 +5,7 @@ import asyncio
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import enter, order
 from companion.flight.rig import Rig
-from companion.flight.roles import in_role, require_role
+from companion.flight.roles import in_role, in_roles, require_role
 from companion.mavlink.roles import Role
 
 _SETTLING = 1.0
@@ -30,7 +30,7 @@ async def takeoff(rig: Rig) -> None:
     rig.detail = "the autopilot to accept the take-off"
     height = rig.config.flight.takeoff_height_m
     command = rig.link.family.take_off(height, _home_altitude(rig))
-    await order(rig, command, {Role.READY}, lambda: not state.landed)
+    await order(rig, command, in_roles(rig.link, {Role.READY}), lambda: not state.landed)
     climb = _Climb(rig, height)
     await rig.until(climb.over)
 
@@ -105,7 +105,8 @@ async def _take_over(rig: Rig) -> None:
         rig.loop.on = True
         await rig.until(lambda: in_role(rig.link, Role.OFFBOARD))
         return
-    await enter(rig, command, {Role.READY}, lambda: in_role(rig.link, Role.OFFBOARD))
+    ours = in_roles(rig.link, {Role.READY})
+    await enter(rig, command, ours, lambda: in_role(rig.link, Role.OFFBOARD))
 
 
 def _commands_flight(rig: Rig) -> bool:

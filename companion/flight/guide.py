@@ -2,10 +2,10 @@
 
 import asyncio
 from collections.abc import Callable
-from math import acos, degrees, dist, inf, nan
+from math import degrees, dist, inf, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
-from companion.attitude.kinematics import cos_tilt
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.control_loop import Command, ControlLoop
 from companion.flight.follow import Follow
 from companion.flight.hover_learning import HoverLearning
@@ -234,7 +234,7 @@ class Guide:
         """Hold where we are if open-loop rates have tilted the vehicle too far."""
         if self.pose is None or self._programme is None or self.begun_at is None:
             return
-        tilt = acos(cos_tilt(self._q[1], self._q[2]))
+        tilt = tilt_angle(self._q[1], self._q[2])
         within = self._clock() - self.begun_at
         if self._programme.at(within, self.pose).body_rates is None or tilt <= self._max_tilt:
             return

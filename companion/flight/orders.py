@@ -1,15 +1,13 @@
 """Commands to a vehicle that somebody else may take at any moment."""
 
 import asyncio
-from collections.abc import Callable, Set
+from collections.abc import Callable
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.rig import Rig
-from companion.flight.roles import require_role
 from companion.mavlink.command import Command
 from companion.mavlink.commands import command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout
-from companion.mavlink.roles import Role
 
 _TRIES = 4
 _SHOWS = 3.0
@@ -19,9 +17,11 @@ _ENTERED = 1.0
 
 Done = Callable[[], bool]
 """Whether the vehicle does what was ordered; may end the flight instead."""
+Ours = Callable[[], None]
+"""Raises `FlightEnded` where the vehicle is not ours to command, such as `roles.in_roles`."""
 
 
-async def order(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> None:
+async def order(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
     """Command until it is answered, and ask each time before whose the vehicle is.
 
     A command is never repeated blindly: the first one may have been obeyed, only its answer lost,
@@ -30,7 +30,7 @@ async def order(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> N
     Args:
         rig: The parts of the flight.
         command: It.
-        allowed: What the vehicle may be doing; else it is left alone.
+        ours: Asked each time; where it raises, nothing is sent.
         done: See `Done`; looked at before a repetition.
 
     Raises:
@@ -42,7 +42,7 @@ async def order(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> N
         await rig.fresh_heartbeat()
         if given > 0 and done():
             return
-        require_role(rig.link, allowed)
+        ours()
         try:
             await rig.link.command(*command, retries=0)
             return
@@ -59,13 +59,13 @@ async def order(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> N
         raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
 
 
-async def enter(rig: Rig, command: Command, allowed: Set[Role], done: Done) -> None:
+async def enter(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
     """`order`, and wait until it shows; as there.
 
     Raises:
         FlightEnded: Also if it was accepted and somebody decided otherwise at once.
     """
-    await order(rig, command, allowed, done)
+    await order(rig, command, ours, done)
     accepted = asyncio.get_running_loop().time()
 
     def entered() -> bool:

@@ -7,7 +7,7 @@ from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import order
 from companion.flight.rig import Rig
-from companion.flight.roles import in_role
+from companion.flight.roles import in_role, in_roles, require_role
 from companion.mavlink.parameter_rules import Values, Verdict
 from companion.mavlink.roles import Role
 
@@ -71,7 +71,7 @@ async def undo_arming(rig: Rig) -> None:
         return
     rig.detail = "the autopilot to accept disarming"
     # The heartbeat may be older than our arming, so it is not asked whether this is needed.
-    ours = {Role.READY, Role.TAKEOFF}
+    ours = in_roles(rig.link, {Role.READY, Role.TAKEOFF})
     await order(rig, rig.link.family.disarm(), ours, lambda: not rig.armed())
     await rig.fresh_heartbeat()
     await rig.until(lambda: not rig.armed())
@@ -83,16 +83,10 @@ async def _arm(rig: Rig) -> None:
     await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
     await rig.until(lambda: state.landed, "the autopilot to say that it stands on the ground")
     _check_battery(rig)
-    await rig.fresh_heartbeat()
-    _refuse(vehicle_checks.armed(state))
-    if state.mode != rig.mode_at_checks:
-        raise FlightEnded(
-            f"the pilot or another station took over before arming: mode {state.mode}"
-        )
     rig.detail = "the autopilot to accept arming"
     *before, command = rig.link.family.arm()
     for each in before:
-        await rig.link.command(*each)
+        await order(rig, each, lambda: _untouched(rig), lambda: in_role(rig.link, Role.READY))
     await rig.until(lambda: in_role(rig.link, Role.READY))
     armings = state.armings
 
@@ -101,9 +95,23 @@ async def _arm(rig: Rig) -> None:
             raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
         return rig.armed()
 
+    def ready() -> None:
+        _refuse(vehicle_checks.armed(state))
+        require_role(rig.link, {Role.READY})
+
     rig.arm_sent = True
-    await order(rig, command, {Role.READY}, armed)
+    await order(rig, command, ready, armed)
     await rig.until(armed, "the vehicle to be armed")
+
+
+def _untouched(rig: Rig) -> None:
+    """Raise `FlightEnded` if somebody armed it or chose another mode since the checks."""
+    state = rig.link.state
+    _refuse(vehicle_checks.armed(state))
+    if state.mode != rig.mode_at_checks:
+        raise FlightEnded(
+            f"the pilot or another station took over before arming: mode {state.mode}"
+        )
 
 
 def _ready(rig: Rig) -> bool:

@@ -5,7 +5,7 @@ import asyncio
 from companion.flight.ending import FlightEnded, internal
 from companion.flight.orders import enter, order
 from companion.flight.rig import Rig
-from companion.flight.roles import in_role, require_role
+from companion.flight.roles import in_role, in_roles, require_role
 from companion.mavlink.roles import Role
 
 _SELF_DISARM = 8.0
@@ -36,7 +36,8 @@ async def hand_back(rig: Rig) -> None:
     """Stop moving, and stream until the autopilot holds by itself."""
     _stop_moving(rig)
     rig.detail = "the autopilot to hold"
-    await enter(rig, rig.link.family.hold(), _OURS, lambda: in_role(rig.link, Role.HOLD))
+    ours = in_roles(rig.link, _OURS)
+    await enter(rig, rig.link.family.hold(), ours, lambda: in_role(rig.link, Role.HOLD))
     rig.release()
 
 
@@ -48,7 +49,7 @@ async def land(rig: Rig) -> None:
     def landing() -> bool:
         return in_role(rig.link, Role.LAND) or not rig.armed()
 
-    await enter(rig, rig.link.family.land(), _OURS | {Role.LAND}, landing)
+    await enter(rig, rig.link.family.land(), in_roles(rig.link, _OURS | {Role.LAND}), landing)
     rig.release()
 
     def down() -> bool:
@@ -73,7 +74,7 @@ async def disarm(rig: Rig) -> None:
             await rig.until(disarmed)
     except TimeoutError:
         rig.detail = "the autopilot to accept disarming"
-        await order(rig, rig.link.family.disarm(), {Role.LAND}, disarmed)
+        await order(rig, rig.link.family.disarm(), in_roles(rig.link, {Role.LAND}), disarmed)
         await rig.until(disarmed)
 
 

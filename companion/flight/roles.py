@@ -1,6 +1,6 @@
 """Whether the vehicle still is in a mode of the flight's own."""
 
-from collections.abc import Set
+from collections.abc import Callable, Set
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.mavlink.link import Link
@@ -32,3 +32,8 @@ def require_role(link: Link, allowed: Set[Role]) -> None:
         else "the pilot or another station took over"
     )
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.LET_GO)
+
+
+def in_roles(link: Link, allowed: Set[Role]) -> Callable[[], None]:
+    """`require_role` to be called later."""
+    return lambda: require_role(link, allowed)

@@ -1,18 +1,37 @@
 """Orders: repeated only after asking whose the vehicle is, and never without need."""
 
+import ast
 import asyncio
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import enter, order
+from companion.flight.roles import in_roles
 from companion.mavlink.command import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.mavlink.roles import Role
 
 LAND = Command(21)
 LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
+
+
+FLIGHT = Path(__file__).parents[2] / "companion" / "flight"
+
+
+def test_every_command_of_a_flight_goes_by_orders():
+    """`rig.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
+    senders = {
+        path.name
+        for path in FLIGHT.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and ast.unparse(node.func).endswith("link.command")
+    }
+    assert senders == {"orders.py", "rig.py"}
 
 
 class Vehicle:
@@ -48,7 +67,12 @@ class Vehicle:
 
 def run(vehicle, work=order):
     landing = asyncio.run(
-        work(vehicle, LAND, {Role.OFFBOARD, Role.LAND}, lambda: vehicle.mode is Role.LAND)
+        work(
+            vehicle,
+            LAND,
+            in_roles(vehicle, {Role.OFFBOARD, Role.LAND}),
+            lambda: vehicle.mode is Role.LAND,
+        )
     )
     return landing, vehicle.sent
 
