@@ -1,10 +1,9 @@
 """All targets by name."""
 
-from tests.fuzz import configuration, frames, telemetry, trajectories
+from tests.fuzz import configuration, frames, recordings, telemetry, trajectories
 from tests.fuzz.target import Target
 
 TARGETS: dict[str, Target] = {
-    target.name: target
-    for target in (configuration.TARGET, trajectories.TARGET, frames.TARGET, telemetry.TARGET)
-
+    module.TARGET.name: module.TARGET
+    for module in (configuration, trajectories, frames, telemetry, recordings)
 }
