@@ -43,11 +43,12 @@ def main() -> int:
 
 
 def _report(searches: list[Search], seconds: float, seed: int) -> None:
-    print(f"\n{'target':<16}{'minutes':>9}{'cases':>10}{'cases/s':>9}{'slowest s':>11}{'failed':>8}")
+    heads = ("minutes", "cases", "cases/s", "slowest s", "failed")
+    print(f"\n{'target':<16}" + "".join(f"{head:>11}" for head in heads))
     for search in searches:
         print(
-            f"{search.target.name:<16}{seconds / 60:>9.1f}{search.cases:>10}"
-            f"{search.cases / seconds:>9.1f}{search.slowest:>11.2f}{len(search.failures):>8}"
+            f"{search.target.name:<16}{seconds / 60:>11.1f}{search.cases:>11}"
+            f"{search.cases / seconds:>11.1f}{search.slowest:>11.2f}{len(search.failures):>11}"
         )
     print(f"seed {seed}, {sum(search.cases for search in searches)} cases")
     for search in searches:

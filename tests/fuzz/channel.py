@@ -7,7 +7,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from tests.fuzz.judge import Judge
-from tests.fuzz.vehicle import STEP, TELEMETRY, Vehicle, sends
+from tests.fuzz.messages import EVERY, sends
+from tests.fuzz.vehicle import STEP, Vehicle
 from tests.fuzz.wires import Wire
 
 Event = dict[str, Any]
@@ -39,7 +40,7 @@ class Channel:
         self._mav = dialect.MAVLink(None, 1, 1)
         self._steps = 0
         self._shift_ms = 0
-        vehicle._say = self.say
+        vehicle.say = self.say
 
     def phase(self, name: str) -> None:
         """A phase of the flight begins: what waits for it is due."""
@@ -54,7 +55,7 @@ class Channel:
         while True:
             self._vehicle.step()
             self._steps += 1
-            for name, (_, every) in TELEMETRY.items():
+            for name, every in EVERY.items():
                 if self._steps % every == 0 and sends(self._vehicle.family, name):
                     self.say(self._vehicle.message(name))
             await asyncio.sleep(STEP)
@@ -150,7 +151,7 @@ class Channel:
                 self._active.append((event, self._loop.time() + event["seconds"]))
 
     def _inject(self, event: Event, count: int) -> None:
-        message = self._vehicle.message(event["message"]) if event["message"] in TELEMETRY else None
+        message = self._vehicle.message(event["message"]) if event["message"] in EVERY else None
         if message is None:
             message = _blank(event["message"])
         for field, value in event["fields"].items():

@@ -98,7 +98,7 @@ def _value(field: dict[str, Any]) -> st.SearchStrategy[str]:
     """Text for a key: what the schema allows, its bounds, or anything."""
     kinds = [field, *field.get("anyOf", ())]
     known: list[st.SearchStrategy[Any]] = [
-        st.sampled_from([kind["enum"] for kind in kinds if "enum" in kind][0])
+        st.sampled_from(next(kind["enum"] for kind in kinds if "enum" in kind))
         if any("enum" in kind for kind in kinds)
         else numbers
     ]
@@ -108,7 +108,7 @@ def _value(field: dict[str, Any]) -> st.SearchStrategy[str]:
         if bounds:
             near = [change(bound) for bound in bounds for change in _NEAR]
             known.append(st.sampled_from(near))
-            known.append(st.floats(min(bounds), max(max(bounds), 100.0)))
+            known.append(st.floats(min(bounds), max(*bounds, 100.0)))
         if kind.get("type") == "array":
             known.append(_LISTS)
         if kind.get("format") == "path":
@@ -118,7 +118,7 @@ def _value(field: dict[str, Any]) -> st.SearchStrategy[str]:
     return st.one_of(st.one_of(known).map(_yaml_text), scalars)
 
 
-_NEAR = (lambda b: b, lambda b: b * 1.000001, lambda b: b * 0.999999, lambda b: int(b), lambda b: -b)
+_NEAR = (float, int, lambda b: b * 1.000001, lambda b: b * 0.999999, lambda b: -b)
 _LISTS = st.one_of(
     st.lists(st.lists(st.one_of(numbers, st.floats(-20.0, 20.0)), max_size=3), max_size=5),
     st.lists(
@@ -157,33 +157,30 @@ def _by_schema(draw: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
-@st.composite
-def _pathological(draw: Any) -> str:
-    """What costs a reader more than it looks."""
-    size = draw(st.sampled_from((3, 30, 100, 1000, 5000, 20_000)))
-    key = draw(st.sampled_from(("link", "mock", "limits", "a")))
-    match draw(st.sampled_from(("depth", "block", "keys", "aliases", "merge", "long", "quoted"))):
-        case "depth":
-            return f"{key}: " + "[" * size + draw(st.sampled_from(("]" * size, "")))
-        case "block":
-            return f"{key}:\n" + "".join(" " * k + "a:\n" for k in range(min(size, 1000)))
-        case "keys":
-            return f"{key}:\n" + "".join(f"  k{k}: {k}\n" for k in range(size))
-        case "aliases":
-            levels = range(1, min(size, 30))
-            return "a0: &a0 [x, x]\n" + "".join(
-                f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in levels
-            )
-        case "merge":
-            levels = range(1, min(size, 30))
-            return "a0: &a0 {x: 1}\n" + "".join(
-                f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in levels
-            )
-        case "long":
-            return f"{key}: {{endpoint: {'9' * size * 10}}}\n"
-        case _:
-            return f'{key}: "' + draw(st.sampled_from(("a", "\\x41", "\n"))) * size + '"\n'
-
+_LARGE = {
+    "depth": lambda size: "a: " + "[" * size + "]" * size,
+    "open": lambda size: "link: " + "{a: " * size,
+    "block": lambda size: "a:\n" + "".join(" " * k + "a:\n" for k in range(min(size, 1000))),
+    "keys": lambda size: "mock:\n" + "".join(f"  k{k}: {k}\n" for k in range(size)),
+    "wrong keys": lambda size: "link:\n" + "".join(f"  k{k}: {k}\n" for k in range(size)),
+    "aliases": lambda size: (
+        "a0: &a0 [x]\n"
+        + "".join(f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in range(1, min(size, 30)))
+    ),
+    "merges": lambda size: (
+        "a0: &a0 {x: 1}\n"
+        + "".join(f"a{k}: &a{k} {{<<: [*a{k - 1}, *a{k - 1}]}}\n" for k in range(1, min(size, 30)))
+    ),
+    "digits": lambda size: f"link: {{endpoint: {'9' * size * 10}}}\n",
+    "escapes": lambda size: 'link: {endpoint: "' + "\\x41" * size + '"}\n',
+    "lines": lambda size: 'link: {endpoint: "' + "\n" * size + '"}\n',
+}
+"""What costs a reader more than it looks, by its size."""
+_pathological = st.builds(
+    lambda kind, size: _LARGE[kind](size),
+    st.sampled_from(sorted(_LARGE)),
+    st.sampled_from((3, 30, 100, 1000, 5000, 20_000)),
+)
 
 _WHOLE = [path.read_text(encoding="utf-8") for path in sorted(SHIPPED.glob("*.yaml"))]
 _PARTS = sorted(
@@ -203,7 +200,7 @@ _texts = st.one_of(
     _by_schema(),
     mutated(_originals),
     mutated(_by_schema()),
-    _pathological(),
+    _pathological,
     st.binary(max_size=80).map(as_text),
     st.text(max_size=80),
 )

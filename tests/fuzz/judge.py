@@ -5,7 +5,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from tests.fuzz.vehicle import Family, Vehicle
+from tests.fuzz.family import Family
+from tests.fuzz.vehicle import Vehicle
 
 _ASKS = {dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL}
 """Commands that only ask."""

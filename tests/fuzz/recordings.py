@@ -84,7 +84,7 @@ _stamps = st.one_of(st.none(), st.integers(0, 2**32 - 1))
 
 @st.composite
 def _flown_tlog(draw: Any) -> bytes:
-    """A flight by rates: setpoints that answer samples, with odd values and stamps here and there."""
+    """A flight by rates, with odd values and stamps here and there."""
     mav, companion = dialect.MAVLink(None, 1, 1), dialect.MAVLink(None, 1, 191)
     records: list[bytes] = []
 
@@ -126,8 +126,10 @@ def _undo_text(draw: Any) -> str:
 def _figures(draw: Any) -> str:
     """A table of numbers under a header, such as a flight writes."""
     width = draw(st.sampled_from((7, 7, 7, 1, 3, 9)))
-    rows = draw(st.lists(st.lists(numbers, min_size=width, max_size=width), max_size=8))
-    lines = [",".join(map(repr, row)) for row in rows]
+    row = st.lists(st.one_of(numbers, st.floats(-1.0, 1.0)), min_size=width, max_size=width)
+    rows = draw(st.lists(row, max_size=4)) * draw(st.sampled_from((1, 1, 5)))
+    step = draw(st.sampled_from((0.004, 0.1, 0.0, -0.1, 1.0)))
+    lines = [",".join(map(repr, (step * k, *row[1:]))) for k, row in enumerate(rows)]
     return draw(st.sampled_from(("a,b\n", "", "time,x\n\n"))) + "\n".join(lines) + "\n"
 
 
@@ -140,9 +142,7 @@ _tables = st.fixed_dictionaries(
         ),
     },
 )
-_tlogs = st.one_of(
-    _flown_tlog(), _flown_tlog(), _mutated_tlog(), st.binary(max_size=100)
-)
+_tlogs = st.one_of(_flown_tlog(), _flown_tlog(), _mutated_tlog(), st.binary(max_size=100))
 _cases = st.one_of(
     _tlogs.map(lambda data: {"tlog": data.hex()}),
     _tlogs.map(lambda data: {"tlog": data.hex()}),

@@ -54,7 +54,7 @@ class Search:
                 self._batch(number)
             except _Over:
                 return
-            except (Exception, HypothesisException, BaseExceptionGroup):  # noqa: B014
+            except (Exception, HypothesisException, BaseExceptionGroup):
                 continue  # it is in `failures`
 
     def _batch(self, number: int) -> None:
@@ -108,8 +108,9 @@ def kind_of(error: BaseException) -> str:
         origin = origin.__cause__
     frames = traceback.extract_tb(origin.__traceback__)
     ours = [frame for frame in frames if "companion/" in frame.filename] or frames
-    places = [f"{Path(frame.filename).name}:{frame.lineno}" for frame in (ours[-1:] + frames[-1:])]
-    return f"{type(error).__name__} at {' and '.join(dict.fromkeys(places))}: {_FOLDERS.sub('', str(error))[:60]}"
+    places = {f"{Path(frame.filename).name}:{frame.lineno}" for frame in (ours[-1], frames[-1])}
+    words = _FOLDERS.sub("", str(error))[:60]
+    return f"{type(error).__name__} at {' and '.join(sorted(places))}: {words}"
 
 
 def save(search: Search, folder: Path) -> Iterator[Path]:

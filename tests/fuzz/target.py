@@ -42,7 +42,7 @@ class Target:
     seconds: float = 2.0
 
     def run(self, case: Case) -> None:
-        """Check one case; raises `Hung` if that does not end in time."""
+        """Check one case; raises `HungError` if that does not end in time."""
         with bounded_memory(), watchdog(self.seconds):
             self.check(case)
 
@@ -51,7 +51,7 @@ class Target:
         return sorted((CORPUS / self.name).glob("*.json"))
 
 
-class Hung(AssertionError):
+class HungError(AssertionError):
     """A case took too long."""
 
 
@@ -64,7 +64,7 @@ def watchdog(seconds: float) -> Iterator[None]:
     """End what takes more than `seconds` of processor time, or waits for ten times as long.
 
     Raises:
-        Hung: it did, with the place where.
+        HungError: it did, with the place where.
     """
 
     def ring(_number: int, _frame: Any) -> None:
@@ -81,7 +81,7 @@ def watchdog(seconds: float) -> Iterator[None]:
             signal.setitimer(timer, limit, 0.5)
         yield
     except _Alarm as alarm:
-        raise Hung(f"took more than {seconds:g} s of processor time") from alarm
+        raise HungError(f"took more than {seconds:g} s of processor time") from alarm
     finally:
         for timer, _ in clocks.values():
             signal.setitimer(timer, 0.0)

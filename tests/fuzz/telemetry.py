@@ -19,9 +19,11 @@ from companion.flight.session import Session
 from companion.mavlink.link import Link
 from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
+from tests.fuzz.family import ARDUPILOT, PX4
 from tests.fuzz.judge import Judge
+from tests.fuzz.messages import EVERY
 from tests.fuzz.target import Case, Target
-from tests.fuzz.vehicle import ARDUPILOT, PX4, TELEMETRY, Vehicle
+from tests.fuzz.vehicle import Vehicle
 
 _LONGEST_FLIGHT = 300.0
 """Virtual time after which a flight must be over, s: all that its phases may take."""
@@ -91,7 +93,7 @@ def _quiet() -> Any:
 async def _flown(case: Case, outcome: Outcome) -> None:
     loop = asyncio.get_running_loop()
     config = Config.model_validate(_configuration(case))
-    vehicle = Vehicle(_FAMILIES[case["family"]], lambda _: None)
+    vehicle = Vehicle(_FAMILIES[case["family"]])
     judge = Judge(vehicle, config.model_dump(mode="json"))
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         session = Session(config, Path(name), outcome, _no)
@@ -132,7 +134,7 @@ async def _no() -> bool:
 
 async def _pilot(vehicle: Vehicle, outcome: Outcome) -> None:
     """A pilot who arms when asked to, and hands over."""
-    while "arm" not in outcome.phases:
+    while "arm" not in outcome.phases:  # noqa: ASYNC110  an observer sets no events
         await asyncio.sleep(0.1)
     await asyncio.sleep(0.5)
     vehicle.mode = vehicle.family.foreign[0]
@@ -173,28 +175,30 @@ _values = st.one_of(
     st.integers(-300, 300),
     st.floats(-50.0, 50.0).map(lambda by: {"add": by}),
 )
-_NAMES = tuple(TELEMETRY)
+_NAMES = tuple(EVERY)
 _FIELDS = {
     kind.msgname: tuple(kind.fieldnames)
     for kind in dialect.mavlink_map.values()
-    if kind.msgname in TELEMETRY
+    if kind.msgname in EVERY
     or kind.msgname in ("COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "TIMESYNC", "STATUSTEXT")
 }
 _seconds = st.one_of(st.floats(0.02, 3.0), st.sampled_from((0.03, 0.1, 0.3, 0.6, 1.2, 6.0)))
 _COMMANDS = (400, 176, 22, 21, 511, 512)
+
+_kinds = st.sampled_from(
+    (
+        *("field", "field", "field", "say", "say", "silence", "silence", "delay", "hold"),
+        *("copies", "swap", "stamps", "restart", "mode", "armed", "deaf", "ack", "jump"),
+        *("interrupt", "bytes"),
+    )
+)
 
 
 @st.composite
 def _events(draw: Any) -> dict[str, Any]:
     """One thing that goes wrong."""
     event: dict[str, Any] = {"phase": draw(_LIKELY), "after": draw(st.floats(0.0, 2.0))}
-    event["kind"] = kind = draw(
-        st.sampled_from(
-            ("field", "field", "field", "say", "say", "silence", "silence", "delay", "hold")
-            + ("copies", "swap", "stamps", "restart", "mode", "armed", "deaf", "ack", "jump")
-            + ("interrupt", "bytes")
-        )
-    )
+    event["kind"] = kind = draw(_kinds)
     if kind in ("field", "silence", "delay", "hold", "copies", "swap", "deaf"):
         event["seconds"] = draw(_seconds)
     match kind:

@@ -9,7 +9,13 @@ from hypothesis import HealthCheck, Phase, given, settings
 from tests.fuzz.target import read_case
 from tests.fuzz.targets import TARGETS
 
-EXAMPLES = {"configuration": 40, "trajectories": 40, "frames": 60, "telemetry": 12, "recordings": 12}
+EXAMPLES = {
+    "configuration": 40,
+    "trajectories": 40,
+    "frames": 60,
+    "telemetry": 12,
+    "recordings": 12,
+}
 """Some seconds of processor time in all."""
 
 AWAITED: dict[str, str] = {}

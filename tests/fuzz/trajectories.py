@@ -83,26 +83,18 @@ _sizes = st.one_of(
 )
 
 
-def _values(key: str) -> st.SearchStrategy[Any]:
-    match key:
-        case "to_m":
-            return _point
-        case "points_m":
-            return st.lists(_point, max_size=6)
-        case "headings_deg":
-            return st.lists(st.one_of(st.none(), st.floats(-360.0, 360.0), numbers), max_size=6)
-        case "heading":
-            return st.sampled_from(("fixed", "along", "file"))
-        case "shape":
-            return st.sampled_from(("gerono", "bernoulli"))
-        case "frame":
-            return st.sampled_from(("enu", "nwu", "ned"))
-        case "file":
-            return st.one_of(st.just("table.csv"), st.just("table.csv"), st.sampled_from(PATHS))
-        case "direction_deg" | "rise_m":
-            return _coordinate
-        case _:
-            return _sizes
+_VALUES: dict[str, st.SearchStrategy[Any]] = {
+    "to_m": _point,
+    "points_m": st.lists(_point, max_size=6),
+    "headings_deg": st.lists(st.one_of(st.none(), st.floats(-360.0, 360.0), numbers), max_size=6),
+    "heading": st.sampled_from(("fixed", "along", "file")),
+    "shape": st.sampled_from(("gerono", "bernoulli")),
+    "frame": st.sampled_from(("enu", "nwu", "ned")),
+    "file": st.one_of(st.just("table.csv"), st.just("table.csv"), st.sampled_from(PATHS)),
+    "direction_deg": _coordinate,
+    "rise_m": _coordinate,
+}
+"""By key; all others are sizes."""
 
 
 def _scalar(value: Any) -> str:
@@ -129,7 +121,9 @@ def _by_shape(draw: Any) -> str:
             if key in _OPTIONAL and draw(st.booleans()):
                 continue
             odd = draw(st.integers(0, 30)) == 0
-            lines.append(f"  {key}: {draw(scalars) if odd else _scalar(draw(_values(key)))}")
+            lines.append(
+                f"  {key}: {draw(scalars) if odd else _scalar(draw(_VALUES.get(key, _sizes)))}"
+            )
     return "\n".join(lines) + "\n"
 
 

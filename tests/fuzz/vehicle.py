@@ -4,42 +4,23 @@ It shares no code with the bundled one: pymavlink, and a point mass that turns a
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from tests.fuzz.family import BRAKE, HOME_ALTITUDE, PX4, Family
+from tests.fuzz.messages import BUILDERS
 
 G = 9.80665
 HOVER = 0.5
 STEP = 0.025
 """Of its physics and its attitude, s."""
-HOME_ALTITUDE = 500.0
-
-
-class Family(NamedTuple):
-    """What an autopilot's modes are called on the wire."""
-
-    autopilot: int
-    takeoff: int
-    ready: int
-    offboard: int
-    land: int
-    foreign: tuple[int, ...]
-
-    @property
-    def ours(self) -> set[int]:
-        """Modes that a flight may be in."""
-        return {self.takeoff, self.ready, self.offboard, self.land, *((17,) * self.is_ardupilot)}
-
-    @property
-    def is_ardupilot(self) -> bool:
-        """Whether GUIDED is take-off and offboard at once."""
-        return self.autopilot == 3
-
-
-PX4 = Family(12, 0x02040000, 0x03040000, 0x00060000, 0x06040000, (0x00030000, 0x05040000, 99))
-ARDUPILOT = Family(3, 4, 4, 4, 9, (0, 5, 6, 250))
-_BRAKE = 17
-_PARAMETERS = {"COM_OF_LOSS_T": 1.0, "GUID_TIMEOUT": 1.0, "GUID_OPTIONS": 8.0, "ATC_ANGLE_BOOST": 0.0}
+_PARAMETERS = {
+    "COM_OF_LOSS_T": 1.0,
+    "GUID_TIMEOUT": 1.0,
+    "GUID_OPTIONS": 8.0,
+    "ATC_ANGLE_BOOST": 0.0,
+}
 """It has no others."""
 _LOSS_S = 1.0
 """As these say."""
@@ -50,11 +31,14 @@ class Vehicle:
 
     Args:
         family: whose manners it has.
+
+    Attributes:
         say: takes each message that it sends.
     """
 
-    def __init__(self, family: Family, say: Callable[[Any], None]) -> None:
-        self.family, self._say = family, say
+    def __init__(self, family: Family) -> None:
+        self.family = family
+        self.say: Callable[[Any], None] = lambda _: None
         self.mode = family.ready
         self.armed = self.by_rates = False
         self.acks: dict[int, int] = {}
@@ -63,7 +47,7 @@ class Vehicle:
         self.rates, self.thrust = (0.0, 0.0, 0.0), 0.0
         self.boot_s = 20.0
         self._goal = 0.0
-        self._rising = False
+        self.rising = False
         self._down_for = 0.0
         self._silent_for = 0.0
 
@@ -78,9 +62,9 @@ class Vehicle:
         """Live for `STEP`."""
         self.boot_s += STEP
         self._silent_for += STEP
-        if self._flies_by_rates() and self._silent_for > _LOSS_S:
-            self.by_rates, self.mode = False, _BRAKE if self.family.is_ardupilot else PX4.ready
-        if self._flies_by_rates():
+        if self.flies_by_rates() and self._silent_for > _LOSS_S:
+            self.by_rates, self.mode = False, BRAKE if self.family.is_ardupilot else PX4.ready
+        if self.flies_by_rates():
             self._turn()
         else:
             self._steer()
@@ -90,7 +74,8 @@ class Vehicle:
             self.position[2], self.velocity = 0.0, [0.0, 0.0, 0.0]
         self._land()
 
-    def _flies_by_rates(self) -> bool:
+    def flies_by_rates(self) -> bool:
+        """Whether it obeys setpoints."""
         if self.family.is_ardupilot:
             return self.by_rates
         return self.armed and self.mode == PX4.offboard
@@ -117,10 +102,10 @@ class Vehicle:
         self.q = [1.0, 0.0, 0.0, 0.0]
         self.rates = (0.0, 0.0, 0.0)
         climb = 0.0
-        if self.armed and self._rising:
+        if self.armed and self.rising:
             climb = min(2.5, 3.0 * (self._goal - self.height))
             if self._goal - self.height < 0.1:
-                self._rising, climb = False, 0.0
+                self.rising, climb = False, 0.0
                 if self.mode == PX4.takeoff:
                     self.mode = PX4.ready
         elif self.mode == self.family.land and self.height > 0.0:
@@ -144,26 +129,26 @@ class Vehicle:
                 self.rates, self.thrust = rates, message.thrust
                 guided = self.family.is_ardupilot and self.mode == 4
                 if guided and self.armed and self.height > 0.5:
-                    self.by_rates, self._rising = True, False
+                    self.by_rates, self.rising = True, False
             case "COMMAND_LONG":
                 self._command(message)
             case "PARAM_REQUEST_READ":
                 self._parameter(str(message.param_id))
             case "TIMESYNC" if message.tc1 == 0:
-                self._say(dialect.MAVLink_timesync_message(int(self.boot_s * 1e9), message.ts1))
+                self.say(dialect.MAVLink_timesync_message(int(self.boot_s * 1e9), message.ts1))
 
     def _parameter(self, name: str) -> None:
         if name not in _PARAMETERS:
-            self._say(dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1))
+            self.say(dialect.MAVLink_param_error_message(1, 191, name.encode(), -1, 1))
             return
-        self._say(dialect.MAVLink_param_value_message(name.encode(), _PARAMETERS[name], 9, 9, 0))
+        self.say(dialect.MAVLink_param_value_message(name.encode(), _PARAMETERS[name], 9, 9, 0))
 
     def _command(self, message: Any) -> None:
         number = message.command
         result = self.acks.get(number)
         if result is None:
             result = self._obey(number, message)
-        self._say(dialect.MAVLink_command_ack_message(number, result))
+        self.say(dialect.MAVLink_command_ack_message(number, result))
 
     def _obey(self, number: int, message: Any) -> int:
         match number:
@@ -171,7 +156,7 @@ class Vehicle:
                 told = self.tell(int(message.param1))
                 if told is None:
                     return 2
-                self._say(told)
+                self.say(told)
             case dialect.MAV_CMD_COMPONENT_ARM_DISARM:
                 if not message.param1 and self.height > 0.1:
                     return 2
@@ -182,7 +167,7 @@ class Vehicle:
                 if not self.armed:
                     return 2
                 above = 0.0 if self.family.is_ardupilot else HOME_ALTITUDE
-                self._goal, self._rising = message.param7 - above, True
+                self._goal, self.rising = message.param7 - above, True
                 self.mode = self.family.takeoff
             case dialect.MAV_CMD_NAV_LAND:
                 self.mode = self.family.land
@@ -196,7 +181,7 @@ class Vehicle:
             if mode == PX4.offboard and self._silent_for > 0.5:
                 return 1
         if mode != self.mode:
-            self.by_rates = self._rising = False
+            self.by_rates = self.rising = False
         self.mode = mode
         return 0
 
@@ -204,98 +189,14 @@ class Vehicle:
 
     def tell(self, number: int) -> Any:
         """The newest of a message that it is asked for."""
-        name = next((n for n, (i, _) in TELEMETRY.items() if i == number), None)
+        known = dialect.mavlink_map.get(number)
         if number == dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             return dialect.MAVLink_autopilot_version_message(
                 0xFFFF, 0x01100000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 7
             )
-        return None if name is None else self.message(name)
+        build = BUILDERS.get(known.msgname if known else "")
+        return build and build(self)
 
     def message(self, name: str) -> Any:
         """A message of its telemetry, as it would send it now."""
-        ms = int(self.boot_s * 1000.0) & 0xFFFFFFFF
-        usec = int(self.boot_s * 1e6)
-        north, east, down = self.position
-        rates = self.rates if self._flies_by_rates() else (0.0, 0.0, 0.0)
-        match name:
-            case "HEARTBEAT":
-                return self._heartbeat()
-            case "ATTITUDE_QUATERNION":
-                return dialect.MAVLink_attitude_quaternion_message(ms, *self.q, *rates)
-            case "LOCAL_POSITION_NED":
-                return dialect.MAVLink_local_position_ned_message(
-                    ms, north, east, down, *self.velocity
-                )
-            case "EXTENDED_SYS_STATE":
-                state = 1 if self.height <= 0.05 else 3 if self._rising else 2
-                return dialect.MAVLink_extended_sys_state_message(0, state)
-            case "SYS_STATUS":
-                return dialect.MAVLink_sys_status_message(
-                    0x1FFFFFFF, 0x1FFFFFFF, 0x1FFFFFFF, 100, 16000, 500, 90, *(0,) * 6
-                )
-            case "ESTIMATOR_STATUS":
-                return dialect.MAVLink_estimator_status_message(usec, 0x33F, *(0.1,) * 8)
-            case "EKF_STATUS_REPORT":
-                return dialect.MAVLink_ekf_status_report_message(0x33F, *(0.1,) * 5)
-            case "HOME_POSITION":
-                return dialect.MAVLink_home_position_message(
-                    473977420, 85455940, int(HOME_ALTITUDE * 1e3), 0, 0, 0, [1, 0, 0, 0], 0, 0, 0
-                )
-            case "GPS_RAW_INT":
-                return dialect.MAVLink_gps_raw_int_message(
-                    usec, 3, 473977420, 85455940, 500_000, 80, 90, 0, 0, 12
-                )
-            case "GLOBAL_POSITION_INT":
-                return dialect.MAVLink_global_position_int_message(
-                    ms, 473977420, 85455940, 500_000, int(-down * 1e3), 0, 0, 0, 0
-                )
-            case "ATTITUDE_TARGET":
-                return dialect.MAVLink_attitude_target_message(
-                    ms, 0, [1.0, 0.0, 0.0, 0.0], *rates, self.thrust
-                )
-            case "ODOMETRY":
-                return self._odometry(usec)
-            case _:
-                return dialect.MAVLink_battery_status_message(
-                    0, 0, 0, 2500, [4000] * 4 + [65535] * 6, 500, 0, 0, 90
-                )
-
-    def _heartbeat(self) -> Any:
-        if self.family.is_ardupilot:
-            base = 1 | 64 | (0 if self.by_rates or self.mode != 4 else 8) | 128 * self.armed
-        else:
-            base = 29 | 128 * self.armed
-        return dialect.MAVLink_heartbeat_message(
-            2, self.family.autopilot, base, self.mode, 4 if self.armed else 3, 3
-        )
-
-    def _odometry(self, usec: int) -> Any:
-        return dialect.MAVLink_odometry_message(
-            usec, 1, 12, *self.position, self.q, *self.velocity, *(0.0,) * 3, [0.0] * 21, [0.0] * 21
-        )
-
-
-_ids = {kind.msgname: number for number, kind in dialect.mavlink_map.items()}
-_EVERY = {
-    "ATTITUDE_QUATERNION": 1,
-    "LOCAL_POSITION_NED": 2,
-    "EXTENDED_SYS_STATE": 8,
-    "ATTITUDE_TARGET": 4,
-    "ODOMETRY": 4,
-    "HEARTBEAT": 20,
-    "SYS_STATUS": 20,
-    "BATTERY_STATUS": 40,
-    "ESTIMATOR_STATUS": 8,
-    "EKF_STATUS_REPORT": 8,
-    "HOME_POSITION": 40,
-    "GPS_RAW_INT": 20,
-    "GLOBAL_POSITION_INT": 20,
-}
-TELEMETRY = {name: (_ids[name], steps) for name, steps in _EVERY.items()}
-"""What it sends: number of the message, and every how many steps."""
-_ONLY = {"ODOMETRY": PX4, "ESTIMATOR_STATUS": PX4, "EKF_STATUS_REPORT": ARDUPILOT}
-
-
-def sends(family: Family, name: str) -> bool:
-    """Whether a family sends a message."""
-    return _ONLY.get(name, family) == family
+        return BUILDERS[name](self)

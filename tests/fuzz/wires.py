@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+_Receive = Callable[[bytes, int], Any]
+
 
 class Wire:
     """Opens as any transport does; `deliver` is what arrives on it.
@@ -15,9 +17,9 @@ class Wire:
 
     def __init__(self, take: Callable[[bytes], None] = lambda _: None) -> None:
         self._take = take
-        self._receive: Callable[[bytes, int], Any] | None = None
+        self._receive: _Receive | None = None
 
-    async def open(self, _endpoint: Any, receive: Callable[[bytes, int], Any], _lost: Any) -> "Wire":
+    async def open(self, _endpoint: Any, receive: _Receive, _lost: Any) -> "Wire":
         """Open it, as `companion.mavlink.opening.open_transport` does."""
         self._receive = receive
         return self
