@@ -9,7 +9,10 @@ import faulthandler
 import secrets
 import sys
 import tempfile
+import warnings
 from pathlib import Path
+
+from hypothesis.errors import HypothesisWarning
 
 from tests.fuzz.search import Search, save
 from tests.fuzz.targets import TARGETS
@@ -27,6 +30,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="folder for failures; default: a new one")
     options = parser.parse_args()
     faulthandler.enable()
+    warnings.filterwarnings("ignore", category=HypothesisWarning)  # of long cases
     seed = secrets.randbits(32) if options.seed is None else options.seed
     out = options.out or Path(tempfile.mkdtemp(prefix="fuzz-found-"))
     searches = [Search(TARGETS[name]) for name in options.target or TARGETS]

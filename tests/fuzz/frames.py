@@ -45,7 +45,7 @@ def _check(case: Case) -> None:
     streaming, signed = case["streaming"], case["signed"]
     chunks = _cut(b"".join(pieces), case["cuts"]) if streaming else pieces
     _scan(chunks, pieces, case)
-    virtual_time.run(_receive(chunks, streaming=streaming, signed=signed))
+    virtual_time.run(_receive(chunks, set(case["claims"]), streaming=streaming, signed=signed))
 
 
 def _cut(data: bytes, cuts: list[int]) -> list[bytes]:
@@ -90,7 +90,7 @@ def _intact(frame: Frame) -> None:
     assert frame.signed == bool(header.incompat_flags & 1)
 
 
-async def _receive(chunks: list[bytes], *, streaming: bool, signed: bool) -> None:
+async def _receive(chunks: list[bytes], claims: set[int], *, streaming: bool, signed: bool) -> None:
     """Let a whole link read it, with all that listens to it."""
     accepted: list[bytes] = []
     errors: list[Exception] = []
@@ -101,9 +101,9 @@ async def _receive(chunks: list[bytes], *, streaming: bool, signed: bool) -> Non
     link = Link(settings, lambda _, raw: accepted.append(raw), wire.open, lambda _: None)
     link.on_attitude, link.on_error = samples.append, errors.append
     async with link:
-        for chunk in chunks:
+        for number, chunk in enumerate(chunks):
             before = len(samples)
-            wire.deliver(chunk)
+            wire.deliver(chunk, who="another" if number in claims else None)
             assert len(samples) - before <= 1 + len(chunk) // 12
     for raw in accepted:
         _accepted(raw, signed=signed)
@@ -241,6 +241,7 @@ def _cases(draw: Any) -> Case:
         "whole": whole,
         "streaming": draw(st.booleans()),
         "signed": draw(st.booleans()),
+        "claims": draw(st.lists(st.integers(0, 11), max_size=2)),
         "cuts": draw(st.lists(st.integers(0, 2000), max_size=12)),
     }
 

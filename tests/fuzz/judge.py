@@ -13,8 +13,6 @@ _ASKS = {dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL}
 _AGE_SLACK = 0.06
 _CLOCK_SLACK = 0.012
 """A vehicle clock may run so much faster or slower, so ages are known no better."""
-_IN_THE_AIR = 0.3
-"""m."""
 
 
 class Judge:
@@ -115,9 +113,8 @@ class Judge:
         vehicle = self._vehicle
         lowest, highest = self._thrusts
         if thrust == 0.0 and not any(rates):
-            up = dialect.MAV_CMD_NAV_TAKEOFF in self.commands and vehicle.height > _IN_THE_AIR
-            if vehicle.armed and up:
-                self._fault(f"idle at {vehicle.height:.1f} m")
+            if vehicle.armed and dialect.MAV_CMD_NAV_TAKEOFF in self.commands:
+                self._fault("no thrust after the take-off was commanded")
         elif not lowest - 1e-6 <= thrust <= highest + 1e-6:
             self._fault(f"thrust {thrust}")
 

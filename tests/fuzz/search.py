@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis.errors import HypothesisException
 
 from tests.fuzz.target import Case, Target, case_text
@@ -67,6 +67,7 @@ class Search:
             phases=(Phase.generate, Phase.target, Phase.shrink),
             suppress_health_check=list(HealthCheck),
             report_multiple_bugs=False,
+            verbosity=Verbosity.quiet,
         )
         @given(self.target.cases)
         def search(case: Case) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-_Receive = Callable[[bytes, int], Any]
+from companion.mavlink.transport import Receiver
 
 
 class Wire:
@@ -17,17 +17,19 @@ class Wire:
 
     def __init__(self, take: Callable[[bytes], None] = lambda _: None) -> None:
         self._take = take
-        self._receive: _Receive | None = None
+        self._receiver: Receiver | None = None
 
-    async def open(self, _endpoint: Any, receive: _Receive, _lost: Any) -> "Wire":
+    async def open(self, _endpoint: Any, receiver: Receiver, _lost: Any) -> "Wire":
         """Open it, as `companion.mavlink.opening.open_transport` does."""
-        self._receive = receive
+        self._receiver = receiver
         return self
 
-    def deliver(self, data: bytes, received_ns: int = 0) -> Any:
-        """Let bytes arrive: one datagram, or a piece of a stream."""
-        assert self._receive is not None
-        return self._receive(data, received_ns)
+    def deliver(self, data: bytes, received_ns: int = 0, who: str | None = None) -> bool:
+        """Let bytes arrive, of the peer or of `who`: a datagram, or a piece of a stream."""
+        assert self._receiver is not None
+        if who is None:
+            return self._receiver.receive(data, received_ns)
+        return self._receiver.claim(data, received_ns, who)
 
     def send(self, frame: bytes) -> bool:
         """Take what the link sends."""
