@@ -67,8 +67,10 @@ def watchdog(seconds: float) -> Iterator[None]:
         HungError: it did, with the place where.
     """
 
-    def ring(_number: int, _frame: Any) -> None:
-        raise _Alarm
+    def ring(_number: int, frame: Any) -> None:
+        # What a callback of the garbage collector raises is lost; the next alarm is not.
+        if frame is None or frame.f_code.co_name != "gc_callback":
+            raise _Alarm
 
     clocks = {
         signal.SIGPROF: (signal.ITIMER_PROF, seconds),
@@ -77,8 +79,7 @@ def watchdog(seconds: float) -> Iterator[None]:
     before = {number: signal.signal(number, ring) for number in clocks}
     try:
         for timer, limit in clocks.values():
-            # Again and again: an alarm in a callback of the garbage collector would be lost.
-            signal.setitimer(timer, limit, 0.5)
+            signal.setitimer(timer, limit, 0.1)
         yield
     except _Alarm as alarm:
         raise HungError(f"took more than {seconds:g} s of processor time") from alarm
