@@ -20,6 +20,7 @@ _SHRINKING_S = 20.0
 """A failure is made smaller for this long."""
 _FOLDERS = re.compile(r"/tmp/fuzz-\w+/")
 """Which a case's files are put to, another one each time."""
+_NUMBERS = re.compile(r"-?(0x)?[0-9a-f.]*[0-9][0-9a-f.]*")
 
 
 class _Over(BaseException):
@@ -110,7 +111,7 @@ def kind_of(error: BaseException) -> str:
     frames = traceback.extract_tb(origin.__traceback__)
     ours = [frame for frame in frames if "companion/" in frame.filename] or frames
     places = {f"{Path(frame.filename).name}:{frame.lineno}" for frame in (ours[-1], frames[-1])}
-    words = _FOLDERS.sub("", str(error))[:60]
+    words = _NUMBERS.sub("#", _FOLDERS.sub("", str(error)))[:60]
     return f"{type(error).__name__} at {' and '.join(sorted(places))}: {words}"
 
 
