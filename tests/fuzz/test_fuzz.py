@@ -21,7 +21,7 @@ EXAMPLES = {
 AWAITED: dict[str, str] = {
     "configuration": "the bounded YAML reader",
     "recordings": "the bounded YAML reader",
-    "trajectories": "trajectories bounded in time and memory",
+    "trajectories": "the bounded YAML reader",
 }
 """Targets with cases that still fail, and what they wait for."""
 
