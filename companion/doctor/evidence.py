@@ -79,12 +79,14 @@ class SampleTimes(NamedTuple):
         longest_pause: Between two of them by our clock, s.
         not_newer: Stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
+        unusable: No unit quaternion, or with a number that is not finite.
     """
 
     heard: int = 0
     longest_pause: float = 0.0
     not_newer: int = 0
     clock_rate: float | None = None
+    unusable: int = 0
 
 
 class Company(NamedTuple):

@@ -1,10 +1,12 @@
 """An ear on the link for a while: when samples come, who else speaks, how the estimate jumps."""
 
 from collections.abc import Callable
+from math import isfinite
 from types import TracebackType
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from companion.attitude.representation import is_unit
 from companion.doctor.evidence import Company, SampleTimes
 from companion.mavlink.codec import Message
 from companion.mavlink.framing import Frame
@@ -38,6 +40,7 @@ class Ear:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._stamps: list[tuple[float, float]] = []
+        self._unusable = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
         self._steering: set[tuple[int, int]] = set()
@@ -69,13 +72,14 @@ class Ear:
         """The attitude samples so far."""
         pairs = list(zip(self._stamps, self._stamps[1:], strict=False))
         if not pairs:
-            return SampleTimes(len(self._stamps))
+            return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         known = len(self._stamps) >= _ENOUGH and last > first
         return SampleTimes(
             heard=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
+            unusable=self._unusable,
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
         )
 
@@ -102,6 +106,9 @@ class Ear:
 
     def _on_attitude(self, message: Message) -> None:
         self._stamps.append((self._clock(), message.time_boot_ms / 1000.0))
+        rates = message.rollspeed, message.pitchspeed, message.yawspeed
+        usable = is_unit((message.q1, message.q2, message.q3, message.q4))
+        self._unusable += not (usable and all(map(isfinite, rates)))
 
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate

@@ -15,6 +15,9 @@ _SETTLING = 1.0
 _REACHED = 0.5
 """Height below the wanted one at which a climb that has ended counts as done, m."""
 
+_PAST = 3.0
+"""Height above the wanted one at which a climb has gone wrong, m; PX4 overshoots by some tenths."""
+
 _ARRIVES = 2.0
 """So long a climb that has become a hold may still take to arrive, s; else somebody stopped it."""
 
@@ -67,6 +70,11 @@ class _Climb:
         if height is None or position is None:
             return False
         rig.detail = f"{self._height:g} m, now {height:.1f} m"
+        if height > self._height + _PAST:
+            raise FlightEnded(
+                f"the vehicle climbed to {height:.1f} m, and flight.takeoff_height_m is "
+                f"{self._height:g}"
+            )
         near = height > self._height - _REACHED
         if not near and self._stopped():
             raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.LET_GO)

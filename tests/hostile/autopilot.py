@@ -100,6 +100,7 @@ class HostileAutopilot(threading.Thread):
         try:
             vehicle.t, frames = 1.0, []
             self.mark("start")
+            self._act()
             while not self.wire.ending.is_set() and vehicle.t < LONGEST_S:
                 self._heard = self.wire.exchange(frames, round(1000.0 * vehicle.t))
                 self._handle()

@@ -2,13 +2,15 @@
 
 import socket
 from typing import NamedTuple
+from unittest.mock import patch
 
 import yaml
 
 from companion.config import Config
 from companion.flight.observer import Silent
 from companion.flight.session import Session
-from companion.mavlink import lockstep
+from companion.mavlink import link, lockstep
+from companion.mavlink.vehicle_clock import VehicleClock
 from companion.yaml_file import parse
 from tests.flight.fly import decline, merged
 from tests.hostile.autopilot import HostileAutopilot
@@ -61,13 +63,15 @@ def fly(kind, script, folder, *, mode=None, prepare=None, **changes):
     autopilot = HostileAutopilot(kind, port, script, mode)
     if prepare is not None:
         prepare(autopilot)
-    link = {"link": {"endpoint": f"udpin://127.0.0.1:{port}"}}
-    text = yaml.safe_dump(merged(merged(CONFIG, link), changes))
+    endpoint = {"link": {"endpoint": f"udpin://127.0.0.1:{port}"}}
+    text = yaml.safe_dump(merged(merged(CONFIG, endpoint), changes))
     config = parse(text, "test", Config)
     session = Session(config, folder, Silent(), decline)
     autopilot.start()
     try:
-        summary = lockstep.run(session.fly())
+        # The steps only pace the flight: a hostile vehicle's clock is not taken for ours.
+        with patch.object(link, "VehicleClock", lambda **_: VehicleClock()):
+            summary = lockstep.run(session.fly())
     finally:
         autopilot.end()
     events = "; ".join(text for _, text in summary.events)

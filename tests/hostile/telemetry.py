@@ -30,7 +30,7 @@ class Telemetry:
         self.clock = lambda t: t
         self.battery, self.fix_type, self.flags = 0.8, 3, vehicle.kind.estimator[1]
         self.samples, self.told = [], []
-        self._due, self._measured = {}, {}
+        self._due, self._latest = {}, []
         self._dialect = vehicle.kind.dialect
         self._encoder = self._dialect.MAVLink(None, srcSystem=1, srcComponent=1)
         self._makers = {
@@ -109,9 +109,10 @@ class Telemetry:
         t, told = self._vehicle.t, self._told(name, fields)
         if name == "ATTITUDE_QUATERNION":
             for each in told:
-                stamp = each["time_boot_ms"]
-                at = self._measured[stamp] = self._measured.get(stamp, measured)
-                self.samples.append((t, stamp, at))
+                again = [at for sample, at in self._latest if sample is each]
+                at = again[0] if again else measured
+                self._latest = [*self._latest[-3:], (each, at)]
+                self.samples.append((t, each["time_boot_ms"], at))
         if name in ("HEARTBEAT", "CURRENT_MODE") and told:
             self.told.append((t, self._vehicle.mode, self._vehicle.armed))
         return self.pack(name, *told)

@@ -69,7 +69,7 @@ TAKE_OFFS = (
     Scenario(
         "the vehicle climbs past the height by 6 m",
         (("start", 0.0, sets(climbs_to=8.0)),),
-        (failed, on_the_ground),
+        (never_took_over, on_the_ground),
     ),
     Scenario(
         "the vehicle climbs on and on",

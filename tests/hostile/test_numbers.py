@@ -110,6 +110,11 @@ HOMES = (
         (("start", 0.0, says("HOME_POSITION", **NOWHERE)),),
         (on_the_ground,),
     ),
+    Scenario(
+        "quaternions of length 0 from the start",
+        (("start", 0.0, turned(lambda _: 0.0)),),
+        (never_armed,),
+    ),
     *(
         Scenario(
             f"{message} is NaN from the start",
