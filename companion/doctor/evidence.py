@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from companion.guidance import Programme
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
@@ -108,6 +109,7 @@ class Evidence:
         resets: How often the estimator jumped meanwhile.
         identity: `None` where it was not asked for.
         words: What the autopilot said meanwhile that is a warning or worse.
+        programme: What is to be flown; `None` where nothing is.
     """
 
     family: AutopilotFamily
@@ -122,6 +124,7 @@ class Evidence:
     resets: int
     identity: Identity | None = None
     words: tuple[str, ...] = ()
+    programme: Programme | None = None
 
     @property
     def awaits_position(self) -> bool:

@@ -1,11 +1,14 @@
 """What is done on the ground, one coroutine a phase, and how arming is undone."""
 
+from dataclasses import replace
+
 from companion.doctor import vehicle_checks
 from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import order
+from companion.flight.programmes import unbegun
 from companion.flight.rig import Rig
 from companion.flight.roles import in_role, in_roles, require_role
 from companion.mavlink.parameter_rules import Values, Verdict
@@ -35,6 +38,7 @@ async def checks(rig: Rig) -> None:
     # Counted only now: a position is not sent before the estimator has one.
     rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
     evidence = await gather(link, granted, _COUNTED_FOR)
+    evidence = replace(evidence, programme=unbegun(rig.programme))
     heartbeats = evidence.streams["HEARTBEAT"].achieved
     if heartbeats > 0.0:
         rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)

@@ -1,5 +1,6 @@
 """The programmes that the configuration asks for, checked before anything flies."""
 
+from dataclasses import replace
 from math import radians
 
 from companion import trajectory_file
@@ -28,6 +29,16 @@ def programme(config: Config) -> Sequence:
         ConfigError: the trajectory cannot be read, or cannot be flown within the limits.
     """
     return Sequence([_part(config, name) for name in config.flight.programme])
+
+
+def unbegun(sequence: Sequence) -> Sequence:
+    """The same, as if nobody had asked it for a reference yet: `Follow` keeps where it began."""
+    return Sequence(
+        [
+            replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
+            for part in sequence.parts
+        ]
+    )
 
 
 def _part(config: Config, name: str) -> Programme:

@@ -74,9 +74,14 @@ def bit_clear(verdict: Verdict, bit: int, because: str) -> Check:
     return check
 
 
+def shortest_hold(silence_limit: float) -> float:
+    """How long the autopilot must hold the last rates at least, s, so that we give up first."""
+    return 1.5 * silence_limit
+
+
 def rates_held(value: float, _: Values, setup: Setup) -> Complaint | None:
     """How long the autopilot holds the last rates: not for long, but longer than we take."""
-    right = max(1.0, 1.5 * setup.silence_limit)
+    right = shortest_hold(setup.silence_limit)
     if value <= setup.silence_limit:
         return Complaint(
             UNSAFE,
