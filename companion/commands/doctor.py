@@ -14,7 +14,7 @@ from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config import Config
 from companion.config_file import changed, load
 from companion.doctor.consultation import Patient, patient
-from companion.doctor.evidence import Evidence, Identity
+from companion.doctor.evidence import Evidence
 from companion.doctor.examination import examine
 from companion.doctor.finding import Finding, Key
 from companion.doctor.gathering import identify
@@ -136,7 +136,7 @@ class _Visit:
             self.say("No parameter is to be set.")
             return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
         require_disarmed(link)
-        undo = UndoFile(config.recording.directory, link, evidence.identity or Identity())
+        undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
             await mend(link, proposed, _agree if unasked else self._ask, undo, self._note)
         finally:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from companion.guidance import Programme
@@ -15,6 +16,17 @@ _ABOUT_POSITION = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
 )
 """Autopilots send none of these before their estimator has a position."""
+
+
+class Stage(Enum):
+    """What the vehicle is about to do; the value is said of it."""
+
+    GROUND = "to be armed"
+    """It stands disarmed."""
+    ARMED = "to take off"
+    """It stands armed."""
+    AIRBORNE = "to be taken over"
+    """It holds in the air, flown by its autopilot."""
 
 
 class Identity(NamedTuple):
@@ -107,7 +119,8 @@ class Evidence:
         samples: The attitude samples' times.
         company: Who else is there.
         resets: How often the estimator jumped meanwhile.
-        identity: `None` where it was not asked for.
+        identity: What the autopilot is.
+        stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
         programme: What is to be flown; `None` where nothing is.
     """
@@ -122,7 +135,8 @@ class Evidence:
     samples: SampleTimes
     company: Company
     resets: int
-    identity: Identity | None = None
+    identity: Identity
+    stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
     programme: Programme | None = None
 

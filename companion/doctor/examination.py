@@ -15,8 +15,11 @@ Check = Callable[[Config, Evidence], Iterator[Finding]]
 CHECKS: tuple[Check, ...] = (
     link_checks.signing,
     vehicle_checks.version,
+    vehicle_checks.motors,
     vehicle_checks.power,
     vehicle_checks.readiness,
+    vehicle_checks.gps,
+    vehicle_checks.ground,
     vehicle_checks.estimator,
     vehicle_checks.fence,
     link_checks.company,

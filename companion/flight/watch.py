@@ -35,6 +35,7 @@ class Watch:
         """
         now = self._clock()
         self._rig.lookout.listen(now)
+        self._rig.ground.look()
         if phase.modes:
             require_role(self._rig.link, phase.modes)
         if phase.monitored and self._rig.loop.guarded:

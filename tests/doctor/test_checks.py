@@ -40,6 +40,10 @@ def state(**changes):
         "global_position": GlobalPosition(0.0, 47.0, 8.0),
         "readiness": READY,
         "estimator": SimpleNamespace(flags=0x3FF),
+        "gps_fault": None,
+        "landed": True,
+        "flying": False,
+        "height": 0.1,
     }
     return SimpleNamespace(**told | changes)
 
