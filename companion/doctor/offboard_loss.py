@@ -18,7 +18,7 @@ from companion.guidance.offboard_loss import (
     tilted_thrust,
 )
 from companion.guidance.reference import Vector
-from companion.mavlink.parameter_checks import shortest_hold
+from companion.mavlink.parameter_checks import LONGEST_HELD, shortest_hold
 from companion.mavlink.parameter_rules import Verdict
 
 _PERIOD = 0.05
@@ -27,8 +27,6 @@ _MOST = 1500
 """but at most this many times."""
 _AHEAD = 0.02
 """The rate of change of the thrust is taken over this, s."""
-_LONGEST_JUDGED = 10.0
-"""The rates being held for longer than this, s, is unsafe whatever is flown."""
 _START = Pose((0.0, 0.0, 0.0), 0.0)
 
 
@@ -52,8 +50,8 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints end at the worst moment of the flight."""
     dead_man, programme = evidence.family.dead_man, evidence.programme
     held = evidence.survey.values.get(dead_man.parameter)
-    if programme is None or held is None or not 0.0 <= held <= _LONGEST_JUDGED:
-        return  # an unknown or longer time is a finding of its own
+    if programme is None or held is None or not 0.0 <= held <= LONGEST_HELD:
+        return  # an unknown or longer time is unsafe, whatever is flown
     worst = worst_reach(config, programme, held, brakes=dead_man.brakes)
     carried = (
         f"should our setpoints end, the last rates are held for {held:g} s "
