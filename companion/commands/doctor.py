@@ -23,7 +23,7 @@ from companion.doctor.report import as_dict, outcome_as_dict, outcome_line, tabl
 from companion.doctor.undo import Undo, UndoFile
 from companion.flight.assembly import open_link
 from companion.flight.programmes import programme
-from companion.guidance import Programme
+from companion.guidance import Sequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
@@ -70,7 +70,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
-def _flown(config: Config) -> tuple[Programme | None, list[Finding]]:
+def _flown(config: Config) -> tuple[Sequence | None, list[Finding]]:
     """What is to be flown, or why it cannot be."""
     try:
         return programme(config), []

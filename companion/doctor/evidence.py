@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from companion.guidance import Programme
+from companion.guidance import Sequence
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
@@ -138,7 +138,7 @@ class Evidence:
     identity: Identity
     stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
-    programme: Programme | None = None
+    programme: Sequence | None = None
 
     @property
     def awaits_position(self) -> bool:

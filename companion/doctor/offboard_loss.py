@@ -7,7 +7,7 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
-from companion.guidance import Pose, Programme, Reference
+from companion.guidance import Pose, Reference, Sequence
 from companion.guidance.fence import Fence
 from companion.guidance.offboard_loss import (
     Flown,
@@ -75,7 +75,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def worst_reach(config: Config, programme: Programme, held: float, *, brakes: bool) -> Worst:
+def worst_reach(config: Config, programme: Sequence, held: float, *, brakes: bool) -> Worst:
     """The largest reach over the maneuvers; `held` and `brakes` as of `Loss`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
@@ -120,11 +120,11 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
     ):
         breach = fence.breach(place, level, None)
         if breach is not None:
-            return breach
+            return str(breach)
     return None
 
 
-def _flown(config: Config, programme: Programme, drag: float) -> Iterator[tuple[float, Flown]]:
+def _flown(config: Config, programme: Sequence, drag: float) -> Iterator[tuple[float, Flown]]:
     """What is flown over the maneuvers; open-loop steps are answered as the attitude law does."""
     gain = config.planner.gain_per_s
     period = max(_PERIOD, programme.duration / _MOST)

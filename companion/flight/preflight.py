@@ -12,7 +12,7 @@ from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import FlightEnded
 from companion.flight.same_vehicle import SameVehicle
-from companion.guidance import Programme
+from companion.guidance import Sequence
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.streams import StreamRate
@@ -42,7 +42,7 @@ class Preflight:
     """
 
     def __init__(
-        self, config: Config, link: Link, same_vehicle: SameVehicle, programme: Programme
+        self, config: Config, link: Link, same_vehicle: SameVehicle, programme: Sequence
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle

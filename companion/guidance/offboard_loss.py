@@ -138,7 +138,7 @@ def _hold(flown: Flown, loss: Loss) -> _Held:
 def _stop(speed: float, tilt: float, size: float, loss: Loss) -> float:
     """How far it goes on horizontally after the rates were held, m."""
     if loss.brakes:
-        return loss.fence.stop(speed)
+        return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
     levelled = _level_time(tilt)
     speed += size * sin(min(tilt, 0.5 * pi)) * levelled
     return speed * levelled + speed / max(loss.drag, _LEAST_DRAG)

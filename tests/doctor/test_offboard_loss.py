@@ -15,6 +15,10 @@ from tests.doctor.test_checks import ARDUPILOT, GOOD
 from tests.flight.fly import CONFIGS
 
 INEFFECTIVE, SAFE = Verdict.INEFFECTIVE, Verdict.SAFE
+WIDE = {
+    "limits": {"fence_radius_m": 200.0, "fence_ceiling_m": 100.0, "fence_floor_m": 0.1},
+    "safety": {"fence_polygon_m": ()},
+}
 NARROW = {"limits": {"fence_radius_m": 30.0}}
 CIRCLE = {
     "flight": {"programme": ("circle",), "takeoff_height_m": 10.0},
@@ -26,8 +30,9 @@ CIRCLE = {
 
 def judged(config, held=1.0, family=GOOD.family):
     name = family.dead_man.parameter
+    flown = programme(changed(config, WIDE, "test"))  # which refuses what comes near by itself
     evidence = replace(
-        GOOD, family=family, survey=Survey({name: held}, {name: name}), programme=programme(config)
+        GOOD, family=family, survey=Survey({name: held}, {name: name}), programme=flown
     )
     (finding,) = offboard_loss(config, evidence)
     assert finding.key == Key.OFFBOARD_LOSS
