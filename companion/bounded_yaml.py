@@ -101,6 +101,10 @@ def dump(data: dict[str, Any]) -> str:
 class _Dumper(yaml.SafeDumper):
     """Puts into quotes what is a number to YAML 1.1 or 1.2, but was a text: 12e5, 0o17."""
 
+    def ignore_aliases(self, data: Any) -> bool:
+        """`parse` reads none."""
+        return True
+
 
 for _pattern, _tag in ((_INTEGER, "int"), (_FLOAT, "float")):
     _Dumper.add_implicit_resolver(

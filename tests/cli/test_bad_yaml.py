@@ -175,7 +175,8 @@ def test_a_truth_is_true_or_false_and_nothing_else(word):
     ["12e45", "0000000000012e45", "0o17", "1e3", "010", "yes", "1:30", "~", "2024-01-01", ""],
 )
 def test_what_is_written_is_read_as_it_was_by_either_version_of_yaml(text):
-    data = {"uid": text, "numbers": [1e-5, 1e300, 3, -0.0], "truth": True, "none": None}
+    numbers = [1e-5, 1e300, 3, -0.0]
+    data = {"uid": text, "one": numbers, "the same": numbers, "truth": True, "none": None}
     assert bounded_yaml.parse(bounded_yaml.dump(data)) == data
     assert yaml.safe_load(bounded_yaml.dump(data)) == data
 
