@@ -10,6 +10,8 @@ from companion.flight.roles import in_role, in_roles, require_role
 from companion.mavlink.parameter_rules import Values, Verdict
 from companion.mavlink.roles import Role
 
+SLOWEST_HEARTBEAT = 3.0
+"""Longest pause between two heartbeats until it is known how often they come, s."""
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
 
@@ -22,6 +24,7 @@ async def connect(rig: Rig) -> None:
 
 async def checks(rig: Rig) -> None:
     """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
+    rig.same_vehicle.begin()
     rig.detail = "asking for telemetry"
     await rig.preflight.ask_for_telemetry()
     await rig.until(lambda: _ready(rig))
@@ -30,7 +33,8 @@ async def checks(rig: Rig) -> None:
     evidence = await rig.preflight.require(Stage.GROUND)
     heartbeats = evidence.streams["HEARTBEAT"].achieved
     if heartbeats > 0.0:
-        rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
+        limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
+        rig.same_vehicle.heartbeat_limit = limit
     _tell_dead_man(rig, evidence.survey.values)
     rig.mode_at_checks = rig.link.state.mode
 
@@ -92,6 +96,7 @@ async def _arm(rig: Rig) -> None:
         require_role(rig.link, {Role.READY})
 
     rig.arm_sent = True
+    rig.same_vehicle.commit()
     await order(rig, command, ready, armed)
     await rig.until(armed, "the vehicle to be armed")
 

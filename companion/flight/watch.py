@@ -36,6 +36,7 @@ class Watch:
         now = self._clock()
         self._rig.lookout.listen(now)
         self._rig.ground.look()
+        self._rig.same_vehicle.require()
         if phase.modes:
             require_role(self._rig.link, phase.modes)
         if phase.monitored and self._rig.loop.guarded:
@@ -49,6 +50,7 @@ class Watch:
         Raises:
             FlightEnded: as `judge`.
         """
+        self._rig.same_vehicle.note_heartbeat()
         self.judge(phase)
         if self._rig.loop.held_back and Role.OFFBOARD in roles_of(self._rig.link):
             self._rig.loop.resume()
@@ -71,8 +73,8 @@ class Watch:
         raise FlightEnded(verdict.reason, EXITS[verdict.action])
 
     def _judge_heartbeat(self) -> None:
-        heartbeat = self._rig.link.state.heartbeat
-        if heartbeat is None or self._clock() - heartbeat.received > self._rig.heartbeat_limit:
+        heartbeat, limit = self._rig.link.state.heartbeat, self._rig.same_vehicle.heartbeat_limit
+        if heartbeat is None or self._clock() - heartbeat.received > limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
             )

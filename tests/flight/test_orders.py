@@ -42,6 +42,7 @@ class Vehicle:
         self.mode, self.failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.family = self.state = self
         self.now = 0.0
+        self.same_vehicle = SimpleNamespace(require=lambda: None)
 
     @property
     def heartbeat(self):
