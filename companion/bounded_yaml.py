@@ -5,10 +5,7 @@ and so are yes, no, on and off. Tags and aliases are refused: no file of ours ne
 lines of aliases stand for gigabytes.
 """
 
-import os
 import re
-import stat
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -50,26 +47,6 @@ class YamlError(Exception):
     def __init__(self, problem: str, line: int | None = None) -> None:
         super().__init__(problem)
         self.line = line
-
-
-def read_text(path: Path) -> str:
-    """The text of a regular file.
-
-    Raises:
-        OSError: it cannot be opened.
-        YamlError: it is no regular file, too large, or not UTF-8.
-    """
-    # Not blocking: opening a pipe that nobody writes to would wait for ever.
-    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise YamlError("not a regular file")
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise YamlError(f"larger than {MOST_BYTES // 1000} kB")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise YamlError("not a text file in UTF-8") from error
 
 
 def parse(text: str) -> Any:

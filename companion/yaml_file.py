@@ -8,7 +8,8 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from companion import bounded_yaml
-from companion.bounded_yaml import YamlError
+from companion.bounded_file import FileRefusedError, read_text
+from companion.bounded_yaml import MOST_BYTES, YamlError
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -83,13 +84,9 @@ def read(path: Path, model: type[BaseModel]) -> dict[str, Any]:
         ConfigError: it is not YAML, or holds no keys.
     """
     try:
-        text = bounded_yaml.read_text(path)
-    except OSError as error:
-        raise UnreadableFileError(
-            f"{path}: cannot read the configuration: {error.strerror}"
-        ) from error
-    except YamlError as error:
-        raise UnreadableFileError(f"{path}: cannot read the configuration: {error}") from error
+        text = read_text(path, MOST_BYTES)
+    except FileRefusedError as error:
+        raise UnreadableFileError(f"{path}: {error}") from error
     return _keys(text, str(path), model)
 
 

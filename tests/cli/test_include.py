@@ -96,7 +96,7 @@ def test_faults_of_several_files_are_told_each_of_its_own(files):
 
 def test_a_missing_included_file_is_named_with_the_file_that_includes_it(files):
     main_file = files(main="include: a.yaml\n", a="include: b.yaml\n")
-    words = r"b\.yaml: cannot read the configuration: No such file.*\(included by .*a\.yaml\)"
+    words = r"b\.yaml: cannot read it: No such file.*\(included by .*a\.yaml\)"
     with pytest.raises(ConfigError, match=words):
         load(main_file)
 
