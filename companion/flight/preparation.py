@@ -5,6 +5,7 @@ from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
+from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import order
 from companion.flight.rig import Rig
 from companion.flight.roles import in_role, in_roles, require_role
@@ -31,13 +32,17 @@ async def checks(rig: Rig) -> None:
     for message, rate in granted.items():
         if rate.granted < rate.asked:
             rig.note(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
+    await leave_offboard(rig)
     await rig.until(lambda: _ready(rig))
     # Counted only now: a position is not sent before the estimator has one.
     rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
     evidence = await gather(link, granted, _COUNTED_FOR)
-    heartbeats = evidence.streams["HEARTBEAT"].achieved
-    if heartbeats > 0.0:
-        rig.heartbeat_limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
+    # PX4's is not asked for: its rate is fixed.
+    heartbeats = evidence.streams.get("HEARTBEAT")
+    if heartbeats is not None and heartbeats.achieved > 0.0:
+        rig.heartbeat_limit = max(
+            _SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved
+        )
     _heed(rig, examine(config, evidence))
     _tell_dead_man(rig, evidence.survey.values)
     rig.mode_at_checks = link.state.mode

@@ -35,7 +35,7 @@ class Rig:
         detail: what the running phase waits for just now, for the user.
         rate_hz: setpoints a second while the programme was flown.
         heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
-            from the rate at which heartbeats really come.
+            from the rate at which heartbeats really come, where a rate was asked for.
         mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
         note: writes down and shows that something happened.

@@ -35,6 +35,18 @@ class Heartbeat(NamedTuple):
     system_status: int
 
 
+class CurrentMode(NamedTuple):
+    """CURRENT_MODE of the autopilot.
+
+    Attributes:
+        received: Event-loop time, s.
+        mode: The mode's name in the words of its family.
+    """
+
+    received: float
+    mode: str
+
+
 class LocalPosition(NamedTuple):
     """LOCAL_POSITION_NED.
 

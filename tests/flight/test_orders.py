@@ -3,7 +3,6 @@
 import ast
 import asyncio
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -44,8 +43,8 @@ class Vehicle:
         self.now = 0.0
 
     @property
-    def heartbeat(self):
-        return SimpleNamespace(received=asyncio.get_running_loop().time(), mode=self.mode.value)
+    def mode_received(self):
+        return asyncio.get_running_loop().time()
 
     def roles(self, mode):
         return frozenset({mode})
@@ -111,5 +110,5 @@ def test_it_is_given_four_times_at_most():
 
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
     monkeypatch.setattr("companion.flight.orders._ENTERED", 0.01)
-    with pytest.raises(FlightEnded, match="left again, not by us: hold"):
+    with pytest.raises(FlightEnded, match="left again, not by us: Role.HOLD"):
         run(Vehicle((None, Role.HOLD)), enter)
