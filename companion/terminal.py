@@ -120,7 +120,8 @@ class TerminalObserver:
         self._stop_status()
         self._console.print(f"[bold]{name:<10}[/] waiting for {waits_for}", highlight=False)
         if self._console.is_terminal:
-            self._status = self._console.status(name)
+            spinner = "line" if self._console.options.ascii_only else "dots"
+            self._status = self._console.status(name, spinner=spinner)
             self._status.start()
 
     def _show_status(self, text: str) -> None:

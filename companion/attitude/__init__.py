@@ -5,7 +5,12 @@ UAV First-Order Acceleration Coefficients Tracking*, Sensors 2026, 26(9), 2727; 
 this package are that paper's.
 """
 
-from companion.attitude.errors import AttitudeError, InvalidQuaternionError, InvalidTargetError
+from companion.attitude.errors import (
+    AttitudeError,
+    InvalidBodyRatesError,
+    InvalidQuaternionError,
+    InvalidTargetError,
+)
 from companion.attitude.limits import Limits
 from companion.attitude.planner import LAW_NAMES, PLANNER_NAMES, Planner, make_planner
 from companion.attitude.representation import (
@@ -24,6 +29,7 @@ __all__ = [
     "AttitudeError",
     "BodyRates",
     "Coefficients",
+    "InvalidBodyRatesError",
     "InvalidQuaternionError",
     "InvalidTargetError",
     "Limits",

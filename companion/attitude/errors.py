@@ -10,4 +10,8 @@ class InvalidQuaternionError(AttitudeError):
 
 
 class InvalidTargetError(AttitudeError):
-    """A target with a value that is not finite."""
+    """A target that is not numbers, or with a value that is not finite or far too large."""
+
+
+class InvalidBodyRatesError(AttitudeError):
+    """Body rates that are not three numbers."""

@@ -5,7 +5,7 @@ so that it costs a flight well under a microsecond and is compiled for batches u
 them need a², a·x and a·y only, and so neither a root nor a division.
 """
 
-from math import atan, sqrt
+from math import acos, atan, sqrt
 
 
 def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -28,6 +28,11 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
 def cos_tilt(x: float, y: float) -> float:
     """Cosine of the tilt; `x`, `y` of the split or of the whole quaternion alike (equation 10)."""
     return 1.0 - 2.0 * (x * x + y * y)
+
+
+def tilt_angle(x: float, y: float) -> float:
+    """The tilt in rad; of a norm a little above 1 too, where the cosine would be below −1."""
+    return acos(max(-1.0, min(1.0, cos_tilt(x, y))))
 
 
 def speed_to_rates(

@@ -4,6 +4,7 @@ from dataclasses import replace
 from math import cos, sin, sqrt
 
 from companion.attitude.constants import Constants
+from companion.attitude.errors import InvalidBodyRatesError
 from companion.attitude.first_order import first_order
 from companion.attitude.heading_model import HeadingModel
 from companion.attitude.history import History, Planned
@@ -74,17 +75,28 @@ class ModelFollowingPlanner:
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Plan anew from here: after a gap, a change of mode, or a jump of the estimate.
 
+        Past the recovery angle there is nothing to plan: the plan begins when the tilt is below it.
+
         Args:
             q: attitude.
             body_rates: rad/s; the plan goes on with them. None, or what no vehicle does: at rest.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
+            InvalidBodyRatesError: `body_rates` are not three numbers.
         """
-        w, x, y, z = normalised(q)
+        w, x, y, z = q = normalised(q)
+        square, _, _ = tilt_products(w, x, y, z)
+        believed = _believable(body_rates)
+        self._started = 2.0 * square - 1.0 >= self._constants.cos_recovery
+        if self._started:
+            self._start(q, believed)
+
+    def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
+        """Begin the plan at `q`, a unit quaternion below the recovery angle."""
+        w, x, y, z = q
         square, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
-        body_rates = _believable(body_rates)
         if body_rates is not None:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
@@ -101,7 +113,6 @@ class ModelFollowingPlanner:
         here = Planned(model.north, model.east, heading, 0.0, 0.0, yaw_rate)
         motion = Planned(north, east, turn_rate, yaw_rate - turn_rate, yaw_rate, 0.0)
         self._past.start(0.0, here, motion)
-        self._started = True
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -111,18 +122,20 @@ class ModelFollowingPlanner:
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: a value of `target` is not finite.
+            InvalidBodyRatesError: `body_rates` are not three numbers.
         """
         constants = self._constants
         w, x, y, z = q = normalised(q)
         target = admissible(target, constants.longest_target)
         square, ax, ay = tilt_products(w, x, y, z)
         cosine = 2.0 * square - 1.0
+        believed = _believable(body_rates)
         if cosine < constants.cos_recovery:
             self._started = False
             return BodyRates(*first_order(q, target, dt, constants))
-        body_rates = _believable(body_rates)
         if not self._started:
-            self.reset(q, body_rates)
+            self._start(q, believed)
+            self._started = True
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         by_tilt = self._past.at(self._time - self._tilt.dead_time)
@@ -131,8 +144,8 @@ class ModelFollowingPlanner:
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
-        if body_rates is not None:  # what turns beyond what was foreseen does so until this acts
-            unforeseen = body_rates.yaw - by_yaw.turning
+        if believed is not None:  # what turns beyond what was foreseen does so until this acts
+            unforeseen = believed.yaw - by_yaw.turning
             heading += (self._tilt.dead_time + self._tilt.lag) * unforeseen
         heading += by_tilt.still - by_yaw.turned
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
@@ -226,10 +239,20 @@ class ModelFollowingPlanner:
 
 
 def _believable(body_rates: BodyRates | None) -> BodyRates | None:
-    """None for rates that no vehicle has or that are no numbers: the plan must not take them in."""
-    if body_rates is None or not all(abs(rate) < _FASTEST for rate in body_rates):
+    """None for rates that no vehicle has or that are NaN: the plan must not take them in.
+
+    Raises:
+        InvalidBodyRatesError: these are not three numbers.
+    """
+    if body_rates is None:
         return None
-    return body_rates
+    try:
+        roll, pitch, yaw = body_rates
+        if abs(roll) < _FASTEST and abs(pitch) < _FASTEST and abs(yaw) < _FASTEST:
+            return BodyRates(roll, pitch, yaw)
+    except (TypeError, ValueError) as error:
+        raise InvalidBodyRatesError(f"body rates are three numbers: {error}") from error
+    return None
 
 
 def _no_quicker(axis: AxisResponse) -> AxisResponse:

@@ -24,10 +24,14 @@ def normalised(q: Quaternion) -> Quaternion:
     """Return `q` with unit norm.
 
     Raises:
-        InvalidQuaternionError: the norm is off by more than 1e-3, or a component is not finite.
+        InvalidQuaternionError: these are not four numbers, the norm is off by more than 1e-3, or a
+            component is not finite.
     """
-    w, x, y, z = q
-    norm = sqrt(w * w + x * x + y * y + z * z)
+    try:
+        w, x, y, z = q
+        norm = sqrt(w * w + x * x + y * y + z * z)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidQuaternionError(f"an attitude quaternion is four numbers: {error}") from error
     if not abs(norm - 1.0) <= NORM_TOLERANCE:  # written so that NaN is refused too
         raise InvalidQuaternionError(
             f"attitude quaternion {q} has norm {norm:.6g}; expected 1 within {NORM_TOLERANCE:g}"

@@ -1,7 +1,7 @@
 """Arrays made fit for a law, as a planner makes one sample fit; the rules are the planner's own."""
 
 from functools import cache
-from math import inf, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from companion.attitude.errors import InvalidQuaternionError, InvalidTargetError
 from companion.attitude.representation import NORM_TOLERANCE, normalised
-from companion.attitude.target import admissible
+from companion.attitude.target import LARGEST_HEADING_RATE, admissible
 from companion.attitude.types import Target
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
@@ -49,7 +49,7 @@ def all_fit(q: Array, targets: Array, longest: float) -> bool:
             (abs(norm_square - 1.0) <= _AS_GOOD_AS_ONE)
             & (length_square <= longest * longest)
             & (abs(targets[2, i]) < pi)
-            & (abs(targets[3, i]) < inf)
+            & (abs(targets[3, i]) <= LARGEST_HEADING_RATE)
         )
         unfit += 0 if fit else 1
     return unfit == 0
@@ -82,7 +82,7 @@ def admissible_targets(targets: Array, longest: float) -> Array:
     north, east, heading, heading_rate = targets
     with np.errstate(over="ignore", invalid="ignore"):  # then it is not fit, and refused by name
         fit = north * north + east * east <= longest * longest
-    fit &= (heading > -pi) & (heading <= pi) & np.isfinite(heading_rate)
+    fit &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
     admitted = targets.copy()
     for i in np.flatnonzero(~fit):
         try:

@@ -1,1 +1,1 @@
-"""The commands, one file each; `companion.cli` reads the command line for them."""
+"""The commands, one file each; `companion.command_line` reads the command line for them."""

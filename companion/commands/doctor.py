@@ -14,7 +14,7 @@ from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config import Config
 from companion.config_file import changed, load
 from companion.doctor.consultation import Patient, patient
-from companion.doctor.evidence import Evidence, Identity
+from companion.doctor.evidence import Evidence
 from companion.doctor.examination import examine
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import identify
@@ -24,6 +24,7 @@ from companion.doctor.undo import Undo, UndoFile
 from companion.flight.assembly import open_link
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_survey import survey
@@ -55,7 +56,7 @@ def doctor(options: argparse.Namespace) -> int:
         visit.say("Interrupted; every parameter that was set is told above.")
         return EXIT_FLIGHT
     if options.json:
-        print(json.dumps(visit.result, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(visit.result, allow_nan=False))
     return code
 
 
@@ -82,7 +83,10 @@ class _Visit:
             findings = await vehicle.met()
             if findings:
                 return self._told(findings)
-            evidence = await vehicle.evidence(wait)
+            try:
+                evidence = await vehicle.evidence(wait)
+            except (LinkTimeout, LinkLost) as error:
+                return self._told(vehicle.silent(error))
             findings = examine(config, evidence)
             code = self._told(findings)
             if fix:
@@ -117,7 +121,7 @@ class _Visit:
             self.say("No parameter is to be set.")
             return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
         require_disarmed(link)
-        undo = UndoFile(config.recording.directory, link, evidence.identity or Identity())
+        undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
             await mend(link, proposed, _agree if unasked else self._ask, undo, self._note)
         finally:

@@ -165,4 +165,4 @@ def _in_ms(seconds: float) -> float | None:
 
 def _tell(options: argparse.Namespace, result: dict[str, Any]) -> None:
     if options.json:
-        print(json.dumps(result, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(result, allow_nan=False))

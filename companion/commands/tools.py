@@ -55,7 +55,7 @@ def study(options: argparse.Namespace) -> int:
         return EXIT_FLIGHT
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:
-        print(json.dumps(rows, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(rows, allow_nan=False))
     return EXIT_OK
 
 

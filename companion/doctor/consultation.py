@@ -5,11 +5,12 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 
 from companion.config import Config
+from companion.doctor import vehicle_checks
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
 from companion.doctor.gathering import gather, wanted_rates
 from companion.doctor.link_checks import signing_findings
-from companion.mavlink.errors import LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.errors import LinkError, LinkTimeout, UnsupportedAutopilot
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import Verdict
@@ -37,18 +38,35 @@ class Patient:
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:
-            silence = _stranger(Key.HEARTBEAT, str(error))
-            return [silence, *signing_findings(self._notices)]
+            return self.silent(error)
         except UnsupportedAutopilot as error:
-            return [_stranger(Key.SUPPORTED, str(error))]
+            return [_met(Key.SUPPORTED, Verdict.UNSAFE, str(error))]
         return []
+
+    def silent(self, error: LinkError) -> list[Finding]:
+        """What is found where nobody answers any more: the likely cause first."""
+        hints = signing_findings(self._notices, Verdict.NOT_CONNECTED)
+        state = self.link.state
+        if state.heartbeat is None:
+            return [*hints, _met(Key.HEARTBEAT, Verdict.NOT_CONNECTED, str(error))]
+        unanswered = Finding(
+            Key.ANSWERS,
+            Verdict.NOT_CONNECTED,
+            f"the vehicle is heard and does not answer: {error}",
+            "what it would do with our setpoints is not known",
+            "see whether what we send reaches it: wiring, ports, a router, signing",
+            "COMMAND_ACK",
+        )
+        alarms = (vehicle_checks.armed(state), *vehicle_checks.failsafe(state))
+        amiss = (finding for finding in alarms if finding.verdict is Verdict.UNSAFE)
+        return [*hints, unanswered, *amiss]
 
     async def evidence(self, patience: float) -> Evidence:
         """Ask for telemetry, wait up to `patience` s for readiness, listen.
 
         Raises:
-            CommandTimeout: It does not answer commands.
-            LinkLost: The connection dropped meanwhile.
+            CommandTimeout: It does not answer commands; `silent` says what that means.
+            LinkLost: The connection dropped meanwhile; the same.
         """
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
@@ -80,6 +98,6 @@ async def patient(config: Config, link_to: Callable[[Notice], Link]) -> AsyncIte
         yield Patient(config, link, notices)
 
 
-def _stranger(key: Key, words: str) -> Finding:
+def _met(key: Key, verdict: Verdict, words: str) -> Finding:
     found, _semicolon, mend = words.partition("; ")
-    return Finding(key, Verdict.UNSAFE, found, mend=mend, source="HEARTBEAT")
+    return Finding(key, verdict, found, mend=mend, source="HEARTBEAT")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 from companion.mavlink.family import AutopilotFamily
@@ -9,6 +10,22 @@ from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import share_lost
 from companion.mavlink.streams import StreamRate
+
+_ABOUT_POSITION = frozenset(
+    {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
+)
+"""Autopilots send none of these before their estimator has a position."""
+
+
+class Stage(Enum):
+    """What the vehicle is about to do; the value is said of it."""
+
+    GROUND = "to be armed"
+    """It stands disarmed."""
+    ARMED = "to take off"
+    """It stands armed."""
+    AIRBORNE = "to be taken over"
+    """It holds in the air, flown by its autopilot."""
 
 
 class Identity(NamedTuple):
@@ -101,7 +118,8 @@ class Evidence:
         samples: The attitude samples' times.
         company: Who else is there.
         resets: How often the estimator jumped meanwhile.
-        identity: `None` where it was not asked for.
+        identity: What the autopilot is.
+        stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
     """
 
@@ -115,5 +133,31 @@ class Evidence:
     samples: SampleTimes
     company: Company
     resets: int
-    identity: Identity | None = None
+    identity: Identity
+    stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
+
+    @property
+    def awaits_position(self) -> bool:
+        """Whether the vehicle has no position yet, so that nothing about it can be told."""
+        readiness = self.state.readiness
+        estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
+        return not readiness.position or self.family.not_ready(estimator_only) is not None
+
+    @property
+    def booting(self) -> bool:
+        """Whether nothing was told of the estimator yet: ArduPilot sends nothing else then."""
+        return self.state.readiness.estimator_flags is None
+
+    @property
+    def awaited(self) -> tuple[str, ...]:
+        """Messages that do not come as long as the vehicle is not ready to send them."""
+        if not self.awaits_position:
+            return ()
+        return tuple(
+            name
+            for name, rate in self.streams.items()
+            if rate.achieved == 0.0
+            and not rate.refusal
+            and (self.booting or name in _ABOUT_POSITION)
+        )

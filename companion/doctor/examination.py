@@ -12,13 +12,16 @@ from companion.mavlink.parameter_rules import Verdict
 Check = Callable[[Config, Evidence], Iterator[Finding]]
 
 CHECKS: tuple[Check, ...] = (
+    link_checks.signing,
     vehicle_checks.version,
+    vehicle_checks.motors,
     vehicle_checks.power,
     vehicle_checks.readiness,
+    vehicle_checks.gps,
+    vehicle_checks.ground,
     vehicle_checks.estimator,
     vehicle_checks.fence,
     link_checks.company,
-    link_checks.signing,
     link_checks.streams,
     link_checks.losses,
     link_checks.delays,
@@ -36,8 +39,26 @@ def examine(config: Config, evidence: Evidence) -> list[Finding]:
 
 
 def forbidding(config: Config, findings: Iterable[Finding]) -> list[Finding]:
-    """What is unsafe and not excepted by `flight.accept`: with any of these nothing is flown."""
+    """With any of these nothing is flown: unsafe and not excepted, or not ready."""
+    findings = tuple(findings)
+    waiting = (finding for finding in findings if finding.verdict is Verdict.NOT_READY)
+    return [*unexcepted(config, findings), *waiting]
+
+
+def unexcepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+    """What is unsafe and not excepted by `flight.accept`."""
     return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
+
+
+def result(config: Config, findings: Iterable[Finding]) -> Verdict:
+    """What it comes to: the gravest verdict that `companion fly` would heed, else safe."""
+    findings = tuple(findings)
+    verdicts = {finding.verdict for finding in findings}
+    if Verdict.NOT_CONNECTED in verdicts:
+        return Verdict.NOT_CONNECTED
+    if unexcepted(config, findings):
+        return Verdict.UNSAFE
+    return Verdict.NOT_READY if Verdict.NOT_READY in verdicts else Verdict.SAFE
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.config import Config
-from companion.doctor.evidence import Evidence, Identity, LinkQuality
+from companion.doctor.evidence import Evidence, Identity, LinkQuality, Stage
 from companion.doctor.listening import Ear
 from companion.mavlink.codec import message_id
 from companion.mavlink.errors import CommandRefused, LinkTimeout
@@ -37,6 +37,7 @@ async def gather(
     granted: Mapping[str, StreamRate],
     seconds: float,
     *,
+    stage: Stage = Stage.GROUND,
     thorough: bool = False,
     notices: Sequence[str] = (),
 ) -> Evidence:
@@ -46,7 +47,8 @@ async def gather(
         link: To a vehicle that was heard.
         granted: What was asked for.
         seconds: To count for.
-        thorough: Ask what it is, too, and what forbids arming.
+        stage: What the vehicle is to be judged for.
+        thorough: Ask what forbids arming, too.
         notices: What the link said of itself; read at the end.
 
     Raises:
@@ -58,7 +60,7 @@ async def gather(
         read, achieved, identity = await asyncio.gather(
             survey(link, link.family.parameters),
             link.measure_rates(granted, seconds),
-            _identity_and_words(link) if thorough else _nothing(),
+            _identity_and_words(link) if thorough else identify(link),
         )
     counts = link.stats.by_message
     return Evidence(
@@ -73,6 +75,7 @@ async def gather(
         company=ear.company,
         resets=ear.resets,
         identity=identity,
+        stage=stage,
         words=tuple(
             text.text
             for text in link.state.texts
@@ -103,10 +106,6 @@ async def _identity_and_words(link: Link) -> Identity:
         with suppress(CommandRefused, LinkTimeout):
             await link.command(dialect.MAV_CMD_RUN_PREARM_CHECKS, retries=1)
     return await identify(link)
-
-
-async def _nothing() -> None:
-    """Ask nothing more."""
 
 
 def _quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:

@@ -35,13 +35,16 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
     good = []
     for name, rate in evidence.streams.items():
         trouble = _trouble(name, rate, evidence)
+        if name in evidence.awaited and rate.granted >= _REACHED * rate.asked:
+            continue  # `readiness` tells of it
         if name in least and rate.achieved < least[name][1]:
             key, limit = least[name]
             yield Finding(
                 f"link.{key}",
                 UNSAFE,
                 f"{name} arrives at {rate.achieved:.0f} Hz, less than link.{key} = {limit:g}",
-                mend="raise the link's speed or lower the limit",
+                "the flight would be controlled on data that is too old",
+                trouble[1] if trouble else "raise the link's speed",
                 source="counted",
             )
         elif trouble is not None:
@@ -73,7 +76,7 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
         return None
     return (
         f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
-        "raise the link's speed, or ask for less, so that nothing has to wait",
+        "raise the link's speed, or ask for fewer messages, so that nothing has to wait",
     )
 
 
@@ -201,11 +204,11 @@ def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
     yield from signing_findings(evidence.link.notices)
 
 
-def signing_findings(notices: Iterable[str]) -> Iterator[Finding]:
-    """What the link said of signatures, as findings."""
+def signing_findings(notices: Iterable[str], verdict: Verdict = INEFFECTIVE) -> Iterator[Finding]:
+    """What the link said of signatures, as findings of a `verdict`."""
     for notice in notices:
         found, _semicolon, mend = notice.partition("; ")
-        yield Finding(Key.SIGNING, INEFFECTIVE, found, mend=mend, source="MAVLink 2 signatures")
+        yield Finding(Key.SIGNING, verdict, found, mend=mend, source="MAVLink 2 signatures")
 
 
 def company(config: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -8,15 +8,24 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.config import Config
-from companion.doctor.examination import forbidding, unsafe
+from companion.doctor.examination import result, unexcepted, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.repair import Outcome
 from companion.mavlink.parameter_rules import Verdict
 
 _TITLES = {
+    Verdict.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
     Verdict.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
     Verdict.INEFFECTIVE: ("INEFFECTIVE: it will not do what is asked of it", "bold yellow"),
+    Verdict.NOT_READY: ("NOT READY: not to be armed yet", "bold yellow"),
     Verdict.SAFE: ("SAFE", "bold green"),
+}
+
+_RESULTS = {
+    Verdict.NOT_CONNECTED: "not connected",
+    Verdict.UNSAFE: "unsafe",
+    Verdict.NOT_READY: "not ready",
+    Verdict.SAFE: "ok",
 }
 
 
@@ -45,11 +54,16 @@ def _table(
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
-    forbidden, amiss = forbidding(config, findings), len(unsafe(findings))
+    forbidden, amiss = unexcepted(config, findings), len(unsafe(findings))
+    verdict = result(config, findings)
+    if verdict is Verdict.NOT_CONNECTED:
+        return Text("not connected: nothing was judged", style="bold red")
     if forbidden:
         mendable = sum(finding.change is not None for finding in forbidden)
         fix = f"; `companion doctor --fix` mends {mendable} of them" if mendable else ""
         return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
+    if verdict is Verdict.NOT_READY:
+        return Text("not ready: ask again once it is, for not all was judged", style="bold yellow")
     if amiss:
         return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
     return Text("nothing unsafe was found", style="bold green")
@@ -71,7 +85,7 @@ def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
         for verdict in _TITLES
     }
     return {
-        "result": "unsafe" if forbidding(config, findings) else "ok",
+        "result": _RESULTS[result(config, findings)],
         **counts,
         "findings": [_finding_as_dict(config, finding) for finding in findings],
     }

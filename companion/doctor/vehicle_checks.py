@@ -5,13 +5,17 @@ from collections.abc import Iterator
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.config import Config
-from companion.doctor.evidence import Evidence
+from companion.doctor.evidence import Evidence, Stage
 from companion.doctor.finding import Finding, Key
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.state import VehicleState
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
+
+GROUND_HEIGHT = 1.5
+"""Height above home that may be read on the ground, m: the estimate drifts."""
 
 
 def armed(state: VehicleState) -> Finding:
@@ -61,15 +65,22 @@ def battery(config: Config, state: VehicleState) -> Finding:
     return Finding(Key.BATTERY, SAFE, f"battery at {100 * remaining:.0f} %", source=source)
 
 
+def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether they stand still before anybody arms."""
+    if evidence.stage is Stage.GROUND:
+        yield armed(evidence.state)
+
+
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Motors and battery."""
-    yield armed(evidence.state)
-    yield battery(config, evidence.state)
+    """The battery."""
+    if evidence.booting and evidence.state.battery is None:
+        yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
+    else:
+        yield battery(config, evidence.state)
 
 
-def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the autopilot would arm, and why not, in its own words."""
-    state = evidence.state
+def failsafe(state: VehicleState) -> Iterator[Finding]:
+    """Whether the autopilot is in a failsafe."""
     if state.failsafe:
         yield Finding(
             Key.FAILSAFE,
@@ -79,23 +90,76 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "clear its cause first",
             "HEARTBEAT system_status",
         )
-    missing = evidence.family.not_ready(state.readiness)
+
+
+def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot would arm, and why not, in its own words."""
+    state, stage = evidence.state, evidence.stage
+    yield from failsafe(state)
+    ready = state.readiness
+    if stage is Stage.AIRBORNE:  # its checks before arming are over
+        ready = ready._replace(prearm_good=True)
+    missing = evidence.family.not_ready(ready)
     said = "; ".join(dict.fromkeys(evidence.words))
     if missing is not None:
+        silent = evidence.awaited
+        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
         yield Finding(
             Key.READY,
-            INEFFECTIVE,
-            f"not ready to be armed, it lacks {missing}",
-            f"the autopilot says: {said}" if said else "the flight would wait for it",
-            "wait, or put right what it says",
+            NOT_READY,
+            f"not ready {stage.value}, it lacks {missing}{unsent}",
+            f"the autopilot says: {said}" if said else "",
+            "wait, or put right what it says, and try again",
             "SYS_STATUS, estimator flags",
         )
         return
     flags = state.estimator.flags if state.estimator else 0
-    found = f"ready to be armed, estimator flags 0x{flags:x}"
+    found = f"ready {stage.value}, estimator flags 0x{flags:x}"
     yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
     if said:
         yield Finding(Key.WORDS, SAFE, f"the autopilot says: {said}", source="STATUSTEXT, EVENT")
+
+
+def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether a GPS that was good still is."""
+    fault, source = evidence.state.gps_fault, "GPS_RAW_INT"
+    if fault is not None:
+        yield Finding(
+            Key.GPS,
+            UNSAFE,
+            fault,
+            "the vehicle will not know where it is",
+            "wait for its fix, in the open",
+            source,
+        )
+
+
+def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether it stands on the ground, and heights mean what they should."""
+    state, source = evidence.state, "EXTENDED_SYS_STATE, LOCAL_POSITION_NED, HOME_POSITION"
+    if evidence.stage is Stage.AIRBORNE:
+        return
+    if not state.landed:
+        yield Finding(
+            Key.LANDED,
+            UNSAFE if state.flying else NOT_READY,
+            "the vehicle says that it flies"
+            if state.flying
+            else "the autopilot does not say that it stands on the ground",
+            "nothing is begun in the air",
+            "land it first, or find why EXTENDED_SYS_STATE does not tell that it stands",
+            "EXTENDED_SYS_STATE",
+        )
+    height = state.height
+    if height is not None and abs(height) > GROUND_HEIGHT:
+        yield Finding(
+            Key.HOME,
+            UNSAFE,
+            f"the vehicle stands {height:.1f} m above home by what it says",
+            "flight.takeoff_height_m and limits.fence_floor_m would be wrong",
+            "have the autopilot set home here",
+            source,
+        )
 
 
 def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -120,10 +184,10 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if told is None:
         yield Finding(
             Key.FENCE,
-            UNSAFE,
+            NOT_READY if evidence.awaits_position else UNSAFE,
             "the vehicle does not tell its latitude and longitude",
             "whether it is inside safety.fence_polygon_deg cannot be known",
-            "wait for GPS, or give safety.fence_polygon_m instead",
+            "wait for GPS",
             source,
         )
         return
@@ -142,10 +206,8 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """What autopilot it is, where that was asked for."""
+    """What autopilot it is."""
     identity, name = evidence.identity, evidence.family.name
-    if identity is None:
-        return
     if identity.version is None or identity.capabilities is None:
         yield Finding(
             Key.VERSION,

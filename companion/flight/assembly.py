@@ -13,9 +13,11 @@ from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.follow import Follow
+from companion.flight.ground_contact import GroundContact
 from companion.flight.guide import Guide
 from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
+from companion.flight.preflight import Preflight
 from companion.flight.programmes import programme
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
@@ -213,12 +215,14 @@ def assemble(
     )
     # In lockstep there is one clock, and a round trip takes a step however quick the link is.
     offset = (lambda: 0.0) if config.link.lockstep else lambda: link.timesync.offset_s
+    ground = GroundContact(link.state, clock)
     guide = Guide(
         loop,
         linear_guidance(config),
         motion_estimate(config, offset),
         thrust,
         link.state,
+        ground,
         trace,
         max_tilt=radians(config.limits.max_tilt_deg),
         period=1.0 / config.guidance.rate_hz,
@@ -226,12 +230,13 @@ def assemble(
         clock=clock,
     )
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
-    rig = Rig(config, link, loop, guide, lookout, programme(config))
+    preflight = Preflight(config, link)
+    rig = Rig(config, link, loop, guide, lookout, programme(config), ground, preflight)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     watch = Watch(rig, ladder, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = rig.note = flight.note
+    ladder.note = rig.note = preflight.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:

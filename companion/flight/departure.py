@@ -2,6 +2,7 @@
 
 import asyncio
 
+from companion.doctor.evidence import Stage
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import enter, order
 from companion.flight.rig import Rig
@@ -17,19 +18,20 @@ _REACHED = 0.5
 _ARRIVES = 2.0
 """So long a climb that has become a hold may still take to arrive, s; else somebody stopped it."""
 
-_ON_GROUND = 1.5
-"""Height above home that may be read on the ground, m: the estimate drifts."""
-
 
 async def takeoff(rig: Rig) -> None:
     """Let the autopilot take off, and wait for the height."""
     state = rig.link.state
     await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
+    await rig.preflight.require(Stage.ARMED)
     await rig.fresh_heartbeat()
     _require_ground(rig)
     rig.detail = "the autopilot to accept the take-off"
     height = rig.config.flight.takeoff_height_m
     command = rig.link.family.take_off(height, _home_altitude(rig))
+    rig.ground.command_takeoff()
+    rig.loop.command = None  # an idle one, which nothing may send from here on
+    rig.guide.step()
     await order(rig, command, in_roles(rig.link, {Role.READY}), lambda: not state.landed)
     climb = _Climb(rig, height)
     await rig.until(climb.over)
@@ -37,11 +39,13 @@ async def takeoff(rig: Rig) -> None:
 
 async def offboard(rig: Rig) -> None:
     """Hand control over to our stream, and settle."""
+    rig.detail = "the vehicle to be as it was at the checks"
+    await rig.preflight.require(Stage.AIRBORNE)
     rig.guide.hold_here()
     rig.lookout.begin(asyncio.get_running_loop().time())
     await _take_over(rig)
     rig.guide.hold_here()
-    rig.loop.guarded = True
+    rig.loop.guarded, rig.loop.taking_over = True, False
     await asyncio.sleep(_SETTLING)
 
 
@@ -78,18 +82,13 @@ class _Climb:
 
 
 def _require_ground(rig: Rig) -> None:
-    """See that it stands ready for the take-off, and that heights mean what they should."""
+    """See that it stands ready for the take-off."""
     state = rig.link.state
     require_role(rig.link, {Role.READY})
     if not rig.armed() or state.flying:
         raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
     if not state.landed:
         raise FlightEnded("the autopilot does not say any more that it stands on the ground")
-    if state.height is not None and abs(state.height) > _ON_GROUND:
-        raise FlightEnded(
-            f"the vehicle stands {state.height:.1f} m above home by what it says, so take-off "
-            "height and limits.fence_floor_m would be wrong; have the autopilot set home here"
-        )
 
 
 async def _take_over(rig: Rig) -> None:
@@ -97,6 +96,7 @@ async def _take_over(rig: Rig) -> None:
     # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
     await rig.until(lambda: _commands_flight(rig), "a target from guidance")
     rig.detail = "the autopilot to obey our rates"
+    rig.loop.taking_over = True
     command = rig.link.family.take_over()
     if command is None:
         # The mode we know may be a second old; never take the vehicle from a pilot who took it.

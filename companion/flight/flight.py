@@ -161,7 +161,7 @@ class Flight:
 
     def _usual_exit(self) -> Exit:
         phase = self.phase
-        if phase.on_failure_landed is not None and self._rig.link.state.landed:
+        if phase.on_failure_landed is not None and self._rig.ground.standing:
             return phase.on_failure_landed
         return phase.on_failure
 

@@ -2,12 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
-from math import acos, degrees, dist, inf, nan
+from math import degrees, dist, inf, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
-from companion.attitude.kinematics import cos_tilt
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.control_loop import Command, ControlLoop
 from companion.flight.follow import Follow
+from companion.flight.ground_contact import GroundContact
 from companion.flight.hover_learning import HoverLearning
 from companion.flight.motion_estimate import MotionEstimate
 from companion.flight.predictive import Following, Predictive
@@ -36,10 +37,11 @@ _LEVEL = Target(0.0, 0.0, 0.0)
 class Guide:
     """Leaves a new `Command` with the control loop at a steady rate, while position is fresh.
 
-    On the ground the command is idle. In the air and without a programme it damps the motion where
-    the vehicle is; `hold` keeps a pose; `follow` flies a programme from it. A programme's open-loop
-    rates are given up, and the vehicle held where it is, once it tilts too far. Jumps of the
-    autopilot's estimate are not chased: poses and references go on without them.
+    On the ground the command is idle until a take-off is commanded. From then on, and without a
+    programme, it damps the motion where the vehicle is; `hold` keeps a pose; `follow` flies a
+    programme from it. A programme's open-loop rates are given up, and the vehicle held where it
+    is, once it tilts too far. Jumps of the autopilot's estimate are not chased: poses and
+    references go on without them.
 
     Attributes:
         begun_at: when the programme began, s on our clock, or None.
@@ -61,6 +63,7 @@ class Guide:
         estimate: MotionEstimate,
         hover_thrust: HoverThrust,
         state: VehicleState,
+        ground: GroundContact,
         trace: FlightTrace,
         *,
         max_tilt: float,
@@ -81,6 +84,7 @@ class Guide:
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self._state = state
+        self._ground = ground
         self._trace = trace
         self._max_tilt = max_tilt
         self._period = period
@@ -155,11 +159,13 @@ class Guide:
             return
         # In control a vehicle that says it has landed is the watch's matter: no thrust would make
         # it true.
-        if self._state.landed and not self._loop.guarded:
+        standing = self._ground.standing and not self._loop.guarded
+        if standing:
             self.learning.stand()
             self._loop.resets.forget()
-            self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
-            return
+            if self._ground.may_idle:
+                self._loop.command = Command(_LEVEL, 0.0, now, idle=True)
+                return
         position = self._loop.resets.without_jumps(position)
         self.estimate.turn_to(self._loop.resets.turn)
         self.estimate.note_position(position, obeyed=self._loop.guarded)
@@ -180,9 +186,10 @@ class Guide:
             turn=self._loop.resets.turn,
         )
         self.off_course = self._distance(reference, situation.now)
-        self.learning.step(
-            now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
-        )
+        if not standing:
+            self.learning.step(
+                now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
+            )
         if self._loop.guarded:
             measured_at = self.estimate.vehicle_time(now, position)
             self._note_tracking(measured_at, reference, situation.now)
@@ -234,7 +241,7 @@ class Guide:
         """Hold where we are if open-loop rates have tilted the vehicle too far."""
         if self.pose is None or self._programme is None or self.begun_at is None:
             return
-        tilt = acos(cos_tilt(self._q[1], self._q[2]))
+        tilt = tilt_angle(self._q[1], self._q[2])
         within = self._clock() - self.begun_at
         if self._programme.at(within, self.pose).body_rates is None or tilt <= self._max_tilt:
             return

@@ -15,6 +15,8 @@ _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _SHORT = 10.0
 """For what the autopilot does at once or not at all, s."""
+_TAKE_OVER = 15.0
+"""The same, and the judgement before it, whose parameters a bad link may lose, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ def flight_phases(
             "offboard",
             "the autopilot to take our rates",
             departure.offboard,
-            _SHORT,
+            _TAKE_OVER,
             Exit.LAND,
             modes=_RISING | {Role.OFFBOARD},
             monitored=True,

@@ -1,9 +1,8 @@
 """What is done on the ground, one coroutine a phase, and how arming is undone."""
 
 from companion.doctor import vehicle_checks
-from companion.doctor.examination import examine, forbidding, unsafe
+from companion.doctor.evidence import Stage
 from companion.doctor.finding import Finding
-from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import order
@@ -14,8 +13,6 @@ from companion.mavlink.roles import Role
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
-_COUNTED_FOR = 1.0
-"""Arriving telemetry is counted for so long, s; the parameters are read meanwhile."""
 
 
 async def connect(rig: Rig) -> None:
@@ -26,26 +23,20 @@ async def connect(rig: Rig) -> None:
 
 async def checks(rig: Rig) -> None:
     """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
-    link, config = rig.link, rig.config
     rig.detail = "asking for telemetry"
-    granted = await link.set_rates(wanted_rates(config, link), window_s=0.1)
-    for message, rate in granted.items():
-        if rate.granted < rate.asked:
-            rig.note(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
+    await rig.preflight.ask_for_telemetry()
     await leave_offboard(rig)
     await rig.until(lambda: _ready(rig))
     # Counted only now: a position is not sent before the estimator has one.
     rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
-    evidence = await gather(link, granted, _COUNTED_FOR)
-    # PX4's is not asked for: its rate is fixed.
-    heartbeats = evidence.streams.get("HEARTBEAT")
+    evidence = await rig.preflight.require(Stage.GROUND)
+    heartbeats = evidence.streams.get("HEARTBEAT")  # PX4's is not asked for: its rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         rig.heartbeat_limit = max(
             _SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved
         )
-    _heed(rig, examine(config, evidence))
     _tell_dead_man(rig, evidence.survey.values)
-    rig.mode_at_checks = link.state.mode
+    rig.mode_at_checks = rig.link.state.mode
 
 
 async def stream(rig: Rig) -> None:
@@ -64,6 +55,7 @@ async def arm(rig: Rig) -> None:
     if rig.link.state.mode == ready:
         rig.note(f"the vehicle is in {ready} already: arming it starts the flight")
     await rig.until(rig.armed, "the pilot to arm (flight.arm is false, --arm was not given)")
+    await rig.preflight.require(Stage.ARMED)
     await rig.until(
         lambda: _handed_over(rig), f"the pilot to hand over, by switching to {ready} on the ground"
     )
@@ -86,13 +78,12 @@ async def _arm(rig: Rig) -> None:
     """Arm; what was good at the checks may not be so any more."""
     state = rig.link.state
     await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
-    await rig.until(lambda: state.landed, "the autopilot to say that it stands on the ground")
-    _check_battery(rig)
     rig.detail = "the autopilot to accept arming"
     *before, command = rig.link.family.arm()
     for each in before:
         await order(rig, each, lambda: _untouched(rig), lambda: in_role(rig.link, Role.READY))
     await rig.until(lambda: in_role(rig.link, Role.READY))
+    await rig.preflight.require(Stage.GROUND)
     armings = state.armings
 
     def armed() -> bool:
@@ -135,19 +126,6 @@ def _check_battery(rig: Rig) -> None:
 def _refuse(finding: Finding) -> None:
     if finding.verdict is Verdict.UNSAFE:
         raise FlightEnded(finding.sentence())
-
-
-def _heed(rig: Rig, findings: list[Finding]) -> None:
-    """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""
-    amiss = [finding.key for finding in findings if finding.verdict is Verdict.INEFFECTIVE]
-    if amiss:
-        rig.note(f"not as it should be: {', '.join(amiss)}; `companion doctor` tells why")
-    refused = forbidding(rig.config, findings)
-    for finding in unsafe(findings):
-        if finding not in refused:
-            rig.note(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
-    if refused:
-        raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
 
 
 def _tell_dead_man(rig: Rig, values: Values) -> None:

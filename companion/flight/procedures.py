@@ -57,7 +57,7 @@ async def land(rig: Rig) -> None:
         height = rig.link.state.height
         rig.detail = "touchdown" + ("" if height is None else f", now {height:.1f} m")
         _require_landing(rig)
-        return rig.link.state.landed
+        return rig.ground.touched_down
 
     await rig.until(down)
 

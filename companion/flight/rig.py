@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from companion.config import Config
 from companion.flight.control_loop import ControlLoop
+from companion.flight.ground_contact import GroundContact
 from companion.flight.guide import Guide
+from companion.flight.preflight import Preflight
 from companion.flight.safety import Lookout
 from companion.guidance import Sequence
 from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
@@ -47,6 +49,8 @@ class Rig:
     guide: Guide
     lookout: Lookout
     programme: Sequence
+    ground: GroundContact
+    preflight: Preflight
     detail: str = ""
     rate_hz: float = 0.0
     heartbeat_limit: float = _SLOWEST_HEARTBEAT
@@ -57,7 +61,7 @@ class Rig:
     def release(self) -> None:
         """Stop answering samples: from here on nothing is sent that steers."""
         self.loop.on = False
-        self.loop.guarded = False
+        self.loop.guarded = self.loop.taking_over = False
         self.guide.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:

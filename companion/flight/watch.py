@@ -31,6 +31,7 @@ class Watch:
         self._ladder = ladder
         self._clock = clock
         self._status_at = -inf
+        self._status_question: asyncio.Task[None] | None = None
         self._question: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
@@ -41,6 +42,7 @@ class Watch:
         """
         now = self._clock()
         self._rig.lookout.listen(now)
+        self._rig.ground.look()
         if phase.modes:
             require_role(self._rig.link, phase.modes)
         if phase.monitored and self._rig.loop.guarded:
@@ -49,14 +51,12 @@ class Watch:
             self._judge_heartbeat()
 
     def on_heartbeat(self, phase: Phase) -> None:
-        """A heartbeat came: it tells whether we may go on after a gap.
+        """A heartbeat came: judge what it says.
 
         Raises:
             FlightEnded: as `judge`.
         """
         self.judge(phase)
-        if self._rig.loop.held_back and Role.OFFBOARD in roles_of(self._rig.link):
-            self._rig.loop.resume()
 
     def on_current_mode(self, phase: Phase) -> None:
         """CURRENT_MODE came: twice a second, and at once when the vehicle's status changes.
@@ -69,15 +69,26 @@ class Watch:
         """
         now = self._clock()
         early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
-        asking = self._question is not None and not self._question.done()
+        asking = self._status_question is not None and not self._status_question.done()
         if early and not asking:
-            self.ask_mode()
+            self._status_question = asyncio.create_task(self._rig.fresh_heartbeat())
         self.judge(phase)
 
     def ask_mode(self) -> None:
-        """Ask for a heartbeat now rather than wait for the next one."""
+        """Ask for the mode now, and go on after a gap if the vehicle still obeys us."""
         # Without an answer the silence limit decides.
-        self._question = asyncio.create_task(self._rig.fresh_heartbeat())
+        self._question = asyncio.create_task(self._confirm())
+
+    async def _confirm(self) -> None:
+        """Wait for a heartbeat that is fresh: one that waited to be read may say what was."""
+        await self._rig.fresh_heartbeat()
+        loop, state = self._rig.loop, self._rig.link.state
+        roles = roles_of(self._rig.link)
+        # While we take over, the stream is needed before offboard is entered; in a failsafe that
+        # came in between it would end the failsafe.
+        entering = loop.taking_over and Role.READY in roles and not state.failsafe
+        if loop.held_back and (Role.OFFBOARD in roles or entering):
+            loop.resume()
 
     def _climb(self, now: float) -> None:
         """Let the ladder look, and do what it says."""

@@ -59,7 +59,7 @@ class Connection:
         # Before the transport is there: its first bytes may come before we run again.
         self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
         self._lost_early = None
-        transport = await self._opener(self._endpoint, self._inbox.receive, self._on_lost)
+        transport = await self._opener(self._endpoint, self._inbox, self._on_lost)
         if self._lost_early is not None:
             transport.close()
             raise EndpointError(f"the connection was dropped at once: {self._lost_early}")

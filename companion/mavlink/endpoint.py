@@ -9,16 +9,29 @@ _HELP = (
     "write udpin://0.0.0.0:14540, udpout://HOST:PORT, tcp://HOST:PORT, tcpin://0.0.0.0:PORT "
     "or serial:///dev/ttyACM0:921600"
 )
+_PEER = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d+))?")
 _NETWORK = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d+)")
 _SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d+)")
 
 
 @dataclass(frozen=True)
+class PeerAddress:
+    """A host that may talk to a listening endpoint, from any port if that is `None`."""
+
+    host: str
+    port: int | None = None
+
+
+@dataclass(frozen=True)
 class UdpIn:
-    """Listen on a local address; talk to the vehicle that is heard there first."""
+    """Listen on a local address; talk to the vehicle that is heard there first.
+
+    With `peers` only to one of them.
+    """
 
     host: str
     port: int
+    peers: tuple[PeerAddress, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -39,10 +52,11 @@ class TcpClient:
 
 @dataclass(frozen=True)
 class TcpServer:
-    """Listen for one vehicle that connects to us."""
+    """Listen for one vehicle that connects to us; with `peers`, from one of them."""
 
     host: str
     port: int
+    peers: tuple[PeerAddress, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,8 @@ def parse_endpoint(text: str) -> Endpoint:
     """Read an endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`.
 
     `udp://` is taken as `udpin://`. An empty host of a listening endpoint means every interface.
+    A listening endpoint may name who is let in: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a
+    port as in `?peer=192.0.2.7:14580`, several with commas between.
 
     Raises:
         EndpointError: The text is not one of the five notations, or its port is not 1..65535
@@ -80,6 +96,7 @@ def parse_endpoint(text: str) -> Endpoint:
     kind = _NETWORK_KINDS.get(scheme)
     if not separator or kind is None:
         raise EndpointError(f"endpoint {text!r} is not understood: {_HELP}")
+    rest, question, query = rest.partition("?")
     found = _NETWORK.fullmatch(rest.rstrip("/"))
     if found is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
@@ -89,7 +106,28 @@ def parse_endpoint(text: str) -> Endpoint:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
     if not (0 if listens else 1) <= port <= 65535:
         raise EndpointError(f"endpoint {text!r}: port {port} is outside 1..65535")
-    return kind(host, port)
+    if not question:
+        return kind(host, port)
+    if kind is UdpIn or kind is TcpServer:
+        return kind(host, port, _peers(text, query))
+    raise EndpointError(
+        f"endpoint {text!r}: {scheme}:// names its peer already; leave ?{query} out"
+    )
+
+
+def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
+    key, _, names = query.partition("=")
+    peers = []
+    for name in names.split(","):
+        found = _PEER.fullmatch(name.strip())
+        port = int(found[2]) if found and found[2] else None
+        if key != "peer" or found is None or not (port is None or 1 <= port <= 65535):
+            raise EndpointError(
+                f"endpoint {text!r}: {query!r} is not understood; write ?peer=ADDRESS or "
+                "?peer=ADDRESS:PORT, several with commas between"
+            )
+        peers.append(PeerAddress(found[1].strip("[]"), port))
+    return tuple(peers)
 
 
 def _serial(text: str, rest: str) -> SerialPort:

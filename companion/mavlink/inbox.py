@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from math import inf
 
 from fastcrc import crc16
 
@@ -14,6 +15,7 @@ from companion.mavlink.codec import (
 )
 from companion.mavlink.framing import V2, Frame, FrameScanner
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.router import Router
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
@@ -55,6 +57,7 @@ class Inbox:
         router: Takes all but the samples.
         tap: Is shown every frame that is accepted.
         notice: Is told, once each, of what keeps the two sides from understanding each other.
+        last_setpoint: Loop time of the last setpoint sent, s.
     """
 
     def __init__(
@@ -64,6 +67,7 @@ class Inbox:
         router: Router,
         tap: Tap | None,
         notice: Notice,
+        last_setpoint: Callable[[], float] = lambda: -inf,
     ) -> None:
         self._source = (settings.target_system, settings.target_component)
         self._signing = settings.signing
@@ -80,6 +84,13 @@ class Inbox:
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
         self.on_foreign: Callable[[Frame], None] | None = None
         self.lockstep: LockstepClient | None = None
+        self._peer_rule = PeerRule(
+            stats,
+            self._notice_once,
+            self._loop.time,
+            last_setpoint,
+            every_frame_claims=settings.signing is not None or settings.lockstep,
+        )
         self.connect(streaming=False)
 
     def connect(self, *, streaming: bool) -> None:
@@ -105,6 +116,31 @@ class Inbox:
         except Exception as error:  # of the tap; subscribers are guarded one by one
             self._router.report(error)
             return False
+
+    def claim(self, data: bytes, received_ns: int, who: str) -> bool:
+        """Take bytes of `who`, who is not the peer; true if that makes it the peer.
+
+        Without a valid claim in them nothing is accepted. Never raises.
+        """
+        admitted = [frame for frame in self._scanner.feed(data) if self._admit(frame)]
+        if not any(map(self._peer_rule.is_claim, admitted)):
+            self._stats.unclaimed += len(admitted)
+            return False
+        self._peer_rule.fix(who)
+        try:
+            for frame in admitted:
+                self._accept(frame, received_ns)
+        except Exception as error:  # of the tap
+            self._router.report(error)
+        return True
+
+    def claim_lapsed(self) -> bool:
+        """Whether another sender may take the peer's place."""
+        return self._peer_rule.lapsed()
+
+    def stranger(self, who: str) -> None:
+        """`who`, whom the endpoint does not name, was ignored."""
+        self._peer_rule.ignore(who)
 
     def _take_attitude(self, data: bytes, received_ns: int) -> bool:
         """The way of a datagram that is one sample and nothing else: control first, count later.
@@ -141,20 +177,25 @@ class Inbox:
             if not self._admit(frame):
                 continue
             accepted = True
-            if self.lockstep is not None and frame.message_id == SYSTEM_TIME:
-                beacon = decode_beacon(frame.payload)
-                if beacon is not None:
-                    # Beacons are no telemetry: they have running numbers of their own.
-                    self.lockstep.beacon(beacon)
-                    continue
-            self._count(frame.message_id, frame.sequence)
-            if self.lockstep is None:
-                sample = self._pass_on(frame, received_ns)
-                if sample is not None:
-                    self._control(sample)
-            else:
-                self._held.append((frame, received_ns))
+            self._accept(frame, received_ns)
         return accepted
+
+    def _accept(self, frame: Frame, received_ns: int) -> None:
+        if frame.message_id == HEARTBEAT and self._peer_rule.is_claim(frame):
+            self._peer_rule.renew()
+        if self.lockstep is not None and frame.message_id == SYSTEM_TIME:
+            beacon = decode_beacon(frame.payload)
+            if beacon is not None:
+                # Beacons are no telemetry: they have running numbers of their own.
+                self.lockstep.beacon(beacon)
+                return
+        self._count(frame.message_id, frame.sequence)
+        if self.lockstep is None:
+            sample = self._pass_on(frame, received_ns)
+            if sample is not None:
+                self._control(sample)
+        else:
+            self._held.append((frame, received_ns))
 
     def _admit(self, frame: Frame) -> bool:
         stats = self._stats

@@ -65,7 +65,7 @@ class Link(Conversation):
         stats = LinkStats()
         router, outbox = Router(stats), Outbox(settings, stats, tap)
         super().__init__(settings, outbox, router, stats, self._loop.time)
-        self._inbox = Inbox(settings, stats, router, tap, notice)
+        self._inbox = Inbox(settings, stats, router, tap, notice, lambda: outbox.setpoint_at)
         self.timesync = TimeSync(outbox, router, self._loop.time)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener

@@ -13,19 +13,19 @@ from companion.mavlink.endpoint import (
 )
 from companion.mavlink.serial_port import SerialTransport
 from companion.mavlink.tcp import open_tcp_client, open_tcp_server
-from companion.mavlink.transport import Lost, Receive, Transport
+from companion.mavlink.transport import Lost, Receiver, Transport
 from companion.mavlink.udp import open_udp
 
-OpenTransport = Callable[[Endpoint, Receive, Lost], Awaitable[Transport]]
+OpenTransport = Callable[[Endpoint, Receiver, Lost], Awaitable[Transport]]
 """As `open_transport`, for a parsed endpoint."""
 
 
-async def open_transport(endpoint: str | Endpoint, receive: Receive, lost: Lost) -> Transport:
+async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Lost) -> Transport:
     """Open what the endpoint describes.
 
     Args:
         endpoint: A parsed endpoint or its notation.
-        receive: Called for all bytes that arrive.
+        receiver: Takes all bytes that arrive.
         lost: Called once if an open connection drops; never for UDP, nor after `close`.
 
     Raises:
@@ -34,10 +34,10 @@ async def open_transport(endpoint: str | Endpoint, receive: Receive, lost: Lost)
     where = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
     match where:
         case UdpIn() | UdpOut():
-            return await open_udp(where, receive)
+            return await open_udp(where, receiver)
         case TcpClient():
-            return await open_tcp_client(where, receive, lost)
+            return await open_tcp_client(where, receiver, lost)
         case TcpServer():
-            return await open_tcp_server(where, receive, lost)
+            return await open_tcp_server(where, receiver, lost)
         case SerialPort():
-            return SerialTransport(where, receive, lost)
+            return SerialTransport(where, receiver.receive, lost)

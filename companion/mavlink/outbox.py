@@ -1,6 +1,7 @@
 """What leaves: numbered, signed, sent at once or not at all."""
 
 import asyncio
+from math import inf
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import (
@@ -18,7 +19,12 @@ from companion.mavlink.transport import Tap, Transport
 
 
 class Outbox:
-    """Numbers, signs and sends frames. It keeps nothing: what cannot leave now is dropped."""
+    """Numbers, signs and sends frames. It keeps nothing: what cannot leave now is dropped.
+
+    Attributes:
+        transport: The open connection, if there is one.
+        setpoint_at: Loop time of the last setpoint, s.
+    """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, tap: Tap | None) -> None:
         self._settings, self._stats, self._tap = settings, stats, tap
@@ -34,6 +40,7 @@ class Outbox:
         )
         self._latched: tuple[int, BodyRates, float] | None = None
         self.transport: Transport | None = None
+        self.setpoint_at = -inf
 
     def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send SET_ATTITUDE_TARGET now; false if it could not leave.
@@ -41,7 +48,9 @@ class Outbox:
         Raises:
             InvalidSetpoint: Nothing was sent.
         """
-        return self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+        left = self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+        self.setpoint_at = self._loop.time()
+        return left
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""

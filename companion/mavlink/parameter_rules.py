@@ -52,6 +52,10 @@ class Verdict(Enum):
     """Somebody may be hurt or the vehicle lost."""
     INEFFECTIVE = "ineffective"
     """The flight does not do what is asked of it, or a protection does nothing."""
+    NOT_READY = "not_ready"
+    """The vehicle is not ready to be armed yet, and this is a consequence of it."""
+    NOT_CONNECTED = "not_connected"
+    """Nobody answers, so nothing was judged."""
 
 
 class Complaint(NamedTuple):

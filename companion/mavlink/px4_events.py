@@ -70,7 +70,9 @@ _EVENTS = {
     "commander_disarm_denied_not_landed": _Words("Disarming denied: not landed"),
     "commander_modeswitch_not_avail": _Words("Switching to that mode is currently not possible"),
     "commander_takeoff_detected": _Words("Takeoff detected"),
+    "commander_landing_current_pos": _Words("Landing at current position"),
     "commander_landing_detected": _Words("Landing detected"),
+    "commander_rtl": _Words("Returning to launch"),
     "navigator_takeoff_default_alt": _Words(
         "Using default takeoff altitude: {:.1f} m", "<f", (None,)
     ),

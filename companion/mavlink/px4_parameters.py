@@ -30,6 +30,7 @@ _INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
 _TERMINATION_OFF = 121212
 _FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
 _NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
+_DEFAULT_FAILURE_ANGLE = 60.0
 _OVERSHOOT = 15.0
 """By which a gust or a step may carry the tilt over its limit, degrees."""
 
@@ -54,8 +55,7 @@ def _termination(value: float, values: Values, setup: Setup) -> Complaint | None
     if not all(name in values for name in _FAILURE_ANGLES):
         return Complaint(
             UNSAFE,
-            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; mend the link, or "
-            f"switch termination off ({_TERMINATION_OFF})",
+            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; mend the link",
         )
     angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
     if not angles or min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
@@ -63,8 +63,8 @@ def _termination(value: float, values: Values, setup: Setup) -> Complaint | None
     return Complaint(
         UNSAFE,
         f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
-        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; raise them, lower it, or switch "
-        f"termination off ({_TERMINATION_OFF})",
+        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; lower limits.max_tilt_deg to "
+        f"{_OVERSHOOT:g}° below it, for gusts and steps",
     )
 
 
@@ -72,11 +72,13 @@ def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | Non
     """The failure detector's angle matters by itself only where it is below our own tilt."""
     if value == 0.0 or value > degrees(setup.max_tilt):
         return None
+    raised = degrees(setup.max_tilt) < _DEFAULT_FAILURE_ANGLE
     return Complaint(
         INEFFECTIVE,
         f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
-        "allows",
-        max(60.0, degrees(setup.max_tilt) + _OVERSHOOT),
+        "allows" + ("" if raised else f"; lower limits.max_tilt_deg below {value:g}"),
+        # Beyond PX4's own default a detector would be weakened for the sake of our limit.
+        _DEFAULT_FAILURE_ANGLE if raised else None,
     )
 
 

@@ -13,6 +13,10 @@ def outdated(received: float, now: float) -> bool:
     return now - received > _LASTS
 
 
+GPS_FIX_3D = 3
+"""Of GPS_FIX_TYPE, this and above."""
+
+
 class Heartbeat(NamedTuple):
     """HEARTBEAT of the autopilot.
 
@@ -129,6 +133,25 @@ class Gps(NamedTuple):
     fix_type: int
     satellites: int | None
     altitude_m: float
+
+
+def gps_fault(gps: Gps | None, now: float) -> str | None:
+    """What is wrong, at `now` in s of our clock, with a GPS that had a 3D fix before."""
+    if gps is None or outdated(gps.received, now):
+        return "GPS is not reported any more"
+    return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None
+
+
+class Prearm(NamedTuple):
+    """SYS_STATUS: the autopilot's own pre-arm checks.
+
+    Attributes:
+        received: Event-loop time, s.
+        good: They pass.
+    """
+
+    received: float
+    good: bool
 
 
 class Home(NamedTuple):

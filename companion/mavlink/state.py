@@ -10,6 +10,7 @@ from companion.mavlink.families import family_for
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
+    GPS_FIX_3D,
     Battery,
     CurrentMode,
     Estimator,
@@ -19,8 +20,10 @@ from companion.mavlink.records import (
     Home,
     Landed,
     LocalPosition,
+    Prearm,
     ToldThrust,
     Vector,
+    gps_fault,
     outdated,
 )
 from companion.mavlink.router import Router
@@ -53,7 +56,8 @@ class _Values:
     home: Home | None = None
     estimator: Estimator | None = None
     armings: int = 0
-    prearm_good: bool | None = None
+    prearm: Prearm | None = None
+    gps_was_good: bool = False
     reset_counter: int | None = None
 
 
@@ -73,7 +77,8 @@ class VehicleState(_Values):
         estimator: See `Estimator`.
         heartbeat_is_newest: Whether HEARTBEAT told the mode last, and so tells of arming as newly.
         armings: How often it was seen to become armed.
-        prearm_good: SYS_STATUS: whether the autopilot's own pre-arm checks pass.
+        prearm: See `Prearm`.
+        gps_was_good: Whether GPS has had a 3D fix since the link was opened.
         reset_counter: ODOMETRY: rises whenever the estimator jumps.
         family: The autopilot's family, once its first heartbeat was heard.
         unsupported: The error to raise if it has none.
@@ -161,13 +166,20 @@ class VehicleState(_Values):
 
     @property
     def readiness(self) -> Readiness:
-        """What the family judges before arming."""
+        """What the family judges before arming; what was not told for a while is not known."""
+        now = self._clock()
+        prearm, estimator, position = self.prearm, self.estimator, self.position
         return Readiness(
-            self.prearm_good,
-            self.estimator.flags if self.estimator else None,
-            self.position is not None,
+            None if prearm is None or outdated(prearm.received, now) else prearm.good,
+            None if estimator is None or outdated(estimator.received, now) else estimator.flags,
+            position is not None and not outdated(position.received, now),
             self.home is not None,
         )
+
+    @property
+    def gps_fault(self) -> str | None:
+        """What is wrong with a GPS that was good, in words, or `None`."""
+        return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
 
     @property
     def position_ned(self) -> Vector | None:
@@ -244,7 +256,8 @@ class VehicleState(_Values):
         self._take_battery(
             None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
         )
-        self.prearm_good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
+        good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
+        self.prearm = Prearm(self._clock(), good)
 
     def _on_odometry(self, message: Message) -> None:
         self.reset_counter = message.reset_counter
@@ -275,6 +288,7 @@ class VehicleState(_Values):
         seen = message.satellites_visible
         satellites = None if seen == 255 else seen
         self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
+        self.gps_was_good = self.gps_was_good or message.fix_type >= GPS_FIX_3D
 
     def _on_home(self, message: Message) -> None:
         if not isfinite(message.z):

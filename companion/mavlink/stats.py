@@ -13,7 +13,7 @@ def share_lost(frames: int, lost: int) -> float:
 
 @dataclass
 class LinkStats:
-    """What a link has seen so far. All but the last two count frames.
+    """What a link has seen so far. All but the last four count frames.
 
     Attributes:
         frames: Accepted from the vehicle.
@@ -23,12 +23,16 @@ class LinkStats:
         unknown: Of messages the dialect does not know.
         bad_signature: Unsigned, wrongly signed or replayed while signing is on.
         ignored_foreign: From systems or components we do not listen to.
+        unclaimed: With the vehicle's ids, from a sender that is not the peer (see `peer.PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
         malformed: Messages whose fields make no sense.
         sent: Handed to the kernel.
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
         reconnects: How often the connection was opened again.
+        peers: How often the peer changed to another address or port, or to another TCP client,
+            after the first. A peer that comes back at its address and port is no new one; a serial
+            port or a TCP connection that we open again counts in `reconnects` alone.
         by_message: Accepted frames for each message id.
         foreign_sources: (system, component) of those that are ignored.
     """
@@ -40,12 +44,14 @@ class LinkStats:
     unknown: int = 0
     bad_signature: int = 0
     ignored_foreign: int = 0
+    unclaimed: int = 0
     non_finite: int = 0
     outdated: int = 0
     malformed: int = 0
     sent: int = 0
     not_sent: int = 0
     reconnects: int = 0
+    peers: int = 0
     by_message: dict[int, int] = field(default_factory=dict)
     foreign_sources: set[tuple[int, int]] = field(default_factory=set)
 

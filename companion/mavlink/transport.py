@@ -6,6 +6,29 @@ from typing import Protocol
 Receive = Callable[[bytes, int], bool]
 """Takes bytes and the `perf_counter_ns` of their arrival; true if a frame in them was accepted."""
 
+
+class Receiver(Protocol):
+    """What a transport hands its bytes to. `PeerRule` says what a claim is."""
+
+    def connect(self, *, streaming: bool) -> None:
+        """Forget a frame that has begun: what comes next is of another connection."""
+
+    def receive(self, data: bytes, received_ns: int) -> bool:
+        """Take bytes of the peer (`Receive`)."""
+
+    def claim(self, data: bytes, received_ns: int, who: str) -> bool:
+        """Take bytes of `who`, who is not the peer; true if that makes it the peer.
+
+        Without a valid claim in them nothing is accepted.
+        """
+
+    def claim_lapsed(self) -> bool:
+        """Whether the peer's claim is so old that another sender may take its place."""
+
+    def stranger(self, who: str) -> None:
+        """Bytes of `who`, which is not among the peers that the endpoint names, were ignored."""
+
+
 Lost = Callable[[str], None]
 """Takes the reason why the connection is gone."""
 

@@ -7,11 +7,13 @@ import logging
 import socket
 import struct
 import time
+from typing import Any
 
 from companion.mavlink.endpoint import UdpIn, UdpOut
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.transport import Receive
+from companion.mavlink.named_peers import NamedPeers, resolve, spelled
+from companion.mavlink.transport import Receiver
 
 _LOG = logging.getLogger(__name__)
 
@@ -24,7 +26,7 @@ _BURST = 32  # datagrams read before other work of the loop has its turn
 _PEER_SILENCE_S = 2.0  # then a vehicle at another address may take the place of a silent one
 
 
-async def open_udp(endpoint: UdpIn | UdpOut, receive: Receive) -> "UdpTransport":
+async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
     """Open a UDP endpoint.
 
     Raises:
@@ -39,16 +41,19 @@ async def open_udp(endpoint: UdpIn | UdpOut, receive: Receive) -> "UdpTransport"
             "IP address"
         ) from error
     family, _, _, _, address = found[0]
-    return UdpTransport(endpoint, family, address, receive)
+    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), socket.SOCK_DGRAM)
+    return UdpTransport(endpoint, family, address, receiver, named)
 
 
 class UdpTransport:
     """A socket that talks to one peer.
 
-    A listening socket connects itself to the first sender whose datagram held an accepted frame:
-    the kernel then finds the way faster (about 8 us of a round trip) and drops strangers. When
-    that peer has been silent for 2 s the socket is opened afresh, so that a vehicle which comes
-    back from another port is heard. Refusals by ICMP (vehicle not up yet) are no reason to stop.
+    A listening socket connects itself to the first sender that makes a valid claim (`PeerRule`):
+    the kernel then finds the way faster (about 8 us of a round trip) and drops strangers. What
+    strangers sent before that is still in the kernel's queue, so the source of each datagram is
+    checked. When the peer has been silent for 2 s, or its claim has lapsed, the socket is opened
+    afresh, so that a vehicle which comes back from another port is heard. Refusals by ICMP
+    (vehicle not up yet) are no reason to stop.
 
     A datagram counts as received when the kernel took it from the network, not when we came to read
     it: latency is then honest where this process woke up late.
@@ -64,13 +69,15 @@ class UdpTransport:
         endpoint: UdpIn | UdpOut,
         family: socket.AddressFamily,
         address: tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes],
-        receive: Receive,
+        receiver: Receiver,
+        named: NamedPeers,
     ) -> None:
         self._endpoint, self._family, self._address = endpoint, family, address
-        self._receive = receive
+        self._receiver, self._named = receiver, named
         self._loop = asyncio.get_running_loop()
         self._heard = False
         self._connected = False
+        self._peer: Any = None
         self._socket = self._open()
         bound = self._socket.getsockname()
         self.local: tuple[str, int] = bound[:2]
@@ -92,6 +99,7 @@ class UdpTransport:
             opened.close()
             raise EndpointError(_why(self._endpoint, error)) from error
         self._connected = isinstance(self._endpoint, UdpOut)
+        self._peer = opened.getpeername() if self._connected else None
         watch(self._loop, opened.fileno(), self._read)
         return opened
 
@@ -99,20 +107,23 @@ class UdpTransport:
         if not self._connected:
             self._read_first()
             return
-        receive, read = self._receive, self._socket.recvmsg
+        receive, read, peer = self._receiver.receive, self._socket.recvmsg, self._peer
         try:
             for _ in range(_BURST):
-                data, stamps, _, _ = read(_MAX_DATAGRAM, _STAMP_SPACE)
-                if receive(data, _arrival_ns(stamps)):
+                data, stamps, _, address = read(_MAX_DATAGRAM, _STAMP_SPACE)
+                if address == peer and receive(data, _arrival_ns(stamps)):
                     self._heard = True
         except OSError:
             return  # nothing left to read, or an ICMP refusal of something sent before
 
     def _read_first(self) -> None:
         try:
-            data, address = self._socket.recvfrom(_MAX_DATAGRAM)
-            if self._receive(data, time.perf_counter_ns()):
+            data, stamps, _, address = self._socket.recvmsg(_MAX_DATAGRAM, _STAMP_SPACE)
+            if not self._named.admit(address):
+                self._receiver.stranger(spelled(address))
+            elif self._receiver.claim(data, _arrival_ns(stamps), spelled(address)):
                 self._socket.connect(address)
+                self._peer = self._socket.getpeername()
                 self._connected = self._heard = True
         except OSError:
             return
@@ -120,7 +131,9 @@ class UdpTransport:
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(_PEER_SILENCE_S, self._check_peer)
         silent, self._heard = not self._heard, False
-        if silent and self._connected and isinstance(self._endpoint, UdpIn):
+        if not self._connected or isinstance(self._endpoint, UdpOut):
+            return
+        if silent or self._receiver.claim_lapsed():
             # Python cannot disconnect a UDP socket, so a new one is bound.
             self._release()
             try:

@@ -15,7 +15,7 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport import Lost, Receive, Tap, Transport
+from companion.mavlink.transport import Lost, Receiver, Tap, Transport
 from companion.mavsdk_link.transport import MavsdkTransport
 
 _LOG = logging.getLogger(__name__)
@@ -44,7 +44,8 @@ class MavsdkLink(Link):
         if settings.lockstep or settings.signing is not None:
             raise LinkError("MAVSDK can neither fly in lockstep nor sign; use link.backend: direct")
 
-        async def opener(where: Endpoint, receive: Receive, _lost: Lost) -> Transport:
-            return MavsdkTransport(settings, receive, speaks_first=not isinstance(where, UdpIn))
+        async def opener(where: Endpoint, receiver: Receiver, _lost: Lost) -> Transport:
+            speaks_first = not isinstance(where, UdpIn)
+            return MavsdkTransport(settings, receiver.receive, speaks_first=speaks_first)
 
         super().__init__(settings, tap, opener, notice)

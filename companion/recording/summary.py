@@ -143,7 +143,7 @@ class Summary:
 
     def as_json(self) -> str:
         """`as_dict` on one line."""
-        return json.dumps(self.as_dict(), ensure_ascii=False, allow_nan=False)
+        return json.dumps(self.as_dict(), allow_nan=False)
 
 
 def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:

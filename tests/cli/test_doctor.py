@@ -27,6 +27,7 @@ MENDED = {
     "ardupilot": {"GUID_OPTIONS": 9.0, "ATC_ANGLE_BOOST": 0.0, "FS_THR_ENABLE": 1.0},
 }
 PLANE, PX4 = 1, 12
+NO_POSITION_YET = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY")
 
 
 def doctor(capsys, *arguments):
@@ -111,9 +112,10 @@ def test_it_asks_on_a_terminal(capsys, tmp_path, monkeypatch):
 class Neighbour(threading.Thread):
     """Says the same to a port until its block ends."""
 
-    def __init__(self, port, *messages):
+    def __init__(self, port, *messages, signed=False):
         super().__init__(daemon=True)
-        self._frames, self._to = frames_of(*messages), ("127.0.0.1", port)
+        frames = map(signed_frame, messages) if signed else frames_of(*messages)
+        self._frames, self._to = list(frames), ("127.0.0.1", port)
         self._over = threading.Event()
 
     def run(self):
@@ -138,8 +140,14 @@ def far_away(folder, port, **changes):
     return path
 
 
-def beat(kind=2, autopilot=PX4):
-    return dialect.MAVLink_heartbeat_message(kind, autopilot, 29, 0, 3, 3)
+def signed_frame(message):
+    mav = dialect.MAVLink(None, 1, 1)
+    mav.signing.secret_key, mav.signing.sign_outgoing = bytes(32), True
+    return message.pack(mav)
+
+
+def beat(kind=2, autopilot=PX4, armed=0):
+    return dialect.MAVLink_heartbeat_message(kind, autopilot, 29 | armed, 0, 3, 3)
 
 
 def test_a_vehicle_that_cannot_be_flown_and_one_that_is_not_there_are_findings(capsys, tmp_path):
@@ -157,7 +165,8 @@ def test_a_vehicle_that_cannot_be_flown_and_one_that_is_not_there_are_findings(c
         assert words in f"{finding['found']}; {finding['mend']}"
     code, out, _ = doctor(capsys, "--config", config, "--json")
     told, keys = found(out)
-    assert (code, keys) == (1, {"vehicle.heartbeat": "unsafe"})
+    assert (code, told["result"], told["unsafe"]) == (1, "not connected", 0)
+    assert keys == {"vehicle.heartbeat": "not_connected"}
     assert told["findings"][0]["found"].startswith("no heartbeat from system 1 within 0.5 s")
 
 
@@ -168,18 +177,59 @@ def test_a_vehicle_that_does_not_sign_is_told_as_that(capsys, tmp_path):
     with Neighbour(port, beat()):
         code, out, _ = doctor(capsys, "--config", config, "--json")
     told, keys = found(out)
-    assert (code, keys) == (1, {"vehicle.heartbeat": "unsafe", "link.signing": "ineffective"})
-    assert "does not sign its frames" in told["findings"][1]["found"]
+    silent = {"vehicle.heartbeat": "not_connected", "link.signing": "not_connected"}
+    assert (code, keys) == (1, silent)
+    assert "does not sign its frames" in told["findings"][0]["found"]
 
 
-def test_a_vehicle_that_answers_nothing_is_one_sentence(capsys, tmp_path, monkeypatch):
+def test_nothing_connected_is_not_called_unsafe(capsys, tmp_path):
+    code, out, _ = doctor(capsys, "--config", far_away(tmp_path, free_port()))
+    assert code == 1
+    assert "NOT CONNECTED: nothing was judged" in out
+    assert "UNSAFE" not in out
+    assert "hurt" not in out
+
+
+SILENT = {"vehicle.answers": "not_connected"}
+HINTED = {"link.signing": "not_connected", **SILENT}
+
+
+@pytest.mark.parametrize(
+    ("signed", "armed", "expected"),
+    [(False, 0, SILENT), (True, 0, HINTED), (True, 128, {**HINTED, "vehicle.armed": "unsafe"})],
+)
+def test_a_vehicle_that_answers_nothing_is_told_with_its_cause_first(
+    capsys, tmp_path, monkeypatch, signed, armed, expected
+):
+    """One that signs and obeys only what is signed times out; the hint is what mends it."""
     monkeypatch.setattr("companion.mavlink.streams._RETRIES", 0)
     monkeypatch.setattr("companion.mavlink.streams._TIMEOUT_S", 0.1)
     port = free_port()
-    with Neighbour(port, beat()):
-        code, _, err = doctor(capsys, "--config", far_away(tmp_path, port))
-    assert code == 1
-    assert "MAV_CMD_SET_MESSAGE_INTERVAL: no answer" in err
+    with Neighbour(port, beat(armed=armed), signed=signed):
+        config = far_away(tmp_path, port)
+        code, out, _ = doctor(capsys, "--config", config, "--json")
+        told, keys = found(out)
+        assert (code, told["result"], keys) == (1, "not connected", expected)
+        assert [finding["key"] for finding in told["findings"]] == list(expected)
+        answers = next(f for f in told["findings"] if f["key"] == "vehicle.answers")
+        assert "MAV_CMD_SET_MESSAGE_INTERVAL: no answer" in answers["found"]
+        code, out, _ = doctor(capsys, "--config", config)
+        assert ("set link.signing_key_file" in " ".join(out.split())) is signed
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_booting_vehicle_is_not_ready_and_nothing_of_it_is_unsafe(capsys, tmp_path, family):
+    with shipped_vehicle(tmp_path, family, prearm_delay_s=1000.0) as mock:
+        mock.ask({"fault": {"kind": "stop_telemetry", "messages": list(NO_POSITION_YET)}})
+        config = config_file(tmp_path, mock)
+        code, out, _ = doctor(capsys, "--config", config, "--wait", "1", "--json")
+        told, keys = found(out)
+        assert (code, told["result"]) == (1, "not ready")
+        assert set(keys.values()) == {"not_ready"}
+        assert "vehicle.ready" in keys
+        code, out, _ = doctor(capsys, "--config", config, "--wait", "1")
+        assert "NOT READY" in out
+        assert "UNSAFE" not in out
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from companion.config import Config
 from companion.config_file import changed
 from companion.doctor import configuration_checks, link_checks, vehicle_checks
 from companion.doctor.evidence import Company, Evidence, Identity, LinkQuality, SampleTimes
-from companion.doctor.examination import examine, forbidding
+from companion.doctor.examination import examine, forbidding, result
 from companion.doctor.finding import Key
 from companion.doctor.parameter_findings import parameters
 from companion.mavlink.families import family_for
@@ -23,6 +23,7 @@ from companion.mavlink.streams import StreamRate
 from tests.doctor.patients import amiss
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
 PX4, ARDUPILOT = family_for(12, 2), family_for(3, 2)
 QUALITY = LinkQuality(1000, 0, 0, 0, 0, 0.004, 0.001)
 READY = Readiness(prearm_good=True, estimator_flags=0x3FF, position=True, home=True)
@@ -39,6 +40,10 @@ def state(**changes):
         "global_position": GlobalPosition(0.0, 47.0, 8.0),
         "readiness": READY,
         "estimator": SimpleNamespace(flags=0x3FF),
+        "gps_fault": None,
+        "landed": True,
+        "flying": False,
+        "height": 0.1,
     }
     return SimpleNamespace(**told | changes)
 
@@ -171,12 +176,63 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
         ({"battery": Battery(0.0, 16.0, 0.19)}, {Key.BATTERY: UNSAFE}),
         ({"battery_silent": True}, {Key.BATTERY: UNSAFE}),
         ({"failsafe": True}, {Key.FAILSAFE: UNSAFE}),
-        ({"readiness": READY._replace(home=False)}, {Key.READY: INEFFECTIVE}),
+        ({"readiness": READY._replace(home=False)}, {Key.READY: NOT_READY}),
     ],
 )
 def test_the_state_of_the_vehicle(changes, expected):
     evidence = replace(GOOD, state=state(**changes))
     assert amiss(examine(CONFIG, evidence)) == expected
+
+
+BOOTING = Readiness(prearm_good=False, estimator_flags=None, position=False, home=False)
+LOST = READY._replace(prearm_good=False, estimator_flags=0x1)
+SILENT_POSITION = {**GOOD.streams, "LOCAL_POSITION_NED": StreamRate(50.0, 50.0, 0.0)}
+
+
+def without_position(readiness, **changes):
+    streams = {**SILENT_POSITION, **changes}
+    told = state(readiness=readiness, global_position=None)
+    received = {**GOOD.received, "HOME_POSITION": 0}
+    return replace(GOOD, state=told, streams=streams, received=received)
+
+
+@pytest.mark.parametrize("readiness", [BOOTING, LOST])
+def test_a_vehicle_without_a_position_yet_is_not_ready_and_nothing_else(readiness):
+    """Neither its missing position nor its missing home is a fault of the link."""
+    evidence = without_position(readiness)
+    findings = examine(CONFIG, evidence)
+    assert amiss(findings) == {Key.READY: NOT_READY}
+    assert [finding.key for finding in forbidding(CONFIG, findings)] == [Key.READY]
+    assert result(CONFIG, findings) is NOT_READY
+    fenced = changed(CONFIG, {"safety": {"fence_polygon_deg": SQUARE}}, "test")
+    assert amiss(examine(fenced, evidence)) == {Key.READY: NOT_READY, Key.FENCE: NOT_READY}
+
+
+def test_a_position_that_will_never_come_is_not_hidden_by_not_being_ready():
+    """Refused, granted too seldom, or silent although the estimator has one."""
+    for rate in (StreamRate(50.0, 0.0, 0.0, "UNSUPPORTED"), StreamRate(50.0, 5.0, 0.0)):
+        evidence = without_position(BOOTING, LOCAL_POSITION_NED=rate)
+        assert found(link_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
+    evidence = without_position(READY._replace(prearm_good=False))
+    assert found(link_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
+    slow = StreamRate(250.0, 250.0, 3.0)
+    evidence = without_position(BOOTING, ATTITUDE_QUATERNION=slow)
+    assert found(link_checks.streams, evidence) == {"link.min_attitude_rate_hz": UNSAFE}
+
+
+def test_no_remedy_is_to_lower_a_safety_limit():
+    """A rate below its minimum: the link is to be mended, or less asked of it."""
+    slow = {name: StreamRate(50.0, 50.0, 1.0) for name in GOOD.streams}
+    evidence = replace(GOOD, streams=slow)
+    remedies = [
+        finding.mend
+        for finding in link_checks.streams(CONFIG, evidence)
+        if finding.verdict is UNSAFE
+    ]
+    assert len(remedies) == 2
+    for remedy in remedies:
+        assert "raise the link's speed" in remedy
+        assert "limit" not in remedy
 
 
 SQUARE = [(46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999)]

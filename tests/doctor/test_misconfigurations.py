@@ -17,6 +17,7 @@ from companion.mavlink.parameter_survey import survey
 from tests.doctor.patients import FAMILIES, amiss, configured, met, shipped_vehicle
 
 UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
 TO_US = {"direction": "to_companion"}
 
 PARAMETERS = {
@@ -101,7 +102,7 @@ FAULTS = [
         "link.min_position_rate_hz",
         UNSAFE,
     ),
-    ({"kind": "refuse_arming", "reason": "no key"}, "vehicle.ready", INEFFECTIVE),
+    ({"kind": "refuse_arming", "reason": "no key"}, "vehicle.ready", NOT_READY),
     # The last one: the battery stays empty.
     ({"kind": "low_battery", "remaining": 0.1}, "vehicle.battery", UNSAFE),
 ]

@@ -8,9 +8,11 @@ import pytest
 
 from companion.flight.phases import Phase
 from companion.flight.watch import Watch
+from companion.mavlink.roles import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
+PHASE = Phase("connect", "", lambda _: None, 1.0)
 AFTER_A_HEARTBEAT = [0.1, pytest.param(0.35, marks=pytest.mark.slow), 0.7]
 """s; PX4's heartbeats come at whole seconds of vehicle time."""
 
@@ -55,9 +57,10 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         await answer.wait()
 
     rig = SimpleNamespace(
-        lookout=SimpleNamespace(listen=lambda _: None), fresh_heartbeat=fresh_heartbeat
+        lookout=SimpleNamespace(listen=lambda _: None),
+        ground=SimpleNamespace(look=lambda: None),
+        fresh_heartbeat=fresh_heartbeat,
     )
-    phase = Phase("connect", "", lambda _: None, 1.0)  # type: ignore[arg-type, return-value]
 
     async def run():
         watch = Watch(rig, None, lambda: now)
@@ -65,7 +68,7 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         async def comes(at):
             nonlocal now
             now = at
-            watch.on_current_mode(phase)
+            watch.on_current_mode(PHASE)
             await asyncio.sleep(0)
 
         for at in (0.5, 1.0, 1.5):
@@ -78,5 +81,47 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         await asyncio.sleep(0)
         await comes(1.9)
         assert asked == [1.7, 1.9]
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("mode", "failsafe", "taking_over", "goes_on"),
+    [
+        (Role.OFFBOARD, False, False, True),
+        (Role.OFFBOARD, False, True, True),
+        (Role.READY, False, True, True),  # not entered yet, and entered only with a stream
+        (Role.READY, True, True, False),  # its failsafe holds; a setpoint would end that
+        (Role.READY, False, False, False),
+        (Role.LAND, True, True, False),
+    ],
+)
+def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking_over, goes_on):
+    """After a stall one that waited to be read says what was, and looks new."""
+    resumed, answer = [], asyncio.Event()
+    loop = SimpleNamespace(
+        held_back=True, guarded=False, taking_over=taking_over, resume=lambda: resumed.append(1)
+    )
+    state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False)
+    family = SimpleNamespace(roles=lambda mode: frozenset({mode}))
+    rig = SimpleNamespace(
+        lookout=SimpleNamespace(listen=lambda _: None),
+        ground=SimpleNamespace(look=lambda: None),
+        loop=loop,
+        link=SimpleNamespace(state=state, family=family),
+        fresh_heartbeat=answer.wait,
+    )
+
+    async def run():
+        watch = Watch(rig, None, lambda: 0.0)
+        watch.ask_mode()
+        await asyncio.sleep(0)
+        watch.on_heartbeat(PHASE)  # the one that waited to be read
+        assert resumed == []
+        state.mode, state.failsafe = mode, failsafe
+        answer.set()
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert bool(resumed) is goes_on
 
     asyncio.run(run())

@@ -19,8 +19,8 @@ AUTOPILOTS = ("px4", "ardupilot")
 PILOTED = {"px4": "POSCTL", "ardupilot": "LOITER"}
 """What the pilot's mode is called."""
 PHASES = ("stream", "takeoff", "offboard", "programme", "hand back", "land")
-AFTER = dict(zip(PHASES, (0.0, 0.8, 0.3, 0.3, 0.02, 0.3), strict=True))
-"""How long after the phase began the fault does, s."""
+AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.02, 0.3), strict=True))
+"""How long after the phase began the fault does, s; offboard begins with a judgement of 1 s."""
 
 GROUND, OK, LANDED, HELD, PILOT = "ground", "ok", "landed", "held", "pilot"
 """ground: never left it. ok: as if nothing were. landed: we landed it, and say why. held: the

@@ -163,12 +163,13 @@ def test_a_mild_fault_is_flown_through_and_counted(tmp_path, fault):
 
 
 def test_refused_arming_says_why(tmp_path):
+    """It was ready at the checks; its pre-arm checks fail before we arm, so we do not try."""
     refusal = {"kind": "refuse_arming", "reason": "system power unavailable", "at_s": 1.4}
     with mock_vehicle(tmp_path, faults=[refusal]) as mock:
         summary = fly(mock, tmp_path / "log")
         assert not mock.state()["armed"]
     assert summary.phase == "arm"
-    assert "MAV_CMD_COMPONENT_ARM_DISARM was refused" in summary.result
+    assert "not ready to be armed, it lacks the autopilot's pre-arm checks" in summary.result
 
 
 def test_a_vehicle_that_never_gets_ready_is_left_alone(tmp_path):

@@ -48,13 +48,15 @@ class Bench:
         self.now = 10.0
         self.hover = HoverSpy()
         self.loop = SimpleNamespace(command=None, guarded=True, resets=EstimatorResets())
-        self.state = SimpleNamespace(position=None, landed=False, battery=None)
+        self.state = SimpleNamespace(position=None, battery=None)
+        self.ground = SimpleNamespace(standing=False, may_idle=True)
         self.guide = Guide(
             self.loop,
             linear_guidance(Config()),
             motion_estimate(Config()),
             self.hover,
             self.state,
+            self.ground,
             FlightTrace(),
             max_tilt=radians(30.0),
             period=0.02,
@@ -114,7 +116,7 @@ def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
     """A compass or GPS that settles before take-off tells where the vehicle really stands."""
     bench = Bench()
     bench.loop.resets.turn, bench.loop.resets.shift = 0.5, (3.0, 0.0, 0.0)
-    bench.state.landed = True
+    bench.ground.standing = True
     bench.fly(IN_HOLD)
     assert bench.loop.resets.turn == 0.5  # in control "landed" is not believed
     bench.loop.guarded = False

@@ -145,9 +145,11 @@ def test_battery(bench):
 
 
 def test_prearm_check_comes_with_sys_status(bench):
-    assert bench.state.prearm_good is None
-    assert bench.take(sys_status(0, 0, 0x10000000)).prearm_good is True
-    assert bench.take(sys_status(0, 0, 0)).prearm_good is False
+    assert bench.state.readiness.prearm_good is None
+    assert bench.take(sys_status(0, 0, 0x10000000)).readiness.prearm_good is True
+    assert bench.take(sys_status(0, 0, 0)).readiness.prearm_good is False
+    bench.now += 5.1
+    assert bench.state.readiness.prearm_good is None
 
 
 def test_landed_gps_home_estimator(bench):

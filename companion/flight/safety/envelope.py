@@ -1,8 +1,8 @@
 """Whether the vehicle moves as it was meant to: tilt, rates, speed, course, thrust."""
 
-from math import acos, degrees, hypot
+from math import degrees, hypot
 
-from companion.attitude.kinematics import cos_tilt
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.safety.monitor import Judge, released
 from companion.flight.safety.snapshot import Snapshot
 
@@ -14,7 +14,7 @@ def tilt(limit: float) -> Judge:
         q = snapshot.motion.q
         if q is None:
             return None
-        lean = acos(max(-1.0, min(1.0, cos_tilt(q[1], q[2]))))
+        lean = tilt_angle(q[1], q[2])
         return f"{degrees(lean):.0f}° of tilt" if lean > released(limit, raised) else None
 
     return judge

@@ -4,10 +4,8 @@ from math import degrees
 
 from companion.flight.safety.monitor import Judge
 from companion.flight.safety.snapshot import Snapshot
-from companion.mavlink.records import outdated
+from companion.mavlink.records import gps_fault, outdated
 
-GPS_FIX_3D = 3
-"""Of GPS_FIX_TYPE, this and above."""
 ATTITUDE, VELOCITY = 0x1, 0x2 | 0x4
 HORIZONTAL = 0x8 | 0x10
 """Of ESTIMATOR_STATUS_FLAGS: either of these two tells a horizontal position."""
@@ -15,12 +13,7 @@ HORIZONTAL = 0x8 | 0x10
 
 def gps(snapshot: Snapshot, _: bool) -> str | None:
     """A vehicle that flew by GPS has lost it, or does not tell of it any more."""
-    fix = snapshot.autopilot.gps
-    if not snapshot.had_gps or fix is None:
-        return None
-    if outdated(fix.received, snapshot.now):
-        return "GPS is not reported any more"
-    return "GPS position lost" if fix.fix_type < GPS_FIX_3D else None
+    return gps_fault(snapshot.autopilot.gps, snapshot.now) if snapshot.had_gps else None
 
 
 def flags(snapshot: Snapshot, _: bool) -> str | None:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from companion.attitude.representation import wrap_angle
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
-from companion.flight.safety.estimate import GPS_FIX_3D
 from companion.flight.safety.snapshot import (
     Autopilot,
     Control,
@@ -65,7 +64,6 @@ class Lookout:
         self._began_at = 0.0
         self._turn = 0.0
         self._shift: Vector = (0.0, 0.0, 0.0)
-        self._had_gps = False
         self._good_flags = 0
 
     def begin(self, now: float) -> None:
@@ -81,8 +79,7 @@ class Lookout:
 
     def listen(self, now: float) -> None:
         """Note what is heard, and count; at every look, whatever the phase."""
-        stats, loop, gps = self._link.stats, self._loop, self._link.state.gps
-        self._had_gps = self._had_gps or (gps is not None and gps.fix_type >= GPS_FIX_3D)
+        stats, loop = self._link.stats, self._loop
         if stats.frames != self._frames:
             self._frames, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)
@@ -122,7 +119,7 @@ class Lookout:
             ),
             self._health(),
             self._resets(now),
-            self._had_gps,
+            state.gps_was_good,
             self._good_flags,
         )
 

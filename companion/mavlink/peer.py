@@ -1,0 +1,92 @@
+"""Who the peer is: what makes a sender the peer, how long it stays so, how often it changed."""
+
+from collections.abc import Callable
+
+from companion.mavlink.framing import Frame
+from companion.mavlink.settings import MAV_TYPE_GCS
+from companion.mavlink.stats import LinkStats
+
+PEER_NOTICE = "link.endpoint: "
+"""Each sentence about the peer begins so."""
+
+CLAIM_LASTS_S = 5.0
+"""A heartbeat comes every second. Without one for this long another sender may become the peer."""
+
+_CONTROL_LASTS_S = 2.0
+"""After the last setpoint; until then the peer changes only if it is silent."""
+
+HEARTBEAT = 0
+_TYPE, _AUTOPILOT, _FIELDS = 4, 5, 6  # of a HEARTBEAT payload, which may lack trailing zeros
+_AUTOPILOT_INVALID = 8
+
+
+class PeerRule:
+    """Decides who the peer is.
+
+    A sender becomes the peer by a claim: a HEARTBEAT of the configured system and component that
+    comes from an autopilot (not type GCS, not autopilot INVALID). Where signing is on, or in
+    lockstep, each accepted frame is a claim. On the ground a claim lapses after 5 s; while
+    setpoints are sent, and 2 s longer, it does not.
+
+    Args:
+        stats: Counts the changes.
+        notice: Is told of each change.
+        clock: Loop time, s.
+        every_frame_claims: Signing is on, or vehicle time drives the loop.
+        last_setpoint: Loop time of the last setpoint sent, s.
+    """
+
+    def __init__(
+        self,
+        stats: LinkStats,
+        notice: Callable[[str], None],
+        clock: Callable[[], float],
+        last_setpoint: Callable[[], float],
+        *,
+        every_frame_claims: bool,
+    ) -> None:
+        self._stats, self._notice, self._clock = stats, notice, clock
+        self._last_setpoint = last_setpoint
+        self._every_frame_claims = every_frame_claims
+        self._claimed_at = clock()
+        self._peer: str | None = None
+
+    def is_claim(self, frame: Frame) -> bool:
+        """Whether an accepted frame makes its sender the peer."""
+        if self._every_frame_claims:
+            return True
+        if frame.message_id != HEARTBEAT:
+            return False
+        fields = frame.payload.ljust(_FIELDS, b"\0")
+        return fields[_AUTOPILOT] != _AUTOPILOT_INVALID and fields[_TYPE] != MAV_TYPE_GCS
+
+    def renew(self) -> None:
+        """The peer made its claim again."""
+        self._claimed_at = self._clock()
+
+    def lapsed(self) -> bool:
+        """Whether another sender may become the peer although this one still sends."""
+        if self._every_frame_claims:
+            return False
+        now = self._clock()
+        if now - self._last_setpoint() < _CONTROL_LASTS_S:
+            return False
+        return now - self._claimed_at > CLAIM_LASTS_S
+
+    def fix(self, who: str) -> None:
+        """`who` is the peer from now on."""
+        before, self._peer = self._peer, who
+        self.renew()
+        if before is not None and before != who:
+            self._stats.peers += 1
+            self._notice(
+                f"{PEER_NOTICE}the vehicle's frames now come from {who}, before from {before}; "
+                f"name the vehicle's address if that is not wanted (?peer=ADDRESS)"
+            )
+
+    def ignore(self, who: str) -> None:
+        """`who` sends, and is not among the peers that the endpoint names."""
+        self._notice(
+            f"{PEER_NOTICE}what {who} sends is ignored, as the endpoint names another peer; "
+            "correct ?peer= if that is the vehicle"
+        )

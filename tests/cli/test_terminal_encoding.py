@@ -1,0 +1,109 @@
+"""Terminals that are not UTF-8: every command says what it has to say, in characters they have."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from companion.demo import free_port
+from companion.text_streams import ascii_for
+from tests.cli.test_demo import quick_demo
+
+ASCII = {"PYTHONIOENCODING": "ascii"}
+LATIN = {"PYTHONIOENCODING": "latin-1"}
+C_LOCALE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+
+
+def companion(folder, environment, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "companion", *arguments],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        check=False,
+    )
+
+
+def assert_said(done, code, *words):
+    out = done.stdout + done.stderr
+    assert done.returncode == code, out
+    for sign in (b"internal error", b"Traceback", b"codec"):
+        assert sign not in out
+    for word in words:
+        assert word in out, out
+
+
+@pytest.mark.parametrize(
+    ("text", "readable"),
+    [
+        ("1.5 m/s² at 35° ± 2 µs…", "1.5 m/s^2 at 35 deg +- 2 us..."),
+        ("ċ = p(c_d − c), ω ≤ Ω", "c = p(c_d - c), omega <= Omega"),
+        ("s⁻¹ → √½", "s^-1 -> sqrt1/2"),
+        ("│ ─ ┌ ⠋ Zürich 飛", "| - + * Zurich ?"),
+        ("\udcff", "?"),
+        ("plain \"'\\", "plain \"'\\"),
+    ],
+)
+def test_what_ascii_lacks_is_written_such_that_it_can_be_read(text, readable):
+    assert ascii_for(text) == readable
+
+
+def test_no_character_is_written_as_one_that_would_break_json():
+    for code in (*range(0x80, 0x3100), *range(0xD800, 0xE000), 0x1F600):
+        written = ascii_for(chr(code))
+        assert written.isascii()
+        assert not set(written) & set('"\\')
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        ASCII,
+        pytest.param(LATIN, marks=pytest.mark.slow),
+        pytest.param(C_LOCALE, marks=pytest.mark.slow),
+    ],
+)
+def test_a_good_flight_is_good_on_any_terminal(tmp_path, environment):
+    options = ("--config", quick_demo(tmp_path), "--lockstep", "--programme", "steps")
+    done = companion(tmp_path, environment, "demo", *options)
+    assert_said(done, 0, b"flight ok", b"sample in -> setpoint out", b"landing")
+    assert b"Recorded in" in done.stdout  # to the very end
+    if environment is not LATIN:
+        assert done.stdout.isascii()
+        assert b" us" in done.stdout
+        assert b"?" not in done.stdout
+    (log,) = (tmp_path / "flights").iterdir()
+    assert_said(companion(tmp_path, environment, "identify", "--log", log), 1, b"explained")
+
+
+def test_refusals_are_told_on_any_terminal(tmp_path):
+    (tmp_path / "wrong.yaml").write_text("limits: {max_tilt_deg: 200}\nlink: {größe: °}\n")
+    refused = companion(tmp_path, ASCII, "check-config", "wrong.yaml")
+    assert_said(refused, 2, b"max_tilt_deg", b"gro")
+    assert_said(companion(tmp_path, {}, "check-config", b"\xff\xc3.yaml"), 2, b"cannot read")
+
+
+def test_help_and_the_schema_are_told_on_any_terminal(tmp_path):
+    assert_said(companion(tmp_path, ASCII, "identify", "--help"), 0, b"of tilt")
+    schema = companion(tmp_path, C_LOCALE, "check-config", "--schema")
+    assert_said(schema, 0)
+    json.loads(schema.stdout)
+
+
+def test_the_doctor_is_told_on_any_terminal(tmp_path):
+    (tmp_path / "nobody.yaml").write_text(
+        f"link: {{endpoint: 'udpin://127.0.0.1:{free_port()}'}}\n"
+        "flight: {connect_timeout_s: 0.2}\n"
+    )
+    done = companion(tmp_path, ASCII, "doctor", "--config", "nobody.yaml", "--wait", "0.1")
+    assert_said(done, 1, b"no heartbeat", b"+---")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [("bench", "planner", "--seconds", "0.01"), ("study", "fig2")])
+def test_figures_are_told_on_any_terminal(tmp_path, command):
+    done = companion(tmp_path, ASCII, *command)
+    assert_said(done, 0)
+    assert done.stdout.isascii()
