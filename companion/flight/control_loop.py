@@ -63,9 +63,9 @@ class Deadlines:
 class ControlLoop:
     """Answers each fresh attitude sample with one setpoint; there is no other way to send one.
 
-    While `taking_over` or `guarded` (the autopilot may obey us, or does), a gap in the answers is not silently closed: the
-    autopilot may have left offboard meanwhile, and PX4 would enter it again on our next setpoint.
-    So the loop asks for the mode and waits for `resume`.
+    While `taking_over` or `guarded` (the autopilot may obey us, or does), a gap in the answers is
+    not silently closed: the autopilot may have left offboard meanwhile, and PX4 would enter it
+    again on our next setpoint. So the loop asks for the mode and waits for `resume`.
 
     Attributes:
         command: the newest command; guidance writes it, None means none yet.

@@ -45,10 +45,12 @@ class CurrentMode(NamedTuple):
     Attributes:
         received: Event-loop time, s.
         mode: The mode's name in the words of its family.
+        intended: The mode that its user asked for last; differs where a failsafe acts.
     """
 
     received: float
     mode: str
+    intended: str
 
 
 class LocalPosition(NamedTuple):

@@ -138,6 +138,14 @@ class VehicleState(_Values):
         return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
 
     @property
+    def mode_by_failsafe(self) -> bool:
+        """Whether a failsafe chose the present mode, as far as the autopilot tells."""
+        current = self.current_mode
+        if current is None or self.heartbeat_is_newest:
+            return self.failsafe
+        return self.failsafe or current.mode != current.intended
+
+    @property
     def landed(self) -> bool:
         """Whether the autopilot says that it stands on the ground; unknown is not landed."""
         return self._landed_state() == LANDED_ON_GROUND
@@ -221,8 +229,11 @@ class VehicleState(_Values):
     def _on_current_mode(self, message: Message) -> None:
         if self.family is None:
             return  # what the number means is not known yet
-        mode = self.family.mode_name(self._base_mode, message.custom_mode)
-        self.current_mode = CurrentMode(self._clock(), mode)
+        mode, intended = (
+            self.family.mode_name(self._base_mode, number)
+            for number in (message.custom_mode, message.intended_custom_mode)
+        )
+        self.current_mode = CurrentMode(self._clock(), mode, intended)
         self.heartbeat_is_newest = False
 
     def _on_extended_sys_state(self, message: Message) -> None:

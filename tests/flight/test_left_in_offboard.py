@@ -32,7 +32,7 @@ class Vehicle:
 
     def __init__(self, mode, *, armed=False, meanwhile=lambda _: None, refuses=False):
         self.mode, self.is_armed, self.meanwhile, self.refuses = mode, armed, meanwhile, refuses
-        self.sent, self.notes, self.failsafe, self.detail = 0, [], False, ""
+        self.sent, self.notes, self.mode_by_failsafe, self.detail = 0, [], False, ""
         self.link = self.family = self.state = self
         self.note = self.notes.append
 

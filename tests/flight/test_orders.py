@@ -38,7 +38,7 @@ class Vehicle:
 
     def __init__(self, *answers):
         self.answers = list(answers)
-        self.mode, self.failsafe, self.sent = Role.OFFBOARD, False, 0
+        self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.family = self.state = self
         self.now = 0.0
 

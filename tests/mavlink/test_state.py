@@ -72,6 +72,17 @@ def test_the_mode_is_what_came_last_of_heartbeat_and_current_mode(bench):
     assert bench.state.heartbeat_is_newest
 
 
+def test_a_mode_that_nobody_asked_for_is_a_failsafes(bench):
+    """PX4 tells of the mode before its next heartbeat tells of the failsafe (recorded)."""
+    landing, offboard = 0x06040000, 0x00060000
+    bench.take(px4_heartbeat(offboard, 129))
+    bench.take(development.MAVLink_current_mode_message(0, landing, landing))
+    assert not bench.state.mode_by_failsafe
+    bench.take(development.MAVLink_current_mode_message(0, landing, offboard))
+    assert bench.state.mode_by_failsafe
+    assert not bench.state.failsafe
+
+
 def test_current_mode_does_not_hide_that_ardupilot_obeys_rates(bench):
     bench.take(dialect.MAVLink_heartbeat_message(2, 3, 209, 4, 4, 3))
     bench.take(development.MAVLink_current_mode_message(0, 4, 4))
