@@ -3,7 +3,7 @@
 The defaults fly the bundled vehicle.
 """
 
-from math import hypot, radians, sin, tan
+from math import hypot, radians, sin
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -31,7 +31,6 @@ from companion.config_sections import (
     ThrustConfig,
     VehicleConfig,
 )
-from companion.guidance.reference import GRAVITY
 from companion.yaml_file import Section
 
 _TILT_SHARE = 0.75
@@ -80,10 +79,8 @@ class Config(Section):
 
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
     """What no single section can know: (whether it is wrong, what to say)."""
-    limits, thrust, flight = config.limits, config.thrust, config.flight
-    circle, flown = config.circle, flight.programme
+    limits, thrust, flown = config.limits, config.thrust, config.flight.programme
     tilt = radians(limits.max_tilt_deg)
-    needed = circle.speed_m_s**2 / circle.radius_m + config.guidance.drag_per_s * circle.speed_m_s
     return [
         (
             config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
@@ -98,10 +95,6 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
         ),
         (
-            limits.fence_floor_m > flight.takeoff_height_m - 0.5,
-            "limits.fence_floor_m must be at least 0.5 m below flight.takeoff_height_m",
-        ),
-        (
             "steps" in flown and config.steps.coefficient > sin(tilt),
             "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
         ),
@@ -111,14 +104,6 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             > sin(tilt),
             "√(north² + east²) of corners' coefficients must not exceed the sine of "
             "limits.max_tilt_deg",
-        ),
-        (
-            "circle" in flown and needed > GRAVITY * tan(tilt),
-            "circle.speed_m_s is too fast for circle.radius_m at limits.max_tilt_deg",
-        ),
-        (
-            "circle" in flown and 2.0 * circle.radius_m > limits.fence_radius_m,
-            "the circle (twice circle.radius_m away) leaves limits.fence_radius_m",
         ),
         *(_identify_contradictions(config) if "identify" in flown else ()),
     ]

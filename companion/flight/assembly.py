@@ -18,9 +18,11 @@ from companion.flight.guide import Guide
 from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.preflight import Preflight
+from companion.flight.preparation import SLOWEST_HEARTBEAT
 from companion.flight.programmes import programme
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
+from companion.flight.same_vehicle import SameVehicle
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.inbox import Notice
@@ -189,6 +191,7 @@ class Assembled:
             missed_deadlines=loop.missed_deadlines,
             stale=loop.stale,
             refused=loop.refused,
+            unanswered={reason.value: count for reason, count in loop.unanswered.items()},
             rate_hz=self.rig.rate_hz,
         )
 
@@ -213,13 +216,11 @@ def assemble(
         trace,
         rate_limits(config),
     )
-    # In lockstep there is one clock, and a round trip takes a step however quick the link is.
-    offset = (lambda: 0.0) if config.link.lockstep else lambda: link.timesync.offset_s
     ground = GroundContact(link.state, clock)
     guide = Guide(
         loop,
         linear_guidance(config),
-        motion_estimate(config, offset),
+        motion_estimate(config, lambda: link.clock.offset),
         thrust,
         link.state,
         ground,
@@ -228,20 +229,25 @@ def assemble(
         period=1.0 / config.guidance.rate_hz,
         position_stale=deadman.position_stale_ms * _MS,
         clock=clock,
+        vehicle_clock=link.clock,
     )
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
-    preflight = Preflight(config, link)
-    rig = Rig(config, link, loop, guide, lookout, programme(config), ground, preflight)
+    same_vehicle = SameVehicle(link, SLOWEST_HEARTBEAT)
+    loop.is_same_vehicle = lambda: same_vehicle.same
+    preflight = Preflight(config, link, same_vehicle)
+    rig = Rig(
+        config, link, loop, guide, lookout, programme(config), ground, preflight, same_vehicle
+    )
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     watch = Watch(rig, ladder, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = rig.note = preflight.note = flight.note
+    ladder.note = rig.note = preflight.note = link.clock.on_event = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:
                 flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
             if config.guidance.kind == "nmpc":
                 guide.predictive = predictive(config, part, flight.note)
-    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), offset, flight.note)
+    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
     return Assembled(flight, rig, trace, dead_time_watch)

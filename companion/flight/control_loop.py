@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 from time import perf_counter_ns
 from typing import NamedTuple
 
@@ -17,16 +17,19 @@ from companion.attitude import (
 )
 from companion.attitude.rotation import within_limits
 from companion.flight.estimator_resets import EstimatorResets
-from companion.flight.freshness import SampleClock
+from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.mavlink.samples import AttitudeSample
+from companion.mavlink.vehicle_clock import Misfit
 from companion.recording.trace import FlightTrace
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 
 _LONGEST_STEP = 0.1
 """A planner never integrates over more than this, s."""
+
+_MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 
 
 class Command(NamedTuple):
@@ -75,10 +78,13 @@ class ControlLoop:
         held_back: a gap happened and `resume` has not come yet.
         resets: jumps of the estimate, which the planner does not see.
         ask_mode: called once a gap, when telemetry is back.
+        is_same_vehicle: asked at each sample: whether it is of the vehicle that was checked.
         thrust: as it was last sent, 0..1.
-        last_answer, last_sample, last_newer, last_fresh: when a setpoint last left; when a sample
-            last came; one that was newer than those before; and one that was fresh. s on our clock.
-        samples, setpoints, missed_deadlines, stale, refused: counts since the loop was made.
+        last_answer, last_sample: when a setpoint last left, and when a sample last came, s on our
+            clock.
+        samples, setpoints, missed_deadlines: counts since the loop was made.
+        unanswered: how many samples were not answered, by reason.
+        reason: why the newest sample was not answered, or None.
     """
 
     def __init__(
@@ -98,15 +104,17 @@ class ControlLoop:
         self.resets = EstimatorResets()
         self.thrust = 0.0
         self.ask_mode: Callable[[], None] = lambda: None
-        self.last_answer = self.last_sample = self.last_newer = self.last_fresh = -inf
-        self.samples = self.setpoints = self.missed_deadlines = self.stale = self.refused = 0
+        self.is_same_vehicle: Callable[[], bool] = lambda: True
+        self.last_answer = self.last_sample = -inf
+        self.samples = self.setpoints = self.missed_deadlines = 0
+        self.unanswered = dict.fromkeys(Unanswered, 0)
+        self.reason: Unanswered | None = None
         self._planner = planner
         self._hover_thrust = hover_thrust
         self._send = send
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
-        self._clock = SampleClock()
         self._last_time = -inf
         self._planned_at = -inf
         self._period = 0.0
@@ -123,32 +131,56 @@ class ControlLoop:
 
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. Called by the link as the datagram arrives."""
-        age = self._clock.age(sample.vehicle_time, sample.received)
-        if age is not None and self.resets.on_attitude(sample):
+        if sample.misfit is None and self.resets.on_attitude(sample):
             self.plan_anew()
-        fresh = age is not None and age <= self._deadlines.telemetry_stale
-        dt = self._note_arrival(sample, newer=age is not None, fresh=fresh)
+        dt = self._note_arrival(sample)
         if not self.on:
             return
         self.samples += 1
         command = self.command
-        if (
-            not fresh
-            or command is None
-            or sample.received - command.made_at > self._deadlines.target_stale
-            or self._after_gap(sample.received)
-        ):
-            self.stale += 1
-            return
+        reason: Unanswered | None
+        if not self.is_same_vehicle():
+            reason = Unanswered.ANOTHER_VEHICLE
+        elif sample.misfit is not None:
+            reason = _MISFITS[sample.misfit]
+        elif not sample.age <= self._deadlines.telemetry_stale:
+            reason = Unanswered.LATE
+        elif command is None:
+            reason = Unanswered.NO_TARGET
+        elif sample.received - command.made_at > self._deadlines.target_stale:
+            reason = Unanswered.OLD_TARGET
+        elif self._after_gap(sample.received):
+            reason = Unanswered.AWAITING_MODE
+        else:
+            reason = self._send_answer(sample, command, dt)
+        self.reason = reason
+        if reason is not None:
+            self.unanswered[reason] += 1
+
+    @property
+    def stale(self) -> int:
+        """Samples not answered because they or the target were too old or out of order."""
+        return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
+
+    @property
+    def refused(self) -> int:
+        """Samples not answered because there was no answer, or because it could not leave."""
+        return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)
+
+    def _send_answer(
+        self, sample: AttitudeSample, command: Command, dt: float
+    ) -> Unanswered | None:
+        """Send the answer to a sample; returns why it did not leave, or None."""
         try:
             rates, thrust = self._answer(sample, command, dt)
-            left = self._send(sample.time_boot_ms, rates, thrust)
-        except (AttitudeError, InvalidSetpoint):
-            left = False
-        if not left:
-            self.refused += 1
-            return
+            if not self._send(sample.time_boot_ms, rates, thrust):
+                return Unanswered.NOT_SENT
+        except AttitudeError:
+            return Unanswered.INVALID_ATTITUDE
+        except InvalidSetpoint:
+            return Unanswered.INVALID_SETPOINT
         self._account(sample, command, rates, thrust)
+        return None
 
     def _answer(
         self, sample: AttitudeSample, command: Command, dt: float
@@ -181,14 +213,12 @@ class ControlLoop:
         self._planned_at = sample.vehicle_time
         return self._planner.rates(q, target, since, sample.body_rates)
 
-    def _note_arrival(self, sample: AttitudeSample, *, newer: bool, fresh: bool) -> float:
+    def _note_arrival(self, sample: AttitudeSample) -> float:
         """Keep what the watch asks for; returns the sample period in s."""
-        dt = min(sample.vehicle_time - self._last_time, _LONGEST_STEP)
         self.last_sample = sample.received
-        if newer:
-            self._last_time, self.last_newer = sample.vehicle_time, sample.received
-        if fresh:
-            self.last_fresh = sample.received
+        dt = min(sample.vehicle_time - self._last_time, _LONGEST_STEP)
+        if sample.misfit is None:
+            self._last_time = sample.vehicle_time
         return dt
 
     def _after_gap(self, now: float) -> bool:
@@ -215,7 +245,12 @@ class ControlLoop:
         if self.guarded:
             self._hover_thrust.sent(thrust, sample.q)
             self._trace.add_rates(
-                sample.vehicle_time, sample.received, rates, thrust, sample.body_rates
+                sample.vehicle_time,
+                sample.received,
+                rates,
+                thrust,
+                sample.body_rates,
+                sample.age if sample.age_known else nan,
             )
         if command.is_step:
             self._trace.add_response(sample.vehicle_time, sample.q, command.target)

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable
-from math import inf, nan
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +21,9 @@ _UNSURE = 1.5
 """So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
 _LONGEST = 75_000
 """The measurement at the end is over so many rows at most, the newest: 5 min at 250 Hz."""
-_OFFSETS = 1000
-"""The clocks' offset is kept for so many looks: as long as so many rows take at 40 Hz."""
 _AXES = ("roll", "pitch", "yaw")
-_COMMANDED, _MEASURED = 2, 6
-"""Columns of `FlightTrace.rates` at which roll, pitch and yaw begin."""
+_COMMANDED, _MEASURED, _AGE = 2, 6, 9
+"""Columns of `FlightTrace.rates`: where roll, pitch and yaw begin, twice, and the sample's age."""
 
 
 class RateLoop(NamedTuple):
@@ -52,7 +50,6 @@ class DeadTimeWatch:
     Args:
         trace: the flight's rows.
         rate_loops: of roll, pitch and yaw.
-        clock_offset: vehicle time minus ours in s, None while it is not known.
         note: takes the warning.
     """
 
@@ -60,17 +57,15 @@ class DeadTimeWatch:
         self,
         trace: FlightTrace,
         rate_loops: tuple[RateLoop, RateLoop, RateLoop],
-        clock_offset: Callable[[], float | None],
         note: Callable[[str], None],
     ) -> None:
         self._trace = trace
         self._rate_loops = dict(zip(_AXES, rate_loops, strict=True))
-        self._clock_offset = clock_offset
         self._note = note
         self._due = -inf
         self._looks = 0
-        # At each look: how many rows there were, and the offset until then, s.
-        self._offsets = deque([(0, nan)], maxlen=_OFFSETS)
+        # How many rows there were at each of the latest looks.
+        self._rows = deque([0], maxlen=_LOOKS + 1)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
@@ -88,9 +83,9 @@ class DeadTimeWatch:
             self._note(f"the dead time is watched no more: {internal(error)}")
 
     def _look(self) -> None:
-        self._note_offset()
-        if len(self._offsets) > _LOOKS:
-            first, _ = self._offsets[-1 - _LOOKS]
+        self._rows.append(len(self._trace.rates))
+        if len(self._rows) > _LOOKS:
+            first = self._rows[0]
             name = _AXES[self._looks % len(_AXES)]
             self._looks += 1
             self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
@@ -99,7 +94,8 @@ class DeadTimeWatch:
         """Measure over all that was flown, and warn if that is still to be done."""
         first = max(0, len(self._trace.rates) - _LONGEST)
         rows = self._trace.rates_rows(first)
-        ages = self._ages(rows, first)
+        ages = rows[:, _AGE]
+        ages = ages[np.isfinite(ages)]
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
             SampleAge(*np.percentile(ages, (50, 99)).tolist()) if ages.size else SampleAge(),
@@ -107,24 +103,6 @@ class DeadTimeWatch:
         )
         self._warn(measured)
         return measured
-
-    def _note_offset(self) -> None:
-        """By how much the clocks differed for the samples since the last look."""
-        offset = self._clock_offset()
-        self._offsets.append((len(self._trace.rates), nan if offset is None else offset))
-
-    def _ages(self, rows: NDArray[np.float64], first: int) -> NDArray[np.float64]:
-        """How old the samples were when they arrived, s, where that is known.
-
-        Args:
-            rows: of the flight.
-            first: number of the first of them.
-        """
-        until, offsets = np.array([*self._offsets, (np.inf, nan)]).T
-        look = np.searchsorted(until, first + np.arange(len(rows)), side="right")
-        ages = rows[:, 1] + offsets[look] - rows[:, 0]
-        known: NDArray[np.float64] = ages[np.isfinite(ages)]
-        return known
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """What the rows say of one axis."""

@@ -22,6 +22,7 @@ _ARRIVES = 2.0
 async def takeoff(rig: Rig) -> None:
     """Let the autopilot take off, and wait for the height."""
     state = rig.link.state
+    rig.same_vehicle.commit()
     await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
     await rig.preflight.require(Stage.ARMED)
     await rig.fresh_heartbeat()

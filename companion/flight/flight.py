@@ -8,6 +8,7 @@ from companion.flight.ending import Exit, FlightEnded, internal
 from companion.flight.observer import Observer
 from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
 from companion.flight.rig import Rig
+from companion.flight.same_vehicle import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
 
@@ -15,6 +16,8 @@ AskLanding = Callable[[], Awaitable[bool]]
 
 _WATCH_PERIOD = 0.02
 _TELL_PERIOD = 1.0
+_CHECKED_ANEW = 5
+"""How often a flight may begin anew because another vehicle may have come, before it gives up."""
 
 
 class Flight:
@@ -55,8 +58,7 @@ class Flight:
             for work in (self._rig.guide.run, self._judge, self._tell)
         ]
         try:
-            for phase in self._phases():
-                await self._fly(phase)
+            await self._fly_all()
         except FlightEnded as ended:
             self.failed_in = self.phase
             self.note(ended.reason)
@@ -120,6 +122,25 @@ class Flight:
             judge(self.phase)
         except FlightEnded as ended:
             self.end(ended)
+
+    async def _fly_all(self) -> None:
+        """Run all phases; from the first again if another vehicle may stand there than was checked.
+
+        Raises:
+            FlightEnded: the first failure.
+        """
+        for _ in range(_CHECKED_ANEW):
+            try:
+                for phase in self._phases():
+                    await self._fly(phase)
+            except ChecksVoid as void:
+                self.note(f"{void.reason}; the checks are made anew")
+                self._rig.release()
+                self._rig.link.state.forget()
+                self._end = self._new_end()
+            else:
+                return
+        raise FlightEnded(f"the vehicle changed {_CHECKED_ANEW} times before it was armed")
 
     def _phases(self) -> Iterator[Phase]:
         """All phases, in order; what follows the ground's depends on the autopilot met there."""

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from math import degrees, dist, inf, nan
+from math import degrees, dist, nan
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -26,6 +26,7 @@ from companion.guidance.linear import ReferenceAt
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.state import VehicleState
+from companion.mavlink.vehicle_clock import VehicleClock
 from companion.recording.trace import FlightTrace
 
 _REJOINED = 1.0
@@ -70,6 +71,7 @@ class Guide:
         period: float,
         position_stale: float,
         clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
     ) -> None:
         self.begun_at: float | None = None
         self.pose: Pose | None = None
@@ -90,27 +92,26 @@ class Guide:
         self._period = period
         self._position_stale = position_stale
         self._clock = clock
+        self._vehicle_clock = vehicle_clock
         self._programme: Sequence | None = None
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
-        self._attitude_time = -inf
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Keep an attitude that has a heading, if it is newer than the last."""
-        if is_unit(sample.q) and sample.vehicle_time > self._attitude_time:
-            self._attitude_time = sample.vehicle_time
+        """Keep an attitude that has a heading and fits the vehicle's clock."""
+        if sample.misfit is None and is_unit(sample.q):
             self._q = sample.q
             self.estimate.note_attitude(sample)
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, unless it is stale: nothing came since, or it was long under way.
 
-        The latter is told by the attitude, which the same clock stamped: what lags it by more than
-        the limit is as old, however lately it came.
+        The latter is told by the vehicle's clock, which every attitude sample keeps up to date.
         """
-        position, limit = self._state.position, self._position_stale
-        if position is None or self._clock() - position.received > limit:
+        position, now = self._state.position, self._clock()
+        if position is None or now - position.received > self._position_stale:
             return None
-        return None if self._attitude_time - position.vehicle_time > limit else position
+        age = self._vehicle_clock.age(position.vehicle_time, now)
+        return None if age is not None and age > self._position_stale else position
 
     def stand_by(self) -> None:
         """Hold nothing: idle on the ground, damp the motion in the air."""

@@ -1,7 +1,6 @@
 """What guidance knows of the motion: measured positions, carried on by the measured attitude."""
 
 from collections.abc import Callable
-from math import inf
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
@@ -16,8 +15,6 @@ _LEAST_COSINE = 0.2
 """Of the tilt; beyond 78° the thrust is not what height hold asked for."""
 _LONGEST = 0.2
 """Between two positions, s: further apart they say nothing of what happened between."""
-_OLDEST = 0.1
-"""On its way no sample is longer, s; clocks that say so do not belong together."""
 _WORTH_TELLING = 0.15
 """By so much the drag must be off to be told, 1/s."""
 
@@ -31,8 +28,8 @@ class MotionEstimate:
     Args:
         observer: of position, velocity and disturbance.
         drag: of the vehicle.
-        offset: the vehicle's clock minus ours, s, if it is known: it tells how old a position was
-            when it came.
+        offset: the vehicle's clock minus ours, s, None before the first attitude: it tells how old
+            a position was when it came.
     """
 
     def __init__(
@@ -49,13 +46,11 @@ class MotionEstimate:
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
-        self._ahead = -inf
         self._turn = 0.0
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude; it tells where the thrust points."""
         self._q, self._body_rates = sample.q, sample.body_rates
-        self._ahead = sample.vehicle_time - sample.received
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
@@ -119,16 +114,9 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """Our time `now` as the vehicle's, s.
-
-        Each sample tells by how much its clock is ahead of ours at least: it cannot have come
-        before it was stamped. So a position that came late is known by the newest attitude.
-        """
-        at_least = max(position.vehicle_time - position.received, self._ahead)
+        """Our time `now` as the vehicle's, s."""
         offset = self._offset()
-        if offset is None or not at_least <= offset <= at_least + _OLDEST:
-            return now + at_least
-        return now + offset
+        return now + (position.vehicle_time - position.received if offset is None else offset)
 
     def surprise(self) -> str | None:
         """In words, where the drag is another than the configuration says."""

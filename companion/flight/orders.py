@@ -40,6 +40,7 @@ async def order(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
     """
     for given in range(_TRIES):
         await rig.fresh_heartbeat()
+        rig.same_vehicle.require()
         if given > 0 and done():
             return
         ours()

@@ -11,6 +11,7 @@ from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import FlightEnded
+from companion.flight.same_vehicle import SameVehicle
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.streams import StreamRate
@@ -33,9 +34,9 @@ class Preflight:
         note: takes what is amiss without forbidding a flight, once each.
     """
 
-    def __init__(self, config: Config, link: Link) -> None:
+    def __init__(self, config: Config, link: Link, same_vehicle: SameVehicle) -> None:
         self.note: Callable[[str], None] = lambda _: None
-        self._config, self._link = config, link
+        self._config, self._link, self._same_vehicle = config, link, same_vehicle
         self._clock = asyncio.get_running_loop().time
         self._granted: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
@@ -60,6 +61,7 @@ class Preflight:
         """Judge the vehicle for `stage`; what it was judged by.
 
         Raises:
+            ChecksVoid: it may be another vehicle than was checked.
             FlightEnded: with what forbids the flight.
             LinkLost: the connection dropped meanwhile.
         """
@@ -67,6 +69,8 @@ class Preflight:
         if evidence is None or self._clock() - self._gathered_at > _LASTS:
             evidence = await gather(self._link, self._granted, _COUNTED_FOR, stage=stage)
             self._evidence, self._gathered_at = evidence, self._clock()
+            self._same_vehicle.note_identity(evidence.identity)
+        self._same_vehicle.require()
         self._heed(examine(self._config, replace(evidence, stage=stage)))
         return evidence
 

@@ -6,11 +6,16 @@ from companion.doctor.finding import Finding
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import order
+from companion.flight.programmes import require_inside
 from companion.flight.rig import Rig
 from companion.flight.roles import in_role, in_roles, require_role
+from companion.guidance.fence import Place
 from companion.mavlink.parameter_rules import Values, Verdict
 from companion.mavlink.roles import Role
+from companion.yaml_file import ConfigError
 
+SLOWEST_HEARTBEAT = 3.0
+"""Longest pause between two heartbeats until it is known how often they come, s."""
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
 
@@ -23,6 +28,7 @@ async def connect(rig: Rig) -> None:
 
 async def checks(rig: Rig) -> None:
     """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
+    rig.same_vehicle.begin()
     rig.detail = "asking for telemetry"
     await rig.preflight.ask_for_telemetry()
     await leave_offboard(rig)
@@ -32,9 +38,9 @@ async def checks(rig: Rig) -> None:
     evidence = await rig.preflight.require(Stage.GROUND)
     heartbeats = evidence.streams.get("HEARTBEAT")  # PX4's is not asked for: its rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
-        rig.heartbeat_limit = max(
-            _SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved
-        )
+        limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
+        rig.same_vehicle.heartbeat_limit = limit
+    _require_inside_map(rig)
     _tell_dead_man(rig, evidence.survey.values)
     rig.mode_at_checks = rig.link.state.mode
 
@@ -96,6 +102,7 @@ async def _arm(rig: Rig) -> None:
         require_role(rig.link, {Role.READY})
 
     rig.arm_sent = True
+    rig.same_vehicle.commit()
     await order(rig, command, ready, armed)
     await rig.until(armed, "the vehicle to be armed")
 
@@ -108,6 +115,18 @@ def _untouched(rig: Rig) -> None:
         raise FlightEnded(
             f"the pilot or another station took over before arming: mode {state.mode}"
         )
+
+
+def _require_inside_map(rig: Rig) -> None:
+    """See that all programmes stay inside a fence on the map, which needs the vehicle's place."""
+    told = rig.link.state.global_position
+    if not rig.config.safety.fence_polygon_deg or told is None:
+        return  # without a place the checks have refused already
+    try:
+        place = Place(told.latitude_deg, told.longitude_deg)
+        require_inside(rig.config, rig.programme.parts, place)
+    except ConfigError as error:
+        raise FlightEnded(str(error)) from error
 
 
 def _ready(rig: Rig) -> bool:

@@ -11,6 +11,7 @@ from companion.flight.ground_contact import GroundContact
 from companion.flight.guide import Guide
 from companion.flight.preflight import Preflight
 from companion.flight.safety import Lookout
+from companion.flight.same_vehicle import SameVehicle
 from companion.guidance import Sequence
 from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
@@ -19,8 +20,6 @@ from companion.mavlink.records import LocalPosition
 
 _POLL = 0.02
 """How often a condition is looked at, s; telemetry that changes it is slower."""
-
-_SLOWEST_HEARTBEAT = 3.0
 
 _BACKLOG = 0.5
 """What waited to be read while we stood still has been read so long, s, after we go on."""
@@ -36,8 +35,6 @@ class Rig:
     Attributes:
         detail: what the running phase waits for just now, for the user.
         rate_hz: setpoints a second while the programme was flown.
-        heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
-            from the rate at which heartbeats really come, where a rate was asked for.
         mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
         note: writes down and shows that something happened.
@@ -51,9 +48,9 @@ class Rig:
     programme: Sequence
     ground: GroundContact
     preflight: Preflight
+    same_vehicle: SameVehicle
     detail: str = ""
     rate_hz: float = 0.0
-    heartbeat_limit: float = _SLOWEST_HEARTBEAT
     mode_at_checks: str | None = None
     arm_sent: bool = False
     note: Callable[[str], None] = lambda _: None

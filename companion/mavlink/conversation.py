@@ -17,6 +17,7 @@ from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate, measure, set_rates
 from companion.mavlink.texts import TextAssembler
+from companion.mavlink.vehicle_clock import VehicleClock
 
 
 class Conversation:
@@ -33,6 +34,7 @@ class Conversation:
         router: Brings what was heard.
         stats: As above.
         clock: Event-loop time, s.
+        vehicle_clock: Tells how old a position is.
     """
 
     def __init__(
@@ -42,12 +44,13 @@ class Conversation:
         router: Router,
         stats: LinkStats,
         clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
     ) -> None:
         self.settings, self.stats = settings, stats
         self._outbox, self._router = outbox, router
         self._registry = PendingRegistry()
         texts = TextAssembler()
-        self.state = VehicleState(router, stats, texts, clock)
+        self.state = VehicleState(router, stats, texts, clock, vehicle_clock)
         router.subscribe_raw("EVENT", EventReader(texts, clock).take)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(

@@ -6,6 +6,7 @@ from math import inf
 
 from fastcrc import crc16
 
+from companion.attitude.types import BodyRates, Quaternion
 from companion.mavlink.codec import (
     ATTITUDE_QUATERNION,
     CRC_EXTRA,
@@ -22,6 +23,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Verdict
 from companion.mavlink.stats import LinkStats, SequenceTracker
 from companion.mavlink.transport import Tap
+from companion.mavlink.vehicle_clock import VehicleClock
 
 Notice = Callable[[str], None]
 """Takes a sentence about the link that its user should read."""
@@ -57,6 +59,7 @@ class Inbox:
         router: Takes all but the samples.
         tap: Is shown every frame that is accepted.
         notice: Is told, once each, of what keeps the two sides from understanding each other.
+        clock: The vehicle's; is fed by every sample.
         last_setpoint: Loop time of the last setpoint sent, s.
     """
 
@@ -67,8 +70,10 @@ class Inbox:
         router: Router,
         tap: Tap | None,
         notice: Notice,
+        clock: VehicleClock,
         last_setpoint: Callable[[], float] = lambda: -inf,
     ) -> None:
+        self._clock = clock
         self._source = (settings.target_system, settings.target_component)
         self._signing = settings.signing
         self._stats, self._router, self._tap = stats, router, tap
@@ -156,17 +161,15 @@ class Inbox:
         decoded = decode_attitude(data[10:end])
         if decoded is None:
             return False
-        time_boot_ms, q, rates = decoded
         now = self._loop.time()
         if self._tap is not None:
             self._tap(now, data)
-        if self.on_attitude is not None:
-            try:
-                self.on_attitude(
-                    AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
-                )
-            except Exception as error:
-                self._router.report(error)
+        try:
+            sample = self._sample(decoded, now, received_ns)
+            if self.on_attitude is not None:
+                self.on_attitude(sample)
+        except Exception as error:
+            self._router.report(error)
         self._count(ATTITUDE_QUATERNION, data[4])
         self._router.route(ATTITUDE_QUATERNION, data[10:end])
         return True
@@ -247,8 +250,15 @@ class Inbox:
         if decoded is None:
             self._stats.non_finite += 1
             return None
+        return self._sample(decoded, now, received_ns)
+
+    def _sample(
+        self, decoded: tuple[int, Quaternion, BodyRates], now: float, received_ns: int
+    ) -> AttitudeSample:
         time_boot_ms, q, rates = decoded
-        return AttitudeSample(time_boot_ms, time_boot_ms / 1000.0, now, received_ns, q, rates)
+        time, age, misfit = self._clock.take(time_boot_ms, now)
+        known = self._clock.age_known
+        return AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
 
     def _control(self, sample: AttitudeSample) -> None:
         if self.on_attitude is not None:

@@ -25,6 +25,7 @@ from companion.mavlink.silence import no_beacon, no_heartbeat
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.timesync import TimeSync
 from companion.mavlink.transport import Tap
+from companion.mavlink.vehicle_clock import VehicleClock
 
 _LOG = logging.getLogger(__name__)
 
@@ -45,7 +46,8 @@ class Link(Conversation):
     Attributes:
         stats: Counters.
         state: What is known of the vehicle.
-        timesync: Clock offset, round trip, age of a sample.
+        clock: The vehicle's: how old a sample is, and whether the clock jumped or restarted.
+        timesync: Round trip.
 
     Raises:
         EndpointError: The endpoint's notation is wrong.
@@ -64,9 +66,12 @@ class Link(Conversation):
         self._tasks: list[asyncio.Task[None]] = []
         stats = LinkStats()
         router, outbox = Router(stats), Outbox(settings, stats, tap)
-        super().__init__(settings, outbox, router, stats, self._loop.time)
-        self._inbox = Inbox(settings, stats, router, tap, notice, lambda: outbox.setpoint_at)
-        self.timesync = TimeSync(outbox, router, self._loop.time)
+        self.clock = VehicleClock(lockstep=settings.lockstep)
+        super().__init__(settings, outbox, router, stats, self._loop.time, self.clock)
+        self._inbox = Inbox(
+            settings, stats, router, tap, notice, self.clock, lambda: outbox.setpoint_at
+        )
+        self.timesync = TimeSync(outbox, router, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
@@ -87,7 +92,7 @@ class Link(Conversation):
             await self.__aexit__()
             raise
         self._start(send_heartbeats(self.settings, self._outbox))
-        self._start(synchronise(self.timesync))
+        self._start(synchronise(self.timesync, self.clock))
         return self
 
     async def __aexit__(self, *_: object) -> None:

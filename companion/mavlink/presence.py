@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.timesync import TimeSync
+from companion.mavlink.vehicle_clock import VehicleClock
 
 _MAV_AUTOPILOT_INVALID = 8
 _MAV_STATE_ACTIVE = 4
@@ -36,11 +37,13 @@ async def send_heartbeats(settings: LinkSettings, outbox: Outbox) -> None:
         await asyncio.sleep(1.0 / settings.heartbeat_rate_hz)
 
 
-async def synchronise(timesync: TimeSync) -> None:
+async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
     """Ask for the vehicle's time until cancelled."""
+    now = asyncio.get_running_loop().time
     for _ in range(_QUICK_REQUESTS):
         timesync.ask()
         await asyncio.sleep(_QUICK_PERIOD_S)
     while True:
         timesync.ask()
         await asyncio.sleep(_PERIOD_S)
+        clock.look(now())

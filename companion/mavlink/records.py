@@ -58,7 +58,7 @@ class LocalPosition(NamedTuple):
 
     Attributes:
         received: Event-loop time, s.
-        vehicle_time: The vehicle's time stamp, s since boot.
+        vehicle_time: The vehicle's time stamp, s, on the clock of `AttitudeSample.vehicle_time`.
         position_ned: m.
         velocity_ned: m/s.
     """

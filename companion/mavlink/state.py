@@ -1,7 +1,7 @@
 """What is known of the vehicle, from its telemetry. Values that are not finite are never kept."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import inf, isfinite
 
 from companion.mavlink.codec import Message
@@ -29,6 +29,7 @@ from companion.mavlink.records import (
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
+from companion.mavlink.vehicle_clock import VehicleClock
 
 _ARMED = 128
 _UNKNOWN_U16 = 65535
@@ -36,11 +37,6 @@ _AUTOPILOT_INVALID = 8
 _STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
 _UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
-
-_BOOT_TAKES = 2.0
-"""An autopilot that starts anew says nothing of its position for so long, s."""
-_LATEST_COPY = 5.0
-"""What another path brings is not later than this, s; time stamps further back are a new boot's."""
 
 
 @dataclass
@@ -86,10 +82,16 @@ class VehicleState(_Values):
     """
 
     def __init__(
-        self, router: Router, stats: LinkStats, texts: TextAssembler, clock: Callable[[], float]
+        self,
+        router: Router,
+        stats: LinkStats,
+        texts: TextAssembler,
+        clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
     ) -> None:
         super().__init__()
         self._stats, self._assembler, self._clock = stats, texts, clock
+        self._vehicle_clock = vehicle_clock
         self.texts = texts.texts
         self.heartbeat_is_newest = True
         self._base_mode = 0
@@ -112,6 +114,12 @@ class VehicleState(_Values):
             "STATUSTEXT": self._on_text,
         }.items():
             router.subscribe(name, callback)
+
+    def forget(self) -> None:
+        """Know nothing but the newest heartbeat: another vehicle may have told the rest."""
+        fresh = _Values(heartbeat=self.heartbeat)
+        for field in fields(_Values):
+            setattr(self, field.name, getattr(fresh, field.name))
 
     @property
     def mode(self) -> str | None:
@@ -248,19 +256,18 @@ class VehicleState(_Values):
         if not all(map(isfinite, values)):
             self._stats.non_finite += 1
             return
-        now, stamp = self._clock(), message.time_boot_ms / 1000.0
-        if self._is_outdated(stamp, now):
+        clock, now, last = self._vehicle_clock, self._clock(), self.position
+        stamp = clock.vehicle_time(message.time_boot_ms)
+        if clock.is_ahead(stamp, now):
+            self._stats.stamped_ahead += 1
+        elif (
+            last is not None
+            and stamp <= last.vehicle_time
+            and not clock.is_ahead(last.vehicle_time, now)  # it came before the clock was known
+        ):
             self._stats.outdated += 1
-            return
-        self.position = LocalPosition(now, stamp, values[:3], values[3:])
-
-    def _is_outdated(self, stamp: float, now: float) -> bool:
-        """Whether a position stamped so, s since boot, is no news; after a new boot it is."""
-        last = self.position
-        if last is None or stamp > last.vehicle_time:
-            return False
-        booted = last.vehicle_time - stamp > _LATEST_COPY and now - last.received > _BOOT_TAKES
-        return not booted
+        else:
+            self.position = LocalPosition(now, stamp, values[:3], values[3:])
 
     def _on_sys_status(self, message: Message) -> None:
         millivolts = message.voltage_battery

@@ -26,6 +26,7 @@ class LinkStats:
         unclaimed: With the vehicle's ids, from a sender that is not the peer (see `peer.PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
+        stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages whose fields make no sense.
         sent: Handed to the kernel.
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
@@ -47,6 +48,7 @@ class LinkStats:
     unclaimed: int = 0
     non_finite: int = 0
     outdated: int = 0
+    stamped_ahead: int = 0
     malformed: int = 0
     sent: int = 0
     not_sent: int = 0

@@ -1,4 +1,4 @@
-"""TIMESYNC: how the vehicle's clock stands to ours. Source: the MAVLink time synchronisation."""
+"""TIMESYNC: asking what the vehicle's clock says. Source: the MAVLink time synchronisation."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,49 +9,50 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.mavlink.codec import Message
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.router import Router
+from companion.mavlink.telemetry_delay import LIFETIME
+from companion.mavlink.vehicle_clock import VehicleClock
 
-_WINDOW = 16  # exchanges; the quickest of them had the least queueing, so it is believed
+_WINDOW = 16
 _NS = 1e-9
 
 
 class _Exchange(NamedTuple):
     round_trip_s: float
-    offset_s: float
+    at: float
 
 
 class TimeSync:
-    """Estimates the offset of the two clocks, and answers the vehicle's own requests.
+    """Asks for the vehicle's time for `VehicleClock`, and answers the vehicle's own requests.
 
     Args:
+        outbox: Takes what is sent.
+        router: Brings TIMESYNC.
         clock: Our time in s (the event loop's).
+        vehicle_clock: Takes each exchange.
     """
 
-    def __init__(self, outbox: Outbox, router: Router, clock: Callable[[], float]) -> None:
-        self._outbox, self._clock = outbox, clock
+    def __init__(
+        self,
+        outbox: Outbox,
+        router: Router,
+        clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
+    ) -> None:
+        self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
         self._asked: deque[int] = deque(maxlen=_WINDOW)
         self._exchanges: deque[_Exchange] = deque(maxlen=_WINDOW)
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
-    def offset_s(self) -> float | None:
-        """Vehicle time minus ours, s; `None` before the first answer."""
-        return min(self._exchanges).offset_s if self._exchanges else None
-
-    @property
     def round_trip_s(self) -> float | None:
-        """The shortest round trip of late, s; it bounds the offset's error to half of it."""
-        return min(self._exchanges).round_trip_s if self._exchanges else None
+        """The shortest round trip of late, s; `None` where none was answered of late."""
+        return min(self._round_trips(), default=None)
 
     @property
     def jitter_s(self) -> float | None:
-        """By how much the round trips of late differ, s; `None` before the first answer."""
-        trips = [exchange.round_trip_s for exchange in self._exchanges]
+        """By how much the round trips of late differ, s; `None` where none was answered."""
+        trips = self._round_trips()
         return max(trips) - min(trips) if trips else None
-
-    def sample_age(self, time_boot_ms: int) -> float | None:
-        """How long ago the vehicle stamped `time_boot_ms`, s; `None` before the first answer."""
-        offset = self.offset_s
-        return None if offset is None else self._clock() + offset - time_boot_ms / 1000.0
 
     def ask(self) -> None:
         """Send one request."""
@@ -70,8 +71,12 @@ class TimeSync:
             self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
         elif message.ts1 in self._asked:  # anything else answers another station
             self._asked.remove(message.ts1)
-            offset_ns = message.tc1 - (message.ts1 + now) // 2
-            self._exchanges.append(_Exchange((now - message.ts1) * _NS, offset_ns * _NS))
+            self._exchanges.append(_Exchange((now - message.ts1) * _NS, now * _NS))
+            self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
+
+    def _round_trips(self) -> list[float]:
+        oldest = self._clock() - LIFETIME
+        return [each.round_trip_s for each in self._exchanges if each.at >= oldest]
 
     def _now_ns(self) -> int:
         # Never 0: a zero in tc1 marks a request.

@@ -23,7 +23,8 @@ class LoopCounts:
         setpoints: setpoints sent.
         missed_deadlines: answers that took longer than `deadman.deadline_ms`.
         stale: samples not answered because they or the target were too old, or out of order.
-        refused: samples not answered because they could not be used.
+        refused: samples not answered because they could not be used or the answer could not leave.
+        unanswered: all samples that were not answered, by reason.
         rate_hz: setpoints a second of vehicle time, over the programme.
     """
 
@@ -33,6 +34,7 @@ class LoopCounts:
     stale: int = 0
     refused: int = 0
     rate_hz: float = 0.0
+    unanswered: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +131,7 @@ class Summary:
             "missed_deadlines": self.counts.missed_deadlines,
             "stale": self.counts.stale,
             "refused": self.counts.refused,
+            "unanswered": self.counts.unanswered,
             "rate_hz": self.counts.rate_hz,
             "latency_us": _without_nan(self.latency_us()),
             "response": _response_as_dict(self.response()),

@@ -23,6 +23,7 @@ _RATES = (
     *(f"commanded_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")),
     "thrust",
     *(f"measured_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")),
+    "age_s",
 )
 
 
@@ -37,8 +38,8 @@ class FlightTrace:
         response: (vehicle time s, w, x, y, z, target north, target east), of steps only.
         tracking: (vehicle time s, reference north, east, down, measured north, east, down).
         rates: (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
-            rad/s, thrust 0..1, measured roll, pitch, yaw rad/s), while the autopilot obeys us,
-            for all that its heartbeats tell.
+            rad/s, thrust 0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while
+            the autopilot obeys us, for all that its heartbeats tell.
         latencies_ns: sample in → setpoint out inside this process, ns.
     """
 
@@ -69,9 +70,10 @@ class FlightTrace:
         commanded: BodyRates,
         thrust: float,
         measured: BodyRates,
+        age: float,
     ) -> None:
-        """Note what was answered to a sample, and the rates that the sample told."""
-        self.rates.add([vehicle_time, received, *commanded, thrust, *measured])
+        """Note what was answered to a sample, the rates it told, and its age (NaN: unknown)."""
+        self.rates.add([vehicle_time, received, *commanded, thrust, *measured, age])
 
     def add_latency(self, nanoseconds: int) -> None:
         """Note how long one answer took."""
@@ -109,5 +111,5 @@ class FlightTrace:
         return self.tracking.rows()
 
     def rates_rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, 9), as `rates`, from row `since` of all that were noted on."""
+        """(N, 10), as `rates`, from row `since` of all that were noted on."""
         return self.rates.rows(since)

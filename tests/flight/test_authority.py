@@ -383,13 +383,16 @@ def test_the_pilot_takes_over_during_the_takeoff(tmp_path):
 
 
 def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold(tmp_path):
-    """PX4 goes back to OFFBOARD when it disarms, where it never is ready to be armed again."""
-    with mock_vehicle(tmp_path) as mock:
+    """PX4 goes back to OFFBOARD when it disarms, where it never is ready to be armed again.
+
+    In still air it would stay inside the fence: open-loop steps know nothing of the wind.
+    """
+    with mock_vehicle(tmp_path, wind={"speed_m_s": 5.0}) as mock:
         summary = fly(
             mock,
             tmp_path / "log",
             flight={"programme": ["steps"]},
-            limits={"fence_radius_m": 0.8},
+            limits={"fence_radius_m": 5.0},
         )
         state = mock.state()
     assert "beyond limits.fence_radius_m" in summary.result

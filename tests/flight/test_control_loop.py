@@ -7,10 +7,11 @@ import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.flight.control_loop import Command, ControlLoop, Deadlines
-from companion.flight.freshness import SampleClock
+from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.samples import AttitudeSample
+from companion.mavlink.vehicle_clock import VehicleClock
 from companion.recording.trace import FlightTrace
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -22,7 +23,7 @@ class Bench:
     """A loop with its setpoints caught, and samples every 4 ms."""
 
     def __init__(self, planner=None, send=None):
-        self.sent = []
+        self.sent, self.clock = [], VehicleClock()
         self.connected = True
         self.asked = 0
         self.time = 10.0
@@ -52,14 +53,18 @@ class Bench:
     def sample(self, vehicle_time=None, q=LEVEL, late=0.0, lead=0):
         """One sample; `vehicle_time` is ours less 7 s unless told otherwise."""
         stamp = self.time - 7.0 if vehicle_time is None else vehicle_time
+        stamp_ms, received = round(stamp * 1000), self.time + late
+        reading = self.clock.take(stamp_ms, received)
         self.loop.on_sample(
             AttitudeSample(
-                round(stamp * 1000),
-                stamp,
-                self.time + late,
+                stamp_ms,
+                reading.vehicle_time,
+                received,
                 perf_counter_ns() - lead,
                 q,
                 BodyRates(0.0, 0.0, 0.0),
+                reading.age,
+                reading.misfit,
             )
         )
 
@@ -200,15 +205,42 @@ def test_a_late_answer_counts_as_a_missed_deadline():
     assert bench.loop.missed_deadlines == 2
 
 
-def test_sample_clock_ages_against_the_quickest_and_forgives_drift():
-    clock = SampleClock()
-    assert clock.age(1.0, 100.0) == 0.0
-    assert clock.age(1.01, 100.03) == pytest.approx(0.02, abs=1e-5)
-    assert clock.age(1.01, 100.04) is None
-    assert clock.age(1.005, 100.05) is None
-    for second in range(2, 3600):  # a vehicle clock that loses 50 ppm
-        age = clock.age(second * (1 - 5e-5), 99.0 + second)
-    assert age == pytest.approx(0.0, abs=1e-3)
+def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
+    bench = Bench()
+    bench.loop.guarded = True
+    bench.run(10)
+    bench.sample()
+    bench.time += 0.004
+    bench.sample(vehicle_time=99.0)
+    bench.sample(late=0.12)
+    bench.time += 0.2
+    bench.sample()
+    bench.refresh()
+    bench.time += 0.004
+    bench.sample()
+    bench.loop.resume()
+    bench.run(1, q=(0.0, 0.0, 0.0, 0.0))
+    bench.connected = False
+    bench.run(2)
+    bench.loop.command = None
+    bench.time += 0.004
+    bench.sample()
+    counted = {reason: n for reason, n in bench.loop.unanswered.items() if n}
+    assert counted == {
+        Unanswered.NOT_NEWER: 1,
+        Unanswered.AHEAD: 1,
+        Unanswered.LATE: 1,
+        Unanswered.OLD_TARGET: 1,
+        Unanswered.AWAITING_MODE: 1,
+        Unanswered.INVALID_ATTITUDE: 1,
+        Unanswered.NOT_SENT: 2,
+        Unanswered.NO_TARGET: 1,
+    }
+    loop = bench.loop
+    assert (loop.stale, loop.refused) == (6, 3)
+    assert loop.samples == loop.setpoints + loop.stale + loop.refused
+    assert loop.reason is Unanswered.NO_TARGET
+    assert all(reason.words for reason in Unanswered)
 
 
 ASKED = BodyRates(0.3, -0.4, 0.5)

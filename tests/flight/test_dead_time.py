@@ -21,9 +21,9 @@ TILT, YAW = RateLoop(LAG, 0.04), RateLoop(0.1, 0.08)
 class Bench:
     """A watch and its flight's rows; the vehicle's clock is 7 s behind ours."""
 
-    def __init__(self, tilt=TILT, yaw=YAW, offset=-7.0):
+    def __init__(self, tilt=TILT, yaw=YAW):
         self.trace, self.notes, self.now = FlightTrace(), [], 0.0
-        self.watch = DeadTimeWatch(self.trace, (tilt, tilt, yaw), lambda: offset, self.note)
+        self.watch = DeadTimeWatch(self.trace, (tilt, tilt, yaw), self.note)
 
     def note(self, text):
         self.notes.append((self.now, text))
@@ -33,8 +33,9 @@ class Bench:
         ages = np.broadcast_to(age, len(commanded)).tolist()
         for asked, got, old in zip(commanded.tolist(), measured.tolist(), ages, strict=True):
             self.now += PERIOD
-            stamp = self.now - 7.0 - old
-            self.trace.add_rates(stamp, self.now, BodyRates(*asked), 0.5, BodyRates(*got))
+            stamp = self.now - 7.0 - np.nan_to_num(old)
+            rates = BodyRates(*asked), 0.5, BodyRates(*got)
+            self.trace.add_rates(stamp, self.now, *rates, old)
             self.watch.after_answer(self.now)
 
 
@@ -150,8 +151,8 @@ def test_the_age_of_samples_is_that_of_their_arrival():
 
 def test_without_timesync_no_age_is_told():
     still = np.zeros((2000, 3))
-    bench = Bench(offset=None)
-    bench.fly(still, still)
+    bench = Bench()
+    bench.fly(still, still, math.nan)
     assert all(math.isnan(value) for value in bench.watch.over_the_flight().sample_age)
 
 

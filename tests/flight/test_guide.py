@@ -13,6 +13,7 @@ from companion.flight.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
+from companion.mavlink.vehicle_clock import VehicleClock
 from companion.recording.trace import FlightTrace
 
 DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
@@ -45,7 +46,7 @@ class Bench:
     """A guide that flies the doublets, its clock set by hand."""
 
     def __init__(self):
-        self.now = 10.0
+        self.now, self.clock = 10.0, VehicleClock()
         self.hover = HoverSpy()
         self.loop = SimpleNamespace(command=None, guarded=True, resets=EstimatorResets())
         self.state = SimpleNamespace(position=None, battery=None)
@@ -62,6 +63,7 @@ class Bench:
             period=0.02,
             position_stale=0.3,
             clock=lambda: self.now,
+            vehicle_clock=self.clock,
         )
         self.fly(0.0, HERE)
         self.guide.hold_here()
@@ -73,7 +75,8 @@ class Bench:
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
         q, still = (cos(half), sin(half), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
-        sample = AttitudeSample(0, self.now, self.now, 0, q, still)
+        reading = self.clock.take(round(1000 * self.now), self.now)
+        sample = AttitudeSample(0, self.now, self.now, 0, q, still, *reading[1:])
         self.guide.note_attitude(sample)
         self.guide.step()
         return self.loop.command
@@ -142,7 +145,9 @@ def test_an_old_attitude_does_not_replace_a_newer_one():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET)
     tilted, still = (cos(0.5), sin(0.5), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
-    bench.guide.note_attitude(AttitudeSample(0, bench.now - 0.1, bench.now, 0, tilted, still))
+    reading = bench.clock.take(round(1000 * bench.now) - 100, bench.now)
+    old = AttitudeSample(0, reading.vehicle_time, bench.now, 0, tilted, still, *reading[1:])
+    bench.guide.note_attitude(old)
     bench.guide.step()
     assert bench.guide.given_up is None
 

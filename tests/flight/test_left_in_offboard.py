@@ -1,6 +1,7 @@
 """A vehicle is not left disarmed in offboard, where PX4 never is ready to be armed again."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
@@ -35,6 +36,7 @@ class Vehicle:
         self.sent, self.notes, self.mode_by_failsafe, self.detail = 0, [], False, ""
         self.link = self.family = self.state = self
         self.note = self.notes.append
+        self.same_vehicle = SimpleNamespace(require=lambda: None)
 
     mode_received = 0.0
 

@@ -3,6 +3,7 @@
 import ast
 import asyncio
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -41,6 +42,7 @@ class Vehicle:
         self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.family = self.state = self
         self.now = 0.0
+        self.same_vehicle = SimpleNamespace(require=lambda: None)
 
     @property
     def mode_received(self):

@@ -15,6 +15,7 @@ from companion.flight.safety.snapshot import (
     Resets,
     Snapshot,
 )
+from companion.flight.unanswered import Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.mavlink.records import Battery, Estimator, Gps
 
@@ -60,25 +61,32 @@ def control(**changes):
     return FINE._replace(control=Control(**changes))
 
 
+def unanswered(reason, **changes):
+    return control(answered=OLD, reason=reason, **changes)
+
+
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LET_GO = Action
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LET_GO, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
-    ("silence", control(answered=OLD, newer=OLD), HAND_BACK, 0.0, "clock stands still"),
-    ("silence", control(answered=OLD, fresh=OLD), HAND_BACK, 0.0, "telemetry_stale_ms"),
-    ("silence", control(answered=OLD, commanded=OLD, placed=OLD), HAND_BACK, 0.0, "no position"),
+    ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
+    ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
+    ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
+    ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
-        control(answered=OLD, commanded=OLD, position_fresh=False),
+        unanswered(Unanswered.OLD_TARGET, position_fresh=False),
         HAND_BACK,
         0.0,
         "position_stale_ms",
     ),
-    ("silence", control(answered=OLD, commanded=OLD), HAND_BACK, 0.0, "guidance makes no"),
-    ("silence", control(answered=OLD, held_back=True), HAND_BACK, 0.0, "did not confirm"),
-    ("silence", control(answered=OLD), HAND_BACK, 0.0, "cannot be used"),
+    ("silence", unanswered(Unanswered.OLD_TARGET), HAND_BACK, 0.0, "guidance makes no"),
+    ("silence", unanswered(Unanswered.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
+    ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
+    ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot leave"),
+    ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
     ("disarmed", autopilot(armed=False), LET_GO, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
     ("failsafe", autopilot(failsafe=True), HAND_BACK, 0.0, "failsafe"),

@@ -25,6 +25,7 @@ from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
+from companion.mavlink.vehicle_clock import VehicleClock
 
 VEHICLE = (1, 1)
 STAMP, OVERHEAD, SIGNATURE, MAVLINK_2 = 8, 12, 13, 0xFD
@@ -142,12 +143,13 @@ class _Player:
         settings = LinkSettings("udpout://nowhere:1", 1, 1, *ours)
         stats = LinkStats()
         router = Router(stats)
-        self._inbox = Inbox(settings, stats, router, None, self.out.notices.append)
+        clock = VehicleClock()
+        self._inbox = Inbox(settings, stats, router, None, self.out.notices.append, clock)
         self._inbox.on_attitude = self.out.samples.append
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
-        self._conversation = Conversation(settings, outbox, router, stats, self._loop.time)
+        self._conversation = Conversation(settings, outbox, router, stats, self._loop.time, clock)
         self.out.stats, self.out.state = stats, self._conversation.state
 
     async def _until(self, time):

@@ -310,7 +310,7 @@ def test_rates_are_asked_for_and_counted(run):
     run(scene())
 
 
-def test_clocks_are_compared_by_the_quickest_exchange(run):
+def test_timesync_tells_how_old_a_sample_was_when_it_arrived(run):
     async def scene():
         async with linked() as (link, vehicle):
             clock, ahead = asyncio.get_running_loop().time, 1000.0
@@ -325,11 +325,14 @@ def test_clocks_are_compared_by_the_quickest_exchange(run):
                 ]
 
             vehicle.answers["TIMESYNC"] = answer
-            await until(lambda: link.timesync.offset_s is not None)
-            error = abs(link.timesync.offset_s - ahead)
-            assert error <= link.timesync.round_trip_s / 2 + 1e-6
-            age = link.timesync.sample_age(round((clock() + ahead - 0.5) * 1000))
-            assert age == pytest.approx(0.5, abs=0.05 + link.timesync.round_trip_s)
+            while not link.clock.age_known:
+                stamp = round(1000 * (clock() + ahead - 0.5))
+                vehicle.send(dialect.MAVLink_attitude_quaternion_message(stamp, 1, *6 * [0]))
+                await asyncio.sleep(0.02)
+            error = link.clock.delay.error + link.timesync.round_trip_s
+            assert link.clock.delay.seconds == pytest.approx(0.5, abs=0.05 + error)
+            age = link.clock.age(clock() + ahead - 1.0, clock())
+            assert age == pytest.approx(1.0, abs=0.05 + error)
 
     run(scene())
 

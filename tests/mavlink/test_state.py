@@ -11,6 +11,7 @@ from companion.mavlink.router import Router
 from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
+from companion.mavlink.vehicle_clock import VehicleClock
 from tests.mavlink.fakes import heartbeat
 
 
@@ -18,7 +19,10 @@ class Bench:
     def __init__(self):
         self.now, self.stats = 10.0, LinkStats()
         self.router = Router(self.stats)
-        self.state = VehicleState(self.router, self.stats, TextAssembler(), lambda: self.now)
+        self.clock = VehicleClock()
+        self.state = VehicleState(
+            self.router, self.stats, TextAssembler(), lambda: self.now, self.clock
+        )
 
     def take(self, message):
         message.pack(dialect.MAVLink(None))
@@ -131,14 +135,32 @@ def test_a_position_stamped_no_later_than_the_last_is_counted_never_stored(bench
     assert position(bench, 60.1, 3.0).position_ned == (3.0, 0.0, 0.0)
 
 
+def attitudes(bench, seconds, began=0.0):
+    """Samples at 50 Hz of a vehicle that started when our clock showed `began`."""
+    for _ in range(round(50 * seconds)):
+        bench.now += 0.02
+        bench.clock.take(round(1e3 * (bench.now - began)), bench.now)
+
+
 def test_after_a_new_boot_positions_are_news_again(bench):
-    position(bench, 60.0)
-    bench.now = 11.9
-    assert position(bench, 1.0).vehicle_time == 60.0  # so quickly none boots
-    bench.now = 12.1
-    assert position(bench, 1.2).vehicle_time == 1.2
-    assert position(bench, 1.3).received == 12.1
-    assert bench.stats.outdated == 1
+    attitudes(bench, 3.0)
+    before = position(bench, bench.now).vehicle_time
+    attitudes(bench, 1.0, began=12.0)
+    after = position(bench, bench.now - 12.0).vehicle_time
+    assert bench.clock.restarts == 1
+    assert after == pytest.approx(before + 1.0, abs=0.03)  # time goes on
+    assert bench.stats.outdated == 0
+
+
+def test_a_position_stamped_far_ahead_is_counted_never_stored(bench):
+    position(bench, 5000.0, 1.0)  # before the vehicle's clock was known
+    attitudes(bench, 3.0)
+    kept = position(bench, bench.now, 2.0)
+    assert kept.position_ned == (2.0, 0.0, 0.0)
+    assert position(bench, bench.now + 3600.0, 3.0) == kept
+    assert bench.stats.stamped_ahead == 1
+    bench.now += 0.02
+    assert position(bench, bench.now, 4.0).position_ned == (4.0, 0.0, 0.0)
 
 
 def sys_status(voltage, remaining, health=0):

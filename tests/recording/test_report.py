@@ -26,7 +26,7 @@ AS_CONFIGURED = DeadTimes(
 
 def table(trace, dead_times=AS_CONFIGURED):
     """The rows of the table as a user sees them, without its lines."""
-    trace.add_rates(1.0, 2.0, BodyRates(0.1, 0.2, 0.3), 0.5, BodyRates(0.0, 0.0, 0.0))
+    trace.add_rates(1.0, 2.0, BodyRates(0.1, 0.2, 0.3), 0.5, BodyRates(0.0, 0.0, 0.0), 0.003)
     summary = Summary(
         "ok", "disarm", "exact", 5.0, LoopCounts(7, 6, 1), {}, trace, dead_times=dead_times
     )

@@ -65,6 +65,7 @@ class Lookout:
         self._turn = 0.0
         self._shift: Vector = (0.0, 0.0, 0.0)
         self._good_flags = 0
+        self._timeline = 0
 
     def begin(self, now: float) -> None:
         """Control begins: fences are about this place, and resets before this do not count."""
@@ -75,6 +76,7 @@ class Lookout:
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
         resets.largest_tilt = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
+        self._timeline = self._link.clock.timeline
         self._counted.clear()
 
     def listen(self, now: float) -> None:
@@ -93,7 +95,7 @@ class Lookout:
 
     def snapshot(self, now: float) -> Snapshot:
         """What is known at `now`, s on our clock; after `listen`."""
-        state, loop = self._link.state, self._loop
+        state, loop, clock = self._link.state, self._loop, self._link.clock
         command = loop.command
         return Snapshot(
             now,
@@ -109,13 +111,12 @@ class Lookout:
             Control(
                 loop.last_answer,
                 loop.last_sample,
-                loop.last_newer,
-                loop.last_fresh,
+                loop.reason,
                 -inf if command is None else command.made_at,
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
-                loop.held_back,
                 self._guide.fresh_position() is not None,
+                None if clock.timeline == self._timeline else clock.last_change,
             ),
             self._health(),
             self._resets(now),

@@ -1,7 +1,8 @@
-"""The deadman: nothing fresh to fly by, so nothing is sent, and that for too long."""
+"""Offboard loss of our own: nothing fresh to fly by, so nothing is sent, for too long."""
 
 from companion.flight.safety.monitor import Judge
 from companion.flight.safety.snapshot import Control, Snapshot
+from companion.flight.unanswered import Unanswered
 
 _HEARD = 0.3
 """Nothing at all from the vehicle for this long, s: it would not be heard taking over, either."""
@@ -22,15 +23,10 @@ def silence(limit: float, *, heard: bool) -> Judge:
 def _why(now: float, control: Control, limit: float) -> str:
     if now - control.sampled > limit:
         return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
-    if now - control.newer > limit:
-        return "the vehicle's clock stands still"
-    if now - control.fresh > limit:
-        return "attitude arrives later than deadman.telemetry_stale_ms"
-    if now - control.commanded > limit:
+    reason = control.reason
+    if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
         return _why_no_command(now, control, limit)
-    if control.held_back:
-        return "after a gap in telemetry the autopilot did not confirm offboard"
-    return "attitude from the vehicle cannot be used, or setpoints cannot leave"
+    return "no setpoint was sent" if reason is None else reason.words
 
 
 def _why_no_command(now: float, control: Control, limit: float) -> str:
@@ -38,4 +34,9 @@ def _why_no_command(now: float, control: Control, limit: float) -> str:
         return "no position from the vehicle"
     if not control.position_fresh:
         return "position arrives later than deadman.position_stale_ms"
-    return "guidance makes no commands any more"
+    return Unanswered.OLD_TARGET.words
+
+
+def clock_changed(snapshot: Snapshot, _: bool) -> str | None:
+    """The vehicle's clock jumped, stood still, wrapped or restarted since control began."""
+    return snapshot.control.clock_change

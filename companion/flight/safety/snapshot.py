@@ -4,6 +4,7 @@ from math import inf
 from typing import NamedTuple
 
 from companion.attitude import Quaternion
+from companion.flight.unanswered import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.mavlink.records import Battery, Estimator, Gps
@@ -45,29 +46,28 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When the way of a sample was last gone, s on our clock.
+    """When each stage of a sample's way last ran, s on our clock, and what stops it.
 
     Attributes:
         answered: a setpoint left.
         sampled: an attitude came.
-        newer: one came that was newer than those before.
-        fresh: one came that was not late.
+        reason: why the newest attitude was not answered, or None.
         commanded: guidance made a command.
         placed: a position came, newer than those before.
         heard: anything at all came from the vehicle.
-        held_back: after a gap the mode was not confirmed yet.
         position_fresh: the newest position is one to fly by.
+        clock_change: how the vehicle's clock has jumped or restarted since control began, in
+            words, or None.
     """
 
     answered: float = inf
     sampled: float = inf
-    newer: float = inf
-    fresh: float = inf
+    reason: Unanswered | None = None
     commanded: float = inf
     placed: float = inf
     heard: float = inf
-    held_back: bool = False
     position_fresh: bool = True
+    clock_change: str | None = None
 
 
 class Health(NamedTuple):

@@ -6,7 +6,7 @@ from companion.config import Config
 from companion.flight.safety import authority, envelope, estimate, resources
 from companion.flight.safety.fence import braking, outside
 from companion.flight.safety.monitor import Action, Monitor
-from companion.flight.safety.silence import silence
+from companion.flight.safety.silence import clock_changed, silence
 from companion.guidance.fence import Fence
 
 _MS = 1e-3
@@ -31,6 +31,7 @@ def _authority(config: Config) -> tuple[Monitor, ...]:
     return (
         Monitor("unheard", unheard, _LET_GO, mutes=True),
         Monitor("silence", still, _HAND_BACK, mutes=True),
+        Monitor("clock", clock_changed, _HAND_BACK, mutes=True),
         Monitor("disarmed", authority.disarmed, _LET_GO),
         Monitor("landed", authority.landed, _LAND),
         # Where it acts, the mode is not ours any more, and that is seen first. ArduPilot tells of
