@@ -58,6 +58,8 @@ class ArduPilot:
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
             **FLIGHT_RATES,
+            # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
+            "HEARTBEAT": 10.0,
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
