@@ -36,7 +36,8 @@ async def takeoff(rig: Rig) -> None:
     rig.ground.command_takeoff()
     rig.loop.command = None  # an idle one, which nothing may send from here on
     rig.guide.step()
-    await order(rig, command, in_roles(rig.link, {Role.READY}), lambda: not state.landed)
+    # Asked again right before it is sent: PX4 that is told so disarmed takes off once a pilot arms.
+    await order(rig, command, lambda: _require_ground(rig), lambda: not state.landed)
     climb = _Climb(rig, height)
     await rig.until(climb.over)
 

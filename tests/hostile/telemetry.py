@@ -30,7 +30,7 @@ class Telemetry:
         self.clock = lambda t: t
         self.battery, self.fix_type, self.flags = 0.8, 3, vehicle.kind.estimator[1]
         self.samples, self.told = [], []
-        self._due, self._latest = {}, []
+        self._due, self._latest, self._mode_sent = {}, [], (-inf, None)
         self._dialect = vehicle.kind.dialect
         self._encoder = self._dialect.MAVLink(None, srcSystem=1, srcComponent=1)
         self._makers = {
@@ -61,10 +61,20 @@ class Telemetry:
         for name, rate in self.rates.items():
             if rate > 0.0 and name in self._makers and t >= self._due.get(name, -inf) - 1e-6:
                 self._due[name] = max(self._due.get(name, t) + 1.0 / rate, t)
-                self._queue.append(self._entry(name))
+                if name != "CURRENT_MODE" or self._mode_is_due():
+                    self._queue.append(self._entry(name))
         leaving = [entry for entry in self._queue if entry[0] <= t + 1e-6]
         self._queue = [entry for entry in self._queue if entry[0] > t + 1e-6]
         return [frame for entry in leaving for frame in self._leave(*entry)]
+
+    def _mode_is_due(self):
+        """PX4 sends CURRENT_MODE at once when something changes, else every 0.5 s."""
+        t, state = self._vehicle.t, (self._vehicle.mode, self._vehicle.armed)
+        at, before = self._mode_sent
+        if state == before and t < at + 0.5 - 1e-6:
+            return False
+        self._mode_sent = t, state
+        return True
 
     def set_interval(self, number, interval_us):
         """Answer SET_MESSAGE_INTERVAL; returns the MAV_RESULT."""
@@ -81,7 +91,10 @@ class Telemetry:
         name = self._message_name(number)
         if name == "AUTOPILOT_VERSION":
             return self.pack(name, _version(uid))
-        return self._leave(*self._entry(name)) if name in self._makers else None
+        if name not in self._makers:
+            return None
+        self._queue.append(self._entry(name))  # it waits where the streamed ones wait
+        return []
 
     def _message_name(self, number):
         kind = self._dialect.mavlink_map.get(int(number))

@@ -89,7 +89,7 @@ IN_CONTROL = (
     Scenario(
         "HEARTBEAT stops in control",
         (("in control", 0.7, actions.stops("HEARTBEAT")),),
-        (stops_within(4.5),),
+        (stops_within(5.2),),
         changes=LONGER,
     ),
     Scenario(

@@ -5,8 +5,6 @@ has made one pass.
 """
 
 _SELDOM = "point 4: the rate of answers is not watched"
-_OFFBOARD = "point 14: a vehicle disarmed in OFFBOARD is left so"
-_TOLD = "point 16: CURRENT_MODE is not asked for"
 _LATE = "point 5: a delay that TIMESYNC tells is not named as the reason"
 
 WAITING = {
@@ -21,10 +19,6 @@ WAITING = {
             "gaps of 120 ms in the attitude again and again",
         )
     },
-    "px4: PX4 was left in OFFBOARD": _OFFBOARD,
-    "px4: PX4 is in OFFBOARD again after the landing for an empty battery": _OFFBOARD,
-    "px4: PX4 is in OFFBOARD again after the landing for a lost GPS": _OFFBOARD,
-    "px4: the pilot takes over in control, told at once": _TOLD,
     "px4: telemetry 400 ms late from the start, TIMESYNC prompt": _LATE,
     "ardupilot: telemetry 400 ms late from the start, TIMESYNC prompt": _LATE,
 }
