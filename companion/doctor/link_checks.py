@@ -6,6 +6,7 @@ from companion.config import Config
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
 from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import SOME_LOST
 from companion.mavlink.streams import StreamRate
 
@@ -15,6 +16,8 @@ _REACHED = 0.7
 """PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
 _COUNTABLE = 5.0
 """So many must be due while we listen for a rate to be told from a count."""
+_SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
+"""What is sent when it changes, and otherwise only so often, Hz, whatever is asked (PX4)."""
 _MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
 _CLOCKS_APART = 0.02
@@ -68,6 +71,7 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
             f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
             "ask for less, or let the autopilot's loop run faster",
         )
+    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
     countable = asked * evidence.window >= _COUNTABLE
     if achieved >= _REACHED * asked if countable else evidence.received[name] > 0:
         return None
@@ -197,15 +201,18 @@ def clocks(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether both sides sign, with the same key, or neither."""
+    """Whether both sides sign, with the same key, or neither; and who else would be the peer."""
     yield from signing_findings(evidence.link.notices)
 
 
 def signing_findings(notices: Iterable[str], verdict: Verdict = INEFFECTIVE) -> Iterator[Finding]:
-    """What the link said of signatures, as findings of a `verdict`."""
+    """What the link said of signatures and of the peer, as findings of a `verdict`."""
     for notice in notices:
-        found, _semicolon, mend = notice.partition("; ")
-        yield Finding(Key.SIGNING, verdict, found, mend=mend, source="MAVLink 2 signatures")
+        of_peer = notice.startswith(PEER_NOTICE)
+        found, _semicolon, mend = notice.removeprefix(PEER_NOTICE).partition("; ")
+        key = Key.ENDPOINT if of_peer else Key.SIGNING
+        source = "senders' addresses" if of_peer else "MAVLink 2 signatures"
+        yield Finding(key, verdict, found, mend=mend, source=source)
 
 
 def company(config: Config, evidence: Evidence) -> Iterator[Finding]:

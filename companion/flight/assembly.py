@@ -19,6 +19,7 @@ from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.preflight import Preflight
 from companion.flight.preparation import SLOWEST_HEARTBEAT
+from companion.flight.programmes import unbegun
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
@@ -28,6 +29,7 @@ from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
+from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport import Tap
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
@@ -82,7 +84,10 @@ def realtime_wishes(config: Config) -> Wishes:
 
 
 def _signing(key_file: Path | None) -> Signing | None:
-    return None if key_file is None else Signing(key_from_passphrase_file(key_file))
+    if key_file is None:
+        return None
+    key = key_from_passphrase_file(key_file)
+    return Signing(key, file=StampFile(key))
 
 
 def planner(config: Config) -> Planner:
@@ -241,7 +246,7 @@ def assemble(
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
     same_vehicle = SameVehicle(link, SLOWEST_HEARTBEAT)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = Preflight(config, link, same_vehicle)
+    preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     watch = Watch(rig, ladder, clock)
