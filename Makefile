@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all matrix lint soak bench clean
+.PHONY: demo test test-all matrix lint soak fuzz bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -37,6 +37,9 @@ lint: $(VENV)/.test
 
 soak: $(VENV)/.test  ## half an hour in real time over a bad link
 	$(BIN)/python -m tests.soak --minutes 30
+
+fuzz: $(VENV)/.test  ## an hour of random files, frames and telemetry
+	nice -n 19 $(BIN)/python -m tests.fuzz --minutes 60
 
 bench: $(VENV)/.test  ## latency of our link against a bare echo and MAVSDK
 	$(BIN)/companion bench link

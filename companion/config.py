@@ -3,8 +3,8 @@
 The defaults fly the bundled vehicle.
 """
 
-from math import hypot, radians, sin, tan
-from typing import Any
+from math import hypot, radians, sin
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -31,8 +31,11 @@ from companion.config_sections import (
     ThrustConfig,
     VehicleConfig,
 )
-from companion.guidance.reference import GRAVITY
 from companion.yaml_file import Section
+
+FileName = Annotated[str, Field(max_length=1000)]
+MOST_INCLUDED = 32
+"""Files that one configuration may include, those of its includes among them."""
 
 _TILT_SHARE = 0.75
 """Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
@@ -60,8 +63,11 @@ class Config(Section):
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
     """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
-    include: str | tuple[str, ...] = Field(default=(), exclude=True)
-    """Files whose keys are read as if they stood here, relative to this one; own keys win."""
+    include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
+        default=(), exclude=True
+    )
+    """Files whose keys are read as if they stood here, relative to this one; own keys win. They may
+    include others, up to four deep."""
 
     @property
     def planner_name(self) -> str:
@@ -80,10 +86,8 @@ class Config(Section):
 
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
     """What no single section can know: (whether it is wrong, what to say)."""
-    limits, thrust, flight = config.limits, config.thrust, config.flight
-    circle, flown = config.circle, flight.programme
+    limits, thrust, flown = config.limits, config.thrust, config.flight.programme
     tilt = radians(limits.max_tilt_deg)
-    needed = circle.speed_m_s**2 / circle.radius_m + config.guidance.drag_per_s * circle.speed_m_s
     return [
         (
             config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
@@ -98,10 +102,6 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
         ),
         (
-            limits.fence_floor_m > flight.takeoff_height_m - 0.5,
-            "limits.fence_floor_m must be at least 0.5 m below flight.takeoff_height_m",
-        ),
-        (
             "steps" in flown and config.steps.coefficient > sin(tilt),
             "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
         ),
@@ -111,14 +111,6 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             > sin(tilt),
             "√(north² + east²) of corners' coefficients must not exceed the sine of "
             "limits.max_tilt_deg",
-        ),
-        (
-            "circle" in flown and needed > GRAVITY * tan(tilt),
-            "circle.speed_m_s is too fast for circle.radius_m at limits.max_tilt_deg",
-        ),
-        (
-            "circle" in flown and 2.0 * circle.radius_m > limits.fence_radius_m,
-            "the circle (twice circle.radius_m away) leaves limits.fence_radius_m",
         ),
         *(_identify_contradictions(config) if "identify" in flown else ()),
     ]

@@ -8,6 +8,9 @@ from pydantic import Field, model_validator
 
 from companion import yaml_file
 from companion.trajectory import (
+    FARTHEST,
+    FASTEST,
+    LONGEST,
     Frame,
     HeadingFrom,
     Hover,
@@ -17,6 +20,7 @@ from companion.trajectory import (
     TrajectoryError,
     bernoulli_eight,
     circle,
+    computable,
     from_samples,
     gerono_eight,
     helix,
@@ -26,11 +30,12 @@ from companion.trajectory import (
 )
 from companion.yaml_file import ConfigError, Section
 
-Metres = Annotated[float, Field(gt=0.0, le=10_000.0)]
-Speed = Annotated[float, Field(gt=0.0, le=100.0)]
-Acceleration = Annotated[float, Field(gt=0.0, le=100.0)]
+Metres = Annotated[float, Field(ge=0.01, le=1000.0)]
+Speed = Annotated[float, Field(ge=0.01, le=FASTEST)]
+Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
-Place = tuple[float, float, float]
+Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Place = tuple[Offset, Offset, Offset]
 FixedOrAlong = Literal["fixed", "along"]
 
 
@@ -43,7 +48,7 @@ class _Shape(Protocol):
 class HoverShape(Section):
     """Stay where it begins."""
 
-    duration_s: Annotated[float, Field(gt=0.0, le=3600.0)]
+    duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
     """How long."""
 
     def trajectory(self, folder: Path) -> Trajectory:
@@ -60,7 +65,7 @@ class LineShape(Section):
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
     """Largest acceleration."""
-    jerk_m_s3: Annotated[float, Field(gt=0.0, le=1000.0)] = 10.0
+    jerk_m_s3: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
     """Largest jerk."""
     heading: FixedOrAlong = "fixed"
     """fixed: as it was at the start. along: facing along the path."""
@@ -74,7 +79,7 @@ class LineShape(Section):
 class _Rounds(Section):
     """What all figures have that are gone round in laps."""
 
-    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
+    laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """How often round, gathering and losing speed included."""
     acceleration_m_s2: Acceleration = 3.0
     """Largest along the path while speed is gathered or lost; too few laps take more."""
@@ -230,9 +235,14 @@ def load(path: Path) -> Trajectory:
     """
     is_table = path.suffix.lower() == ".csv"
     try:
-        if is_table:
-            return CsvShape(file=Path(path.name)).trajectory(path.parent)
-        return yaml_file.load(path, TrajectoryFile).trajectory(path.parent)
+        with computable():
+            trajectory = (
+                CsvShape(file=Path(path.name)).trajectory(path.parent)
+                if is_table
+                else yaml_file.load(path, TrajectoryFile).trajectory(path.parent)
+            )
+            trajectory.check_times()
+            return trajectory
     except TrajectoryError as error:
-        # The table's own errors name it already.
-        raise ConfigError(str(error) if is_table else f"{path}: {error}") from error
+        named = is_table and str(error).startswith(str(path))  # a table's own errors name it
+        raise ConfigError(str(error) if named else f"{path}: {error}") from error

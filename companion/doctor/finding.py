@@ -36,6 +36,7 @@ class Key(StrEnum):
     JITTER = "link.jitter"
     PAUSES = "link.pauses"
     SIGNING = "link.signing"
+    ENDPOINT = "link.endpoint"
     CLOCK = "link.clock"
     OUR_IDS = "link.our_ids"
     SECOND_COMPANION = "link.second_companion"

@@ -6,6 +6,7 @@ from companion.config import Config
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
 from companion.mavlink.parameter_rules import Verdict
+from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import SOME_LOST
 from companion.mavlink.streams import StreamRate
 
@@ -197,15 +198,18 @@ def clocks(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether both sides sign, with the same key, or neither."""
+    """Whether both sides sign, with the same key, or neither; and who else would be the peer."""
     yield from signing_findings(evidence.link.notices)
 
 
 def signing_findings(notices: Iterable[str], verdict: Verdict = INEFFECTIVE) -> Iterator[Finding]:
-    """What the link said of signatures, as findings of a `verdict`."""
+    """What the link said of signatures and of the peer, as findings of a `verdict`."""
     for notice in notices:
-        found, _semicolon, mend = notice.partition("; ")
-        yield Finding(Key.SIGNING, verdict, found, mend=mend, source="MAVLink 2 signatures")
+        of_peer = notice.startswith(PEER_NOTICE)
+        found, _semicolon, mend = notice.removeprefix(PEER_NOTICE).partition("; ")
+        key = Key.ENDPOINT if of_peer else Key.SIGNING
+        source = "senders' addresses" if of_peer else "MAVLink 2 signatures"
+        yield Finding(key, verdict, found, mend=mend, source=source)
 
 
 def company(config: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -30,6 +30,7 @@ from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
+from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport import Tap
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
@@ -84,7 +85,10 @@ def realtime_wishes(config: Config) -> Wishes:
 
 
 def _signing(key_file: Path | None) -> Signing | None:
-    return None if key_file is None else Signing(key_from_passphrase_file(key_file))
+    if key_file is None:
+        return None
+    key = key_from_passphrase_file(key_file)
+    return Signing(key, file=StampFile(key))
 
 
 def planner(config: Config) -> Planner:

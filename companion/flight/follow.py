@@ -41,6 +41,10 @@ class Follow:
         """How long it turns before the trajectory begins, as far as that is known, s."""
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
+    def check_times(self) -> list[float]:
+        """Those of the trajectory: the turn before it is on the spot."""
+        return list(self.trajectory.check_times())
+
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the beginning at `start`."""
         if self._turned is None or start is not self._pose:

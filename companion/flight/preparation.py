@@ -5,10 +5,13 @@ from companion.doctor.evidence import Stage
 from companion.doctor.finding import Finding
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import order
+from companion.flight.programmes import require_inside
 from companion.flight.rig import Rig
 from companion.flight.roles import in_role, in_roles, require_role
+from companion.guidance.fence import Place
 from companion.mavlink.parameter_rules import Values, Verdict
 from companion.mavlink.roles import Role
+from companion.yaml_file import ConfigError
 
 SLOWEST_HEARTBEAT = 3.0
 """Longest pause between two heartbeats until it is known how often they come, s."""
@@ -35,6 +38,7 @@ async def checks(rig: Rig) -> None:
     if heartbeats > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
         rig.same_vehicle.heartbeat_limit = limit
+    _require_inside_map(rig)
     _tell_dead_man(rig, evidence.survey.values)
     rig.mode_at_checks = rig.link.state.mode
 
@@ -109,6 +113,18 @@ def _untouched(rig: Rig) -> None:
         raise FlightEnded(
             f"the pilot or another station took over before arming: mode {state.mode}"
         )
+
+
+def _require_inside_map(rig: Rig) -> None:
+    """See that all programmes stay inside a fence on the map, which needs the vehicle's place."""
+    told = rig.link.state.global_position
+    if not rig.config.safety.fence_polygon_deg or told is None:
+        return  # without a place the checks have refused already
+    try:
+        place = Place(told.latitude_deg, told.longitude_deg)
+        require_inside(rig.config, rig.programme.parts, place)
+    except ConfigError as error:
+        raise FlightEnded(str(error)) from error
 
 
 def _ready(rig: Rig) -> bool:

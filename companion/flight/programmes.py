@@ -1,12 +1,18 @@
 """The programmes that the configuration asks for, checked before anything flies."""
 
-from math import radians
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from math import radians, tau
+
+import numpy as np
 
 from companion import trajectory_file
 from companion.config import Config
 from companion.config_programmes import IdentifyConfig
+from companion.flight.fence_check import FenceCheck
 from companion.flight.follow import Follow
 from companion.flight.outer_loop import thrust_limits
+from companion.flight.safety.table import fence_of
 from companion.guidance import (
     GRAVITY,
     Circle,
@@ -17,20 +23,62 @@ from companion.guidance import (
     Sequence,
     Steps,
 )
-from companion.trajectory import Envelope, TrajectoryError, slow_down, violations
+from companion.guidance.fence import Place
+from companion.guidance.predicted import predicted
+from companion.trajectory import (
+    Envelope,
+    Motion,
+    TrajectoryError,
+    Violation,
+    judge,
+    slow_down,
+    violations,
+)
 from companion.yaml_file import ConfigError
+
+_SLOWER = "make it slower or smaller, or change the limit"
 
 
 def programme(config: Config) -> Sequence:
     """The programmes of `flight.programme`, one after the other.
 
     Raises:
-        ConfigError: the trajectory cannot be read, or cannot be flown within the limits.
+        ConfigError: a trajectory cannot be read, or a programme cannot be flown within the limits
+            and the fence.
     """
     return Sequence([_part(config, name) for name in config.flight.programme])
 
 
+def require_inside(config: Config, parts: Iterable[Programme], origin: Place | None) -> None:
+    """See that all programmes stay inside the fence, with a polygon on the map if there is one.
+
+    Args:
+        config: as it is flown.
+        parts: the programmes.
+        origin: where control begins, or None where that is not known.
+
+    Raises:
+        ConfigError: one of them leaves it, or could not stop inside.
+    """
+    check = _fence_check(config, origin)
+    for part in parts:
+        for motion in _motions(part, config.guidance.drag_per_s):
+            _refuse(part.name, check(motion))
+
+
 def _part(config: Config, name: str) -> Programme:
+    if name == "trajectory":
+        return _follow(config)
+    part = _simple(config, name)
+    require_inside(config, [part], None)
+    if isinstance(part, Circle):
+        (motion,) = _motions(part, config.guidance.drag_per_s)
+        for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
+            _refuse(part.name, broken)
+    return part
+
+
+def _simple(config: Config, name: str) -> Programme:
     corners, steps, circle = config.corners, config.steps, config.circle
     match name:
         case "hover":
@@ -46,10 +94,28 @@ def _part(config: Config, name: str) -> Programme:
                 corners.duration_s,
                 corners.settle_s,
             )
-        case "identify":
-            return _doublets(config.identify)
         case _:
-            return _follow(config)
+            return _doublets(config.identify)
+
+
+def _motions(part: Programme, drag: float) -> Iterator[Motion]:
+    """How the vehicle moves in it; with rates of the body, whatever its heading is."""
+    turns = 8 if isinstance(part, Doublets) else 1
+    for k in range(turns):
+        moments = list(predicted(part, tau * k / turns, drag))
+        times, offset, velocity, acceleration = (
+            np.array(column) for column in zip(*moments, strict=True)
+        )
+        jerk, turning = np.zeros_like(offset), np.zeros_like(times)
+        yield Motion(times, offset, velocity, acceleration, jerk, turning)
+
+
+def _refuse(name: str, broken: Violation | None) -> None:
+    if broken is None:
+        return
+    # Only a trajectory is slowed down by us.
+    remedy = _SLOWER if broken.slowing_helps else broken.remedy
+    raise ConfigError(f"{name}: {broken}; {remedy}")
 
 
 def _doublets(identify: IdentifyConfig) -> Doublets:
@@ -77,10 +143,8 @@ def _follow(config: Config) -> Follow:
         except TrajectoryError as error:
             raise ConfigError(f"{path}: {error}") from error
     elif broken := violations(trajectory, envelope):
-        raise ConfigError(
-            f"{path}: {broken[0]}; fly it more slowly (--slow-down finds how much), or change "
-            "the limit"
-        )
+        first = min(broken, key=lambda one: one.slowing_helps)
+        raise ConfigError(f"{path}: {first}; {first.remedy}")
     return Follow(trajectory, radians(config.limits.max_yaw_rate_deg_s), factor)
 
 
@@ -95,9 +159,12 @@ def _envelope(config: Config) -> Envelope:
         max_thrust=max_thrust,
         max_climb=limits.max_climb_m_s,
         max_descent=limits.max_descent_m_s,
-        fence_radius=limits.fence_radius_m,
-        fence_ceiling=limits.fence_ceiling_m,
-        fence_floor=limits.fence_floor_m - config.flight.takeoff_height_m,
+        max_speed=config.safety.max_speed_m_s,
+        fence=_fence_check(config, None),
         drag=config.guidance.drag_per_s,
         gravity=GRAVITY,
     )
+
+
+def _fence_check(config: Config, origin: Place | None) -> FenceCheck:
+    return FenceCheck(fence_of(config), config.flight.takeoff_height_m, origin)

@@ -5,9 +5,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-import yaml
-
-from companion import realtime
+from companion import bounded_yaml, realtime
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.chronicle import Chronicle
@@ -73,7 +71,7 @@ class Session:
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: what `realtime` requires is not granted; nothing was sent.
         """
-        flown = yaml.safe_dump(self._config.model_dump(mode="json"), sort_keys=False)
+        flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()

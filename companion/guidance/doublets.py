@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from companion.attitude import BodyRates
+from companion.guidance.programmes import spread
 from companion.guidance.reference import Pose, Reference
 
 _SMALL = 0.5
@@ -101,6 +102,15 @@ class Doublets:
             for size in (_SMALL, 1.0)
         ]
         return *rates, *(_CLIMBS * [_Part(self.climb_step, climb=self.climb)])
+
+    def check_times(self) -> list[float]:
+        """All over each doublet, and once in each hold."""
+        times, begin = [0.0], 0.0
+        for part in self._parts:
+            begin += self.settle
+            times += spread(begin, begin + part.duration)
+            begin += part.duration
+        return [*times, self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop rates in a doublet, position hold between them."""

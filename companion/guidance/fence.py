@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, hypot, radians
-from typing import NamedTuple
+from math import cos, hypot, inf, radians
+from typing import Any, NamedTuple
 
 from companion.guidance.reference import Vector
 
 Corner = tuple[float, float]
 """(north, east) in m, or (latitude, longitude) in degrees."""
+
+Components = tuple[Any, Any, Any]
+"""A `Vector`, or one whose components are arrays."""
 
 EARTH_RADIUS = 6_371_000.0
 """Mean, m; over the size of a fence the earth is flat."""
@@ -20,6 +23,26 @@ class Place(NamedTuple):
 
     latitude: float
     longitude: float
+
+
+class Breach(NamedTuple):
+    """What is wrong with a place.
+
+    Attributes:
+        limit: the key of the configuration that says so.
+        side: on which side of the limit the place lies.
+        where: the place, as the end of a sentence.
+        by: how far it lies outside, m; negative inside.
+    """
+
+    limit: str
+    side: str
+    where: str
+    by: float
+
+    def __str__(self) -> str:
+        polygon = self.limit.startswith("safety.")
+        return self.where if polygon else f"{self.where}, {self.side} {self.limit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,33 +67,70 @@ class Fence:
     deceleration: float
     reaction: float
 
-    def breach(self, offset: Vector, height: float | None, origin: Place | None) -> str | None:
-        """What is wrong with a place, as the end of a sentence.
+    def breach(
+        self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
+    ) -> Breach | None:
+        """What is wrong with a place.
 
         Args:
             offset: from where control began, m NED.
             height: above home, m, or None where home is not known.
             origin: where control began, or None where that is not known.
+            margin: the place must lie inside by this, m.
         """
         north, east, down = offset
         distance = hypot(north, east)
-        if distance > self.radius:
-            return f"{distance:.1f} m from where control began, beyond limits.fence_radius_m"
+        if distance > self.radius - margin:
+            where = f"{distance:.1f} m from where control began"
+            return Breach("limits.fence_radius_m", "beyond", where, distance - self.radius)
         if self.places and origin is None:
-            return "at a place whose latitude and longitude are not known"
+            where = "at a place whose latitude and longitude are not known"
+            return Breach("safety.fence_polygon_deg", "with", where, 0.0)
         corners = local_polygon(self.places, origin) if origin and self.places else self.polygon
-        if corners and not inside(north, east, corners):
-            return "outside the polygon of the fence"
-        if -down > self.ceiling:
-            return f"{-down:.1f} m above where control began, above limits.fence_ceiling_m"
-        if height is not None and height < self.floor:
-            return f"{height:.1f} m above home, below limits.fence_floor_m"
+        if corners:
+            by = -distance_inside(north, east, corners) if margin else 0.0
+            if by > -margin or not inside(north, east, corners):
+                key = "safety.fence_polygon_deg" if self.places else "safety.fence_polygon_m"
+                return Breach(key, "outside", "outside the polygon of the fence", by)
+        if -down > self.ceiling - margin:
+            where = f"{0.0 - down:.1f} m above where control began"
+            return Breach("limits.fence_ceiling_m", "above", where, -down - self.ceiling)
+        if height is not None and height < self.floor + margin:
+            where = f"{height:.1f} m above home"
+            return Breach("limits.fence_floor_m", "below", where, self.floor - height)
         return None
 
-    def stop(self, velocity: float) -> float:
-        """How far the vehicle goes on along one axis, m."""
-        way = abs(velocity) * self.reaction + velocity * velocity / (2.0 * self.deceleration)
-        return way if velocity >= 0.0 else -way
+    def stop(self, offset: Components, velocity: Components) -> Components:
+        """Where the vehicle comes to a stop, m: v·t + v²/(2a), horizontally and vertically.
+
+        Args:
+            offset: from where control began, m NED; numbers, or arrays of them.
+            velocity: m/s NED.
+        """
+        north, east, down = velocity
+        level = self._seconds((north * north + east * east) ** 0.5)
+        return (
+            offset[0] + level * north,
+            offset[1] + level * east,
+            offset[2] + self._seconds(abs(down)) * down,
+        )
+
+    def stop_breach(
+        self,
+        offset: Vector,
+        velocity: Vector,
+        height: float | None,
+        origin: Place | None,
+        margin: float = 0.0,
+    ) -> Breach | None:
+        """What is wrong with the place where the vehicle stops if it begins to brake now."""
+        stop = self.stop(offset, velocity)
+        sunk = stop[2] - offset[2]
+        return self.breach(stop, None if height is None else height - sunk, origin, margin)
+
+    def _seconds(self, speed: Any) -> Any:
+        """For how long the vehicle would go on at this speed to come as far as it does, s."""
+        return self.reaction + speed / (2.0 * self.deceleration)
 
 
 def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
@@ -83,6 +143,19 @@ def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
         if (e0 > east) is not (e1 > east) and north < n0 + (east - e0) / (e1 - e0) * (n1 - n0):
             odd = not odd
     return odd
+
+
+def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> float:
+    """From a place in a polygon to the nearest of its sides, m; negative outside."""
+    nearest = inf
+    for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+        along_north, along_east = n1 - n0, e1 - e0
+        square = along_north * along_north + along_east * along_east
+        across = (north - n0) * along_north + (east - e0) * along_east
+        share = min(max(across / square, 0.0), 1.0) if square > 0.0 else 0.0
+        gap = hypot(north - n0 - share * along_north, east - e0 - share * along_east)
+        nearest = min(nearest, gap)
+    return nearest if inside(north, east, polygon) else -nearest
 
 
 @lru_cache(maxsize=4)

@@ -29,6 +29,16 @@ class Programme(Protocol):
         """The reference `time` seconds after the beginning at `start`."""
         ...
 
+    def check_times(self) -> list[float]:
+        """When to look at it to judge all of it, s, ascending."""
+        ...
+
+
+def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
+    """Times from `begin` to `end`, both included, about `step` apart, s."""
+    count = max(1, math.ceil((end - begin) / step))
+    return [begin + (end - begin) * k / count for k in range(count + 1)]
+
 
 @dataclass(frozen=True, slots=True)
 class Hover:
@@ -36,6 +46,10 @@ class Hover:
 
     duration: float
     name: str = "hover"
+
+    def check_times(self) -> list[float]:
+        """Its beginning and its end."""
+        return [0.0, self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: the starting pose at rest."""
@@ -70,6 +84,11 @@ class Steps:
     @property
     def _period(self) -> float:
         return 4.0 * self.step + self.settle
+
+    def check_times(self) -> list[float]:
+        """All over each doublet, and once in each settling."""
+        begins = [which * self._period for which in range(len(self.DIRECTIONS))]
+        return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop coefficients in a doublet, position hold between them."""
@@ -121,6 +140,10 @@ class Corners:
         """All corners, and the settling, s."""
         return len(self.CORNERS) * self.step + self.settle
 
+    def check_times(self) -> list[float]:
+        """All over the corners, and the end."""
+        return [*spread(0.0, len(self.CORNERS) * self.step), self.duration]
+
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop coefficients at the corners, then position hold."""
         rest = Reference(start.position_ned, heading=start.heading)
@@ -161,6 +184,17 @@ class Circle:
     def duration(self) -> float:
         """The way at full speed, and half of each ramp more, s."""
         return self._length / self.speed + self._ramp
+
+    def check_times(self) -> list[float]:
+        """The ramps and one lap between: the others are like it."""
+        ramp, lap = self._ramp, math.tau * self.radius / self.speed
+        begin, brake = ramp, self.duration - ramp
+        step = max(min(lap, ramp) / 720.0, ramp / 10_000.0)
+        return [
+            *spread(0.0, begin, step),
+            *spread(begin, min(begin + lap, brake), step),
+            *spread(brake, self.duration, step),
+        ]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference on the circle, with its velocity and acceleration."""

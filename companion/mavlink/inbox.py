@@ -37,7 +37,7 @@ _REFUSED = {
     Verdict.WRONG_KEY: "the vehicle signs its frames with another key, so they are refused; give "
     "both sides the same key (link.signing_key_file)",
 }
-"""A replayed frame is no more than a repeated one, and only counted."""
+"""What is said of time stamps `Signing.remarks` says."""
 
 _WE_DO_NOT_SIGN = (
     "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
@@ -84,6 +84,7 @@ class Inbox:
         self._explained = 0
         self._notice = notice
         self._noticed: set[str] = set()
+        self._candidate: str | None = None
         self._held: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
@@ -131,12 +132,20 @@ class Inbox:
         if not any(map(self._peer_rule.is_claim, admitted)):
             self._stats.unclaimed += len(admitted)
             return False
+        self._candidate = None
         self._peer_rule.fix(who)
         try:
             for frame in admitted:
                 self._accept(frame, received_ns)
         except Exception as error:  # of the tap
             self._router.report(error)
+        return True
+
+    def may_answer(self, who: str) -> bool:
+        """Whether a question is to be sent to `who`, whose claim an answer alone would prove."""
+        if self._signing is None or not self._signing.awaits_answer:
+            return False
+        self._candidate = who
         return True
 
     def claim_lapsed(self) -> bool:
@@ -180,6 +189,9 @@ class Inbox:
             if not self._admit(frame):
                 continue
             accepted = True
+            if self._candidate is not None:
+                self._peer_rule.fix(self._candidate)
+                self._candidate = None
             self._accept(frame, received_ns)
         return accepted
 
@@ -214,12 +226,19 @@ class Inbox:
                 self._notice_once(_WE_DO_NOT_SIGN)
             return True
         verdict = self._signing.judge(frame)
+        if self._signing.remarks:
+            self.tell_remarks()
         if verdict is Verdict.GOOD:
             return True
         stats.bad_signature += 1
         if verdict in _REFUSED:
             self._notice_once(_REFUSED[verdict])
         return False
+
+    def tell_remarks(self) -> None:
+        """Pass on what there is to say of time stamps."""
+        while self._signing is not None and self._signing.remarks:
+            self._notice_once(self._signing.remarks.pop(0))
 
     def _notice_once(self, text: str) -> None:
         if text not in self._noticed:

@@ -22,6 +22,7 @@ from companion.mavlink.router import Router
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.silence import no_beacon, no_heartbeat
+from companion.mavlink.stamp_keeper import StampKeeper
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.timesync import TimeSync
 from companion.mavlink.transport import Tap
@@ -75,6 +76,9 @@ class Link(Conversation):
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
+        self._keeper: StampKeeper | None = None
+        if settings.signing is not None and settings.signing.file is not None:
+            self._keeper = StampKeeper(settings.signing, settings.signing.file)
         self._lockstep: LockstepClient | None = None
         if settings.lockstep:
             if not isinstance(self._loop, LockstepEventLoop):
@@ -91,6 +95,9 @@ class Link(Conversation):
         except BaseException:
             await self.__aexit__()
             raise
+        if self._keeper is not None:
+            self._keeper.start()
+        self._inbox.tell_remarks()
         self._start(send_heartbeats(self.settings, self._outbox))
         self._start(synchronise(self.timesync, self.clock))
         return self
@@ -104,6 +111,9 @@ class Link(Conversation):
         self._tasks.clear()
         self._registry.fail("closed by us")
         await self._connection.close()
+        if self._keeper is not None:
+            self._keeper.stop()
+        self._inbox.tell_remarks()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
         """Wait for the autopilot's heartbeat; return the newest at once if there was one.

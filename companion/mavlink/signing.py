@@ -8,18 +8,25 @@ import hashlib
 import hmac
 import re
 import time
+from collections import deque
 from collections.abc import Callable
-from enum import Enum
 from pathlib import Path
 
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
+from companion.mavlink.stamp_file import StampFile
+from companion.mavlink.stamp_judge import StampJudge, Stamps, Verdict
 
-_EPOCH_UNIX_S = 1420070400
-_TICKS_PER_S = 100_000
-_NEW_STREAM_WINDOW = 60 * _TICKS_PER_S
+__all__ = ["Signing", "Verdict", "key_from_hex", "key_from_passphrase_file"]
+
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
+
+_ID_AT = slice(7, 10)  # of a version 2 frame
+_PAYLOAD_AT = 10
+_TIMESYNC_ID = 111
+_TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
+_QUESTIONS = 16
 
 
 def key_from_hex(text: str) -> bytes:
@@ -48,46 +55,60 @@ def key_from_passphrase_file(path: Path) -> bytes:
     return hashlib.sha256(lines[0].strip().encode()).digest()
 
 
-class Verdict(Enum):
-    """What a signature is worth."""
-
-    GOOD = "signed with our key, and newer than all before it on its stream"
-    UNSIGNED = "not signed"
-    WRONG_KEY = "signed with another key"
-    REPLAYED = "not newer than what came before: repeated on the way, or a recording"
-
-
 class Signing:
     """Signs our frames and judges theirs.
 
     Args:
         key: 32 bytes shared with the vehicle.
         link_id: Number of this link in our signatures, 0..255.
-        clock: Unix time in s. Our stamps only ever rise, even if it is set back.
+        clock: Unix time in s, read once; see `StampJudge`.
+        elapsed: Monotonic time in s. Our stamps only ever rise.
+        file: Keeps the newest stamps from one run to the next; `None` keeps nothing.
+
+    Attributes:
+        file: As given.
+        remarks: What the user should know of the date; who reads the sentences takes them out.
+        changed: Set when `stamps` should be written soon.
 
     Raises:
         SigningError: The key is not 32 bytes.
     """
 
     def __init__(
-        self, key: bytes, link_id: int = 0, clock: Callable[[], float] = time.time
+        self,
+        key: bytes,
+        link_id: int = 0,
+        clock: Callable[[], float] = time.time,
+        elapsed: Callable[[], float] = time.monotonic,
+        file: StampFile | None = None,
     ) -> None:
         if len(key) != 32:
             raise SigningError(f"a signing key has 32 bytes, not {len(key)}")
         self._key = key
         self._link = bytes([link_id])
-        self._clock = clock
-        self._stamp = 0
-        self._streams: dict[tuple[int, int, int], int] = {}
+        self.file = file
+        kept, trouble = file.load() if file is not None else (Stamps(), None)
+        self._judge = StampJudge(kept, clock, elapsed)
+        self.remarks, self.changed = self._judge.remarks, self._judge.changed
+        if trouble is not None:
+            self.remarks.append(trouble)
+        self._stamp = kept.sent
+        self._asked: deque[bytes] = deque(maxlen=_QUESTIONS)
+        self._unproven = 0
 
     def sign(self, frame: bytes) -> bytes:
         """Add the signature to a frame built with `signed=True`."""
-        self._stamp = max(self._stamp + 1, self._now())
+        self._stamp = max(self._stamp + 1, self._judge.date())
+        if frame[_ID_AT] == _TIMESYNC:
+            answer_at, question = _timesync(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
+            if not any(answer_at):
+                self._asked.append(question)
         tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
     def judge(self, frame: Frame) -> Verdict:
         """Judge a frame; only a good one moves what is kept of its stream."""
+        self._unproven = 0
         if not frame.signed:
             return Verdict.UNSIGNED
         signature = frame.raw[-SIGNATURE_LENGTH:]
@@ -95,17 +116,36 @@ class Signing:
             return Verdict.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
-        # A stream not heard before may lag our clock by a minute at most, or a recording of an
-        # old flight could be played to us.
-        oldest = self._streams.get(stream, max(self._stamp, self._now()) - _NEW_STREAM_WINDOW)
-        if stamp <= oldest:
-            return Verdict.REPLAYED
-        self._streams[stream] = stamp
-        self._stamp = max(self._stamp, stamp)
-        return Verdict.GOOD
+        verdict = self._judge.judge(stream, stamp, answers=self._answers(frame))
+        if verdict is Verdict.GOOD:
+            self._stamp = max(self._stamp, stamp)
+        elif verdict is Verdict.AHEAD and self._judge.awaits_answer(stamp):
+            # A question that is older than what the vehicle knows it would not answer.
+            self._stamp = max(self._stamp, stamp)
+            self._unproven = stamp
+        return verdict
 
-    def _now(self) -> int:
-        return int((self._clock() - _EPOCH_UNIX_S) * _TICKS_PER_S)
+    @property
+    def awaits_answer(self) -> bool:
+        """Whether the last frame was refused only because a question of ours is not answered."""
+        return self._unproven != 0
+
+    def stamps(self) -> Stamps:
+        """What this run adds to what is kept; asked for by another thread."""
+        return Stamps(self._judge.date(), self._stamp, self._judge.streams())
+
+    def _answers(self, frame: Frame) -> bool:
+        """Whether it is the answer to a TIMESYNC question of this run, which no recording has."""
+        if frame.message_id != _TIMESYNC_ID:
+            return False
+        answer_at, question = _timesync(frame.payload)
+        return any(answer_at) and any(question) and question in self._asked
 
     def _hash(self, data: bytes) -> bytes:
         return hashlib.sha256(self._key + data).digest()[:_HASH_BYTES]
+
+
+def _timesync(payload: bytes) -> tuple[bytes, bytes]:
+    """tc1, zero in a question, and ts1, the asker's time, which the answer repeats."""
+    whole = payload.ljust(16, b"\0")
+    return whole[:8], whole[8:16]

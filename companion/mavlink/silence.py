@@ -24,6 +24,11 @@ def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
 
 def _refused(start: str, stats: LinkStats) -> str | None:
     """What came instead and was refused, `None` if nothing was."""
+    if stats.unclaimed:
+        return (
+            f"{start}, but {stats.unclaimed} other frames with its ids; no sender is taken for the "
+            "vehicle before its autopilot's heartbeat"
+        )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))
         return (
@@ -31,5 +36,8 @@ def _refused(start: str, stats: LinkStats) -> str | None:
             f"{source}; is link.target_system right?"
         )
     if stats.bad_signature:
-        return f"{start}, but {stats.bad_signature} frames not signed with our key"
+        return (
+            f"{start}, but {stats.bad_signature} frames not signed with our key, or with a time "
+            "stamp that is not believed"
+        )
     return None

@@ -22,6 +22,12 @@ class Receiver(Protocol):
         Without a valid claim in them nothing is accepted.
         """
 
+    def may_answer(self, who: str) -> bool:
+        """After a claim of `who` that failed: whether it is to be sent what we send all the same.
+
+        Its frames are still refused; but it may prove by an answer that it is no recording.
+        """
+
     def claim_lapsed(self) -> bool:
         """Whether the peer's claim is so old that another sender may take its place."""
 

@@ -119,9 +119,12 @@ class UdpTransport:
     def _read_first(self) -> None:
         try:
             data, stamps, _, address = self._socket.recvmsg(_MAX_DATAGRAM, _STAMP_SPACE)
+            who = spelled(address)
             if not self._named.admit(address):
-                self._receiver.stranger(spelled(address))
-            elif self._receiver.claim(data, _arrival_ns(stamps), spelled(address)):
+                self._receiver.stranger(who)
+            elif self._receiver.claim(data, _arrival_ns(stamps), who) or (
+                self._receiver.may_answer(who)
+            ):
                 self._socket.connect(address)
                 self._peer = self._socket.getpeername()
                 self._connected = self._heard = True

@@ -9,6 +9,7 @@ from companion.mavlink.endpoint import (
     UdpOut,
     parse_endpoint,
 )
+from companion.mavlink.errors import EndpointError
 
 
 def connection_url(endpoint: str) -> str:
@@ -18,6 +19,11 @@ def connection_url(endpoint: str) -> str:
         EndpointError: With the reason and how to mend it.
     """
     where = parse_endpoint(endpoint)
+    if isinstance(where, UdpIn | TcpServer) and where.peers:
+        raise EndpointError(
+            f"endpoint {endpoint!r}: MAVSDK hears every sender; leave ?peer= out, or use "
+            "link.backend: direct"
+        )
     return f"{_scheme(where)}://{_address(where)}"
 
 

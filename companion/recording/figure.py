@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,10 @@ Floats = NDArray[np.float64]
 # Readable by the colour-blind.
 _MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
 _STYLES = ("-", "--", ":")
+_COLUMNS = 7
+"""Of each table that is drawn."""
+_LARGEST = 1e9
+"""No time in s and no distance in m of a flight is larger."""
 _FOR_LEGEND = 0.2
 """Room above the curves, as a share of their height."""
 
@@ -57,9 +62,9 @@ def draw_flight(folder: Path, out: Path) -> None:
     figure, grid = plt.subplots(
         1, len(panels), figsize=(4.5 * len(panels), 4.2), layout="constrained", squeeze=False
     )
-    for axes, draw in zip(grid[0], panels, strict=True):
-        draw(axes)
     try:
+        for axes, draw in zip(grid[0], panels, strict=True):
+            draw(axes)
         figure.savefig(out, dpi=120)
     except ValueError as error:  # an ending that matplotlib does not know
         raise FigureError(f"{out}: {error}") from error
@@ -68,20 +73,38 @@ def draw_flight(folder: Path, out: Path) -> None:
 
 
 def _rows(path: Path) -> Floats | None:
-    """The numbers of a CSV file; None where the flight wrote none."""
+    """The (N, 7) numbers of a CSV file; None where the flight wrote none.
+
+    Raises:
+        FigureError: the file is not as `FlightTrace.save` writes it.
+    """
     if not path.is_file():
         return None
     try:
-        return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        lines = path.read_text(encoding="utf-8").splitlines()[1:]
+        if not any(map(str.strip, lines)):
+            raise ValueError("it holds no rows")
+        rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
     except ValueError as error:
         raise FigureError(f"{path}: not as a flight writes it: {error}") from error
+    if rows.shape[1] != _COLUMNS:
+        raise FigureError(
+            f"{path}: not as a flight writes it: {rows.shape[1]} columns instead of {_COLUMNS}"
+        )
+    # NaN stands for a reference that there was not; nothing else is that large.
+    if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
+        raise FigureError(f"{path}: not as a flight writes it: a number is above {_LARGEST:g}")
+    return rows
 
 
 def _gain(folder: Path) -> float:
     try:
         summary: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        return float(summary["gain_per_s"])
-    except (OSError, ValueError, KeyError) as error:
+        gain = float(summary["gain_per_s"])
+        if not 0.0 < gain < inf:
+            raise ValueError(f"gain_per_s is {gain:g}")
+        return gain
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise FigureError(
             f"{folder / 'summary.json'}: not as a flight writes it: {error}"
         ) from error

@@ -1,9 +1,11 @@
 """What can be followed: curves in space with a time law, sampled up to the jerk."""
 
+from companion.trajectory.computable import computable
 from companion.trajectory.csv_file import Table
 from companion.trajectory.csv_file import read as read_csv
+from companion.trajectory.demand import Motion
 from companion.trajectory.facing import turned_first
-from companion.trajectory.feasibility import Envelope, Violation, slow_down, violations
+from companion.trajectory.feasibility import Envelope, Violation, judge, slow_down, violations
 from companion.trajectory.figures import (
     Hover,
     Laps,
@@ -15,15 +17,27 @@ from companion.trajectory.figures import (
 )
 from companion.trajectory.from_samples import Frame, HeadingFrom, SampleOptions, from_samples
 from companion.trajectory.retimed import Slowed
-from companion.trajectory.sample import Sample, Trajectory, TrajectoryError, Vector
+from companion.trajectory.sample import (
+    FARTHEST,
+    FASTEST,
+    LONGEST,
+    Sample,
+    Trajectory,
+    TrajectoryError,
+    Vector,
+)
 from companion.trajectory.waypoints import waypoints
 
 __all__ = [
+    "FARTHEST",
+    "FASTEST",
+    "LONGEST",
     "Envelope",
     "Frame",
     "HeadingFrom",
     "Hover",
     "Laps",
+    "Motion",
     "Sample",
     "SampleOptions",
     "Slowed",
@@ -34,9 +48,11 @@ __all__ = [
     "Violation",
     "bernoulli_eight",
     "circle",
+    "computable",
     "from_samples",
     "gerono_eight",
     "helix",
+    "judge",
     "line",
     "read_csv",
     "slow_down",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt, tau
 from typing import NamedTuple, Protocol
 
-from companion.trajectory.sample import Vector
+from companion.trajectory.sample import TrajectoryError, Vector
 
 
 class CurvePoint(NamedTuple):
@@ -19,11 +19,56 @@ class CurvePoint(NamedTuple):
     third: Vector
 
 
+class Looks(NamedTuple):
+    """Where to look at a curve so that nothing is missed between two looks.
+
+    Attributes:
+        step: phase between two looks; None where `phases` lists them.
+        period: after this phase it repeats itself, but for a steady rise; None: it does not.
+        phases: of the looks, ascending.
+    """
+
+    step: float | None
+    period: float | None = None
+    phases: tuple[float, ...] = ()
+
+
+PATH_STEP = 0.25
+"""Largest way between two looks, m."""
+
+MOST_LOOKS = 80_000
+"""Looks at one trajectory, about a second of work."""
+
+_LOOKS_A_LAP = 720
+"""An extreme of the k-th harmonic is then missed by 0.001 k² % at most."""
+
+
+def require_looks(needed: float) -> None:
+    """See that a trajectory can be judged with a bounded number of looks.
+
+    Raises:
+        TrajectoryError: it cannot.
+    """
+    if not needed <= MOST_LOOKS:
+        raise TrajectoryError(
+            f"it is too long to be checked: it takes {needed:.3g} samples, and {MOST_LOOKS} are "
+            "the most; make it shorter, or let it gather speed more quickly"
+        )
+
+
+def _looks_of(figure: "Figure") -> Looks:
+    return Looks(min(tau / _LOOKS_A_LAP, PATH_STEP / figure.steepest), tau)
+
+
 class Curve(Protocol):
     """A curve over its phase."""
 
     def at(self, phase: float) -> CurvePoint:
         """The point at `phase`."""
+        ...
+
+    def looks(self) -> Looks:
+        """How finely it is to be looked at."""
         ...
 
 
@@ -45,6 +90,10 @@ class Straight:
     """
 
     direction: Vector
+
+    def looks(self) -> Looks:
+        """The phase is the way."""
+        return Looks(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
         """The point `phase` metres along."""
@@ -70,6 +119,10 @@ class Helix:
         """The same everywhere."""
         return hypot(self.radius, self.rise / tau)
 
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
+
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
         r, up = self.radius, self.rise / tau
@@ -91,6 +144,10 @@ class GeronoEight:
     def steepest(self) -> float:
         """In the middle."""
         return sqrt(2.0) * self.half_width
+
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
@@ -116,6 +173,10 @@ class BernoulliEight:
     def steepest(self) -> float:
         """At the tips; in the middle it is 1/√2 of this."""
         return self.half_width
+
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
@@ -143,6 +204,10 @@ class Turned:
     def steepest(self) -> float:
         """That of the figure."""
         return self.figure.steepest
+
+    def looks(self) -> Looks:
+        """Those of the figure."""
+        return self.figure.looks()
 
     def at(self, phase: float) -> CurvePoint:
         """The turned point."""

@@ -1,5 +1,6 @@
 """What a trajectory demands of the vehicle: tilt, rates, thrust, speeds, room."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,14 +34,24 @@ class Motion:
         )
 
 
-def sampled(trajectory: Trajectory, step: float) -> Motion:
-    """The motion from beginning to end, at most `step` seconds apart."""
-    times = np.linspace(0.0, trajectory.duration, int(np.ceil(trajectory.duration / step)) + 1)
-    samples = [trajectory.at(time) for time in times.tolist()]
-    position, velocity, acceleration, jerk, _, heading_rate = (
+def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
+    """The motion at some times, or at those at which all of it can be judged.
+
+    Raises:
+        TrajectoryError: it is too long to be judged.
+        FloatingPointError: it is not a finite number somewhere; see `computable`.
+    """
+    times = trajectory.check_times() if times is None else times
+    samples = [trajectory.at(time) for time in times]
+    position, velocity, acceleration, jerk, heading, heading_rate = (
         np.array(column) for column in zip(*samples, strict=True)
     )
-    return Motion(times, position, velocity, acceleration, jerk, heading_rate)
+    motion = Motion(np.array(times), position, velocity, acceleration, jerk, heading_rate)
+    # A comparison with a limit is false for what is not a number.
+    for column in (position, velocity, acceleration, jerk, heading, heading_rate):
+        if not np.isfinite(column).all():
+            raise FloatingPointError("not a finite number")
+    return motion
 
 
 @dataclass(frozen=True, slots=True)

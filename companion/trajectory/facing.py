@@ -40,6 +40,10 @@ class TurnedFirst:
         """It does not."""
         return False
 
+    def check_times(self) -> list[float]:
+        """Those of the trajectory; the turn keeps its own limit and stays where it is."""
+        return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
+
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the turn began."""
         after = time - self.turn.duration

@@ -1,18 +1,16 @@
 """Whether a trajectory can be flown within limits, and how much slower if not."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
+from companion.trajectory.computable import computable
 from companion.trajectory.demand import Floats, Motion, demand, sampled
 from companion.trajectory.retimed import Slowed
 from companion.trajectory.sample import Trajectory, TrajectoryError
-
-_STEP = 0.005
-"""How finely a trajectory is looked at, s."""
 
 _ROUNDING = 1e-9
 """Share of a limit by which it may be missed: the fastest place may be meant to lie on it."""
@@ -24,6 +22,32 @@ _PRECISION = 1e-3
 """Of the factor, as a share of it."""
 
 _DEGREES = 180.0 / pi
+
+SLOWER = "fly it more slowly (--slow-down finds how much), or change the limit"
+"""The remedy for what breaks a limit by its motion."""
+
+
+class Violation(NamedTuple):
+    """A limit that a trajectory breaks; its text is for the user.
+
+    Attributes:
+        limit: the key of the configuration that sets it.
+        begins: when it is first broken, s.
+        time: when it is broken most, s.
+        text: all of this in words.
+        remedy: what to do about it, as the end of a sentence.
+        slowing_helps: whether it is kept if the way is flown slowly enough.
+    """
+
+    limit: str
+    begins: float
+    time: float
+    text: str
+    remedy: str = SLOWER
+    slowing_helps: bool = True
+
+    def __str__(self) -> str:
+        return self.text
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +63,7 @@ class Envelope:
         max_climb: upward speed, m/s.
         max_descent: downward speed, m/s.
         max_speed: m/s.
-        fence_radius: horizontally, m.
-        fence_ceiling: highest, m.
-        fence_floor: lowest, m; negative below the start.
+        fence: judges where it goes, and where it would stop.
         drag: linear against still air, equal in all directions, per mass, 1/s.
         gravity: m/s².
     """
@@ -54,30 +76,9 @@ class Envelope:
     max_climb: float | None = None
     max_descent: float | None = None
     max_speed: float | None = None
-    fence_radius: float | None = None
-    fence_ceiling: float | None = None
-    fence_floor: float | None = None
+    fence: Callable[[Motion], Violation | None] | None = None
     drag: float = 0.0
     gravity: float = 9.80665
-
-
-class Violation(NamedTuple):
-    """A limit that a trajectory breaks; its text is for the user.
-
-    Attributes:
-        limit: the key of the configuration that sets it.
-        begins: when it is first broken, s.
-        time: when it is broken most, s.
-        text: all of this in words.
-    """
-
-    limit: str
-    begins: float
-    time: float
-    text: str
-
-    def __str__(self) -> str:
-        return self.text
 
 
 class _Need(NamedTuple):
@@ -102,7 +103,14 @@ class _Need(NamedTuple):
 
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a trajectory breaks, in the order of time; none if it can be flown."""
-    return _broken(sampled(trajectory, _STEP), envelope)
+    with computable():
+        return _broken(sampled(trajectory), envelope)
+
+
+def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
+    """All limits that a motion breaks, in the order of time."""
+    with computable():
+        return _broken(motion, envelope)
 
 
 def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, float]:
@@ -114,14 +122,26 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, f
     Raises:
         TrajectoryError: however slowly it is flown, it breaks a limit.
     """
-    motion = sampled(trajectory, _STEP)
-    if not _broken(motion, envelope):
+    with computable():
+        return _slowed_down(trajectory, sampled(trajectory), envelope)
+
+
+def _slowed_down(
+    trajectory: Trajectory, motion: Motion, envelope: Envelope
+) -> tuple[Trajectory, float]:
+    broken = _broken(motion, envelope)
+    if not broken:
         return trajectory, 1.0
+    for one in broken:
+        if not one.slowing_helps:
+            raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
     too_fast, slow = 1.0, 2.0
     while found := _broken(motion.slowed(slow), envelope):
         too_fast, slow = slow, 2.0 * slow
         if slow > _SLOWEST:
-            raise TrajectoryError(f"{trajectory.name}: however slowly it is flown, {found[0]}")
+            raise TrajectoryError(
+                f"{trajectory.name}: however slowly it is flown, {found[0]}; {found[0].remedy}"
+            )
     while slow - too_fast > _PRECISION * too_fast:
         middle = 0.5 * (too_fast + slow)
         if _broken(motion.slowed(middle), envelope):
@@ -132,31 +152,28 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, f
 
 
 def _broken(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    found = (_violation(motion.times, need) for need in _needs(motion, envelope))
+    found = [_violation(motion.times, need) for need in _needs(motion, envelope)]
+    if envelope.fence is not None:
+        found.append(envelope.fence(motion))
     return tuple(sorted((one for one in found if one), key=lambda one: one.begins))
 
 
 def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     """What the motion needs of everything that the envelope limits."""
-    e, climb, height = envelope, -motion.velocity[:, 2], -motion.position[:, 2]
+    e, climb = envelope, -motion.velocity[:, 2]
     rotors = demand(motion, e.drag, e.gravity)
     turn = np.abs(motion.heading_rate)
     speed = np.linalg.norm(motion.velocity, axis=1)
-    distance = np.hypot(motion.position[:, 0], motion.position[:, 1])
-    above, away = " m of height above the start", " m of distance from the start"
-    yield _Need("max_tilt_deg", e.max_tilt, rotors.tilt, "° of tilt", _DEGREES)
-    yield _Need(
-        "max_tilt_rate_deg_s", e.max_tilt_rate, rotors.tilt_rate, "°/s of roll and pitch", _DEGREES
-    )
-    yield _Need("max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _DEGREES)
-    yield _Need("min_thrust", e.min_thrust, rotors.thrust, " m/s² of thrust", least=True)
-    yield _Need("max_thrust", e.max_thrust, rotors.thrust, " m/s² of thrust")
-    yield _Need("max_climb_m_s", e.max_climb, climb, " m/s of climb")
-    yield _Need("max_descent_m_s", e.max_descent, -climb, " m/s of descent")
-    yield _Need("max_speed_m_s", e.max_speed, speed, " m/s of speed")
-    yield _Need("fence_radius_m", e.fence_radius, distance, away)
-    yield _Need("fence_ceiling_m", e.fence_ceiling, height, above)
-    yield _Need("fence_floor_m", e.fence_floor, height, above, least=True)
+    yield _Need("limits.max_tilt_deg", e.max_tilt, rotors.tilt, "° of tilt", _DEGREES)
+    turning = rotors.tilt_rate
+    spin = "°/s of roll and pitch"
+    yield _Need("limits.max_tilt_rate_deg_s", e.max_tilt_rate, turning, spin, _DEGREES)
+    yield _Need("limits.max_yaw_rate_deg_s", e.max_yaw_rate, turn, "°/s of yaw", _DEGREES)
+    yield _Need("limits.min_thrust", e.min_thrust, rotors.thrust, " m/s² of thrust", least=True)
+    yield _Need("limits.max_thrust", e.max_thrust, rotors.thrust, " m/s² of thrust")
+    yield _Need("limits.max_climb_m_s", e.max_climb, climb, " m/s of climb")
+    yield _Need("limits.max_descent_m_s", e.max_descent, -climb, " m/s of descent")
+    yield _Need("safety.max_speed_m_s", e.max_speed, speed, " m/s of speed")
 
 
 def _violation(times: Floats, need: _Need) -> Violation | None:
@@ -171,9 +188,9 @@ def _violation(times: Floats, need: _Need) -> Violation | None:
     begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(excess)])
     needed = float(need.needed[np.argmax(excess)]) * need.shown_in
     text = (
-        f"at {time:.2f} s it needs {needed:.4g}{need.what}, limits.{need.limit} allows "
+        f"at {time:.2f} s it needs {needed:.4g}{need.what}, {need.limit} allows "
         f"{'no less than ' if need.least else ''}{need.allowed * need.shown_in:.4g}"
     )
     if begins < time:
         text += f" (broken from {begins:.2f} s on)"
-    return Violation(f"limits.{need.limit}", begins, time, text)
+    return Violation(need.limit, begins, time, text)

@@ -11,7 +11,7 @@ from companion.trajectory.curves import (
     Straight,
     Turned,
 )
-from companion.trajectory.sample import Sample, TrajectoryError, Vector
+from companion.trajectory.sample import LEAST_WAY, Sample, TrajectoryError, Vector
 from companion.trajectory.time_laws import STEEPEST, Cruise, LimitedJerk
 from companion.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
@@ -38,6 +38,10 @@ class Hover:
         """It does."""
         return True
 
+    def check_times(self) -> list[float]:
+        """Its beginning and its end."""
+        return [0.0, self.duration]
+
     def at(self, time: float) -> Sample:
         """At rest."""
         return Sample(_REST, _REST, _REST, _REST, 0.0, 0.0)
@@ -60,7 +64,7 @@ def line(
             `along`.
     """
     length = sqrt(sum(x * x for x in to))
-    if length == 0.0:
+    if length < LEAST_WAY:
         raise TrajectoryError("a line must lead somewhere else than where it begins")
     if along and hypot(to[0], to[1]) == 0.0:
         raise TrajectoryError("a vertical line has no heading to face along")

@@ -1,14 +1,17 @@
 """A trajectory from samples of it, in whatever frame they are given."""
 
 from enum import Enum
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
+from companion.trajectory.check_times import require_duration
 from companion.trajectory.csv_file import Table
 from companion.trajectory.sample import TrajectoryError
 from companion.trajectory.septic_spline import Floats, SepticSpline
 from companion.trajectory.spline_curve import (
+    HEADING_LOOKS,
     SplineCurve,
     heading_spline,
     smoothed,
@@ -19,6 +22,12 @@ from companion.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
 
 _AT_REST = 0.1
 """Samples that begin or end slower than this are meant to be at rest there, m/s."""
+
+_LOOKS = 16
+"""At each piece of the spline: it is smooth over two of them, a period of the cutoff."""
+
+_MOST_PIECES = 6000
+"""Pieces of the spline, two for each period of the cutoff; it is fitted within a second."""
 
 _LARGEST_RAMP = 0.5
 """Of the duration may be taken by gathering speed, and by losing it."""
@@ -109,8 +118,10 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     runs from standstill up to its true pace, and the trajectory lasts longer than the samples.
 
     Raises:
-        TrajectoryError: velocity or acceleration are not the derivatives of the position.
+        TrajectoryError: velocity or acceleration are not the derivatives of the position, or it
+            lasts too long.
     """
+    _require_short(table, options.cutoff)
     to_ned = _TO_NED[options.frame]
     position = (table.position - table.position[0]) @ to_ned.rotation.T
     derivatives = tuple(known @ to_ned.rotation.T for known in table.derivatives)
@@ -124,7 +135,21 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
         for rests, speed in zip(resting, speeds, strict=True)
     ]
     law = Cruise(spline.end, 1.0, *ramps)
-    return TimedCurve(name, SplineCurve(spline), law, _heading(spline, table, options, resting))
+    heading = _heading(spline, table, options, resting)
+    step = inf if isinstance(heading, HeldHeading) else HEADING_LOOKS
+    return TimedCurve(name, SplineCurve(spline, _LOOKS, step), law, heading)
+
+
+def _require_short(table: Table, cutoff: float) -> None:
+    """See that fitting it takes bounded work."""
+    lasts = float(table.times[-1])
+    require_duration(lasts)
+    if lasts * 2.0 * cutoff > _MOST_PIECES:
+        most = _MOST_PIECES / (2.0 * cutoff)
+        raise TrajectoryError(
+            f"it lasts {lasts:.4g} s, and {most:.4g} s is the longest with cutoff_hz {cutoff:g}; "
+            "lower that, or fly a part of it"
+        )
 
 
 def _speed(spline: SepticSpline, time: float) -> float:
@@ -133,7 +158,7 @@ def _speed(spline: SepticSpline, time: float) -> float:
 
 def _check(spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]) -> None:
     """That what the file calls velocity and acceleration are that."""
-    motion = np.array([spline.at(time) for time in times.tolist()])
+    motion = spline.along(times)
     for order, (known, quantity) in enumerate(zip(derivatives, _DERIVATIVES, strict=False), 1):
         missed = np.linalg.norm(motion[:, :, order] - known, axis=1)
         size = np.linalg.norm(known, axis=1)

@@ -32,6 +32,10 @@ class Slowed:
         """As the trajectory does."""
         return self.trajectory.holds_heading
 
+    def check_times(self) -> list[float]:
+        """Those of the trajectory, stretched."""
+        return [self.factor * time for time in self.trajectory.check_times()]
+
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""
         rate = 1.0 / self.factor

@@ -1,9 +1,23 @@
 """The words of the trajectory room. World NED, SI units, radians; plain floats."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 Vector = tuple[float, float, float]
 """(north, east, down)."""
+
+
+LONGEST = 3600.0
+"""A trajectory lasts no longer than this, s."""
+
+FARTHEST = 10_000.0
+"""No place that a file names lies farther from the beginning along any axis, m."""
+
+FASTEST = 100.0
+"""No file asks for more along any axis, m/s."""
+
+LEAST_WAY = 1e-3
+"""Places nearer to each other than this are the same, m."""
 
 
 class TrajectoryError(ValueError):
@@ -51,4 +65,12 @@ class Trajectory(Protocol):
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning; at rest before it and past the end."""
+        ...
+
+    def check_times(self) -> Sequence[float]:
+        """When to look at it to judge all of it, s: see `companion.trajectory.check_times`.
+
+        Raises:
+            TrajectoryError: it is too long to be judged.
+        """
         ...

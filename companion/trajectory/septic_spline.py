@@ -1,6 +1,7 @@
 """Splines of polynomials of degree 7, given by their value, velocity, acceleration and jerk."""
 
 from bisect import bisect_right
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,7 @@ class SepticSpline:
         )
         unit = np.einsum("ij,kjn->kni", FROM_ENDS, ends)
         pieces = unit / (spans[:, None, None] ** np.arange(_DEGREE + 1))
+        self._arrays = knots, pieces
         self._knots: list[float] = knots.tolist()
         self._pieces: list[list[list[float]]] = pieces.tolist()
 
@@ -68,9 +70,21 @@ class SepticSpline:
         u = time - self._knots[which]
         return [_horner(piece, u) for piece in self._pieces[which]]
 
+    def along(self, times: Floats) -> Floats:
+        """The same as `at` at (m,) times at once; (m, n, 4)."""
+        knots, pieces = self._arrays
+        which = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)
+        u = (times - knots[which])[:, None]
+        return np.stack(_horner(np.moveaxis(pieces[which], -1, 0), u), axis=-1)
 
-def _horner(c: list[float], u: float) -> tuple[float, float, float, float]:
-    """Of c₀ + c₁u + … c₇u⁷, and its first three derivatives."""
+    @property
+    def knots(self) -> Floats:
+        """All of them, (k,), s."""
+        return self._arrays[0]
+
+
+def _horner(c: Any, u: Any) -> tuple[Any, Any, Any, Any]:
+    """Of c₀ + c₁u + … c₇u⁷, and its first three derivatives; of floats, or of arrays."""
     c0, c1, c2, c3, c4, c5, c6, c7 = c
     return (
         ((((((c7 * u + c6) * u + c5) * u + c4) * u + c3) * u + c2) * u + c1) * u + c0,

@@ -4,13 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.trajectory.curves import CurvePoint
+from companion.trajectory.curves import PATH_STEP, CurvePoint, Looks, require_looks
 from companion.trajectory.minimum_snap import Fixed, Observations, minimum_snap
 from companion.trajectory.sample import TrajectoryError
 from companion.trajectory.septic_spline import ORDER, Floats, SepticSpline
 
 _HEADING_CUTOFF = 2.0
 """Where the heading along a spline is smoothed, Hz: nothing follows a quicker one."""
+
+HEADING_LOOKS = 1.0 / (32.0 * _HEADING_CUTOFF)
+"""Between two looks at such a heading, s."""
 
 _HEADING_STEP = 0.01
 """How finely the direction of flight is looked at, s."""
@@ -24,9 +27,33 @@ _STANDING = 0.01
 
 @dataclass(frozen=True, slots=True)
 class SplineCurve:
-    """A spline of north, east and down, in m."""
+    """A spline of north, east and down, in m.
+
+    Attributes:
+        spline: three times continuously differentiable.
+        looks_a_piece: at least; between them its extremes are missed by less than 0.3 %.
+        looks_step: largest phase between two of them, where a heading changes more quickly.
+    """
 
     spline: SepticSpline
+    looks_a_piece: int = 64
+    looks_step: float = np.inf
+
+    def looks(self) -> Looks:
+        """The pieces evenly divided, the long ones and the fast ones more finely."""
+        knots = self.spline.knots
+        spans = np.diff(knots)
+        evenly = np.linspace(0.0, 1.0, 17)
+        velocity = self.spline.along((knots[:-1, None] + spans[:, None] * evenly).ravel())[:, :, 1]
+        fastest = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
+        counts = np.ceil(np.maximum(spans * fastest * 1.05 / PATH_STEP, spans / self.looks_step))
+        counts = np.maximum(counts, self.looks_a_piece)
+        require_looks(float(counts.sum()))
+        grids = [
+            np.linspace(begin, end, int(count), endpoint=False)
+            for begin, end, count in zip(knots[:-1], knots[1:], counts, strict=True)
+        ]
+        return Looks(None, phases=tuple(np.concatenate((*grids, knots[-1:])).tolist()))
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the spline's time `phase`."""
@@ -102,7 +129,7 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     """
     count = int(np.ceil((spline.end - spline.begin) / _HEADING_STEP)) + 1
     times = np.linspace(spline.begin, spline.end, count)
-    velocity = np.array([[axis[1] for axis in spline.at(t)[:2]] for t in times.tolist()])
+    velocity = spline.along(times)[:, :2, 1]
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     moving = speed > max(_SLOW * speed.max(), _STANDING)
     if not moving.any():

@@ -25,8 +25,25 @@ class Progress(NamedTuple):
     third: float = 0.0
 
 
+class Piece(NamedTuple):
+    """A part of a time law in which its derivatives are smooth.
+
+    Attributes:
+        begin, end: s.
+        steady: whether the rate is constant in it.
+    """
+
+    begin: float
+    end: float
+    steady: bool
+
+
 class TimeLaw(Protocol):
     """Progress along a curve over time."""
+
+    def pieces(self) -> Sequence[Piece]:
+        """Its smooth parts, in order, from 0 to the duration."""
+        ...
 
     @property
     def duration(self) -> float:
@@ -61,6 +78,15 @@ class Cruise:
         """The way at the steady rate, and half of each ramp more, s."""
         return self.length / self.rate + 0.5 * (self.gathering + self.losing)
 
+    def pieces(self) -> list[Piece]:
+        """Gathering, steady, losing."""
+        brake = self.duration - self.losing
+        return [
+            Piece(0.0, self.gathering, False),
+            Piece(self.gathering, brake, True),
+            Piece(brake, self.duration, False),
+        ]
+
     def at(self, time: float) -> Progress:
         """Progress at `time`."""
         left = self.duration - time
@@ -87,6 +113,10 @@ def _ramp(rate: float, duration: float, time: float) -> Progress:
         rate / duration * 140.0 * u3 * v * v * v,
         rate / (duration * duration) * 420.0 * u * u * v * v * (1.0 - 2.0 * u),
     )
+
+
+_CRUISING = 3
+"""Which of the seven pieces of constant jerk has neither jerk nor acceleration."""
 
 
 class LimitedJerk:
@@ -125,6 +155,12 @@ class LimitedJerk:
         self._ends = [start for start, _, _ in self._pieces[1:]]
         self.duration = 2.0 * gathering + cruising
         """How long it lasts, s."""
+
+    def pieces(self) -> list[Piece]:
+        """The seven of constant jerk."""
+        begins = [start for start, _, _ in self._pieces]
+        spans = zip(begins, [*begins[1:], self.duration], strict=True)
+        return [Piece(begin, end, k == _CRUISING) for k, (begin, end) in enumerate(spans)]
 
     def at(self, time: float) -> Progress:
         """Progress at `time`."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import atan2, remainder, tau
 from typing import Protocol
 
+from companion.trajectory.check_times import check_times
 from companion.trajectory.curves import Curve, CurvePoint
 from companion.trajectory.sample import Sample, Vector
 from companion.trajectory.time_laws import TimeLaw
@@ -70,6 +71,14 @@ class TimedCurve:
     def holds_heading(self) -> bool:
         """Whether it keeps the heading it finds."""
         return isinstance(self.heading, HeldHeading)
+
+    def check_times(self) -> list[float]:
+        """When to look at it to judge all of it, s.
+
+        Raises:
+            TrajectoryError: it is too long to be judged.
+        """
+        return check_times(self.curve.looks(), self.law)
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""

@@ -5,10 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.trajectory.check_times import require_duration
 from companion.trajectory.minimum_snap import Fixed, minimum_snap
-from companion.trajectory.sample import TrajectoryError, Vector
+from companion.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
 from companion.trajectory.septic_spline import ORDER, Floats, SepticSpline
-from companion.trajectory.spline_curve import SplineCurve, SplineHeading, tangent_heading
+from companion.trajectory.spline_curve import (
+    HEADING_LOOKS,
+    SplineCurve,
+    SplineHeading,
+    tangent_heading,
+)
 from companion.trajectory.time_laws import Cruise
 from companion.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
 
@@ -50,23 +56,26 @@ def waypoints(
         )
     places = np.array([(0.0, 0.0, 0.0), *points])
     distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    if not points or not distances.all():
+    if not points or distances.min() < LEAST_WAY:
         raise TrajectoryError(_fault(distances))
     knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
     knots *= _stretch(_through(knots, places), knots, speed, acceleration)
+    require_duration(float(knots[-1]))
     spline = _through(knots, places)
     heading: Heading = HeldHeading()
+    curve = SplineCurve(spline)
     if along:
+        curve = SplineCurve(spline, looks_step=HEADING_LOOKS)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):
         heading = _given_headings(knots, headings)
-    return TimedCurve("waypoints", SplineCurve(spline), Cruise(spline.end, 1.0), heading)
+    return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
 
 
 def _fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
-    which = int(np.flatnonzero(distances == 0.0)[0])
+    which = int(np.flatnonzero(distances < LEAST_WAY)[0])
     before = f"waypoint {which}" if which else "the start"
     return f"waypoint {which + 1} is the same as {before}; leave it out"
 
@@ -100,7 +109,7 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
     """
     fine = np.linspace(0.0, knots.size - 1.0, _LOOKS * (knots.size - 1) + 1)
     times = np.interp(fine, np.arange(knots.size), knots)
-    motion = np.array([spline.at(time) for time in times.tolist()])
+    motion = spline.along(times)
     fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
     return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
 

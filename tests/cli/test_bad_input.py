@@ -45,14 +45,17 @@ def config(tmp_path, text):
         ("link: {attitude_rate_hz: 40}", "min_attitude_rate_hz must not exceed"),
         ("link: {source_component: 1}", "the autopilot's own"),
         ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),
-        ("limits: {fence_floor_m: 4.8}", "fence_floor_m must be at least 0.5 m below"),
+        (
+            "limits: {fence_floor_m: 4.8}",
+            "limits.fence_floor_m is judged with 0.5 m",
+        ),
         (
             "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
             "[0, 0], where control begins, lies outside",
         ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
-        ("circle: {radius_m: 1, speed_m_s: 4}", "too fast for circle.radius_m"),
-        ("circle: {radius_m: 26}", "leaves limits.fence_radius_m"),
+        ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
+        ("circle: {radius_m: 26}", "circle: from 33.75 s on it leaves the fence, by up to 2.0 m"),
         (
             "flight: {programme: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",
@@ -94,7 +97,7 @@ def test_a_wrong_configuration_is_refused_with_what_where_and_how(capsys, tmp_pa
 def test_a_missing_file_is_named(capsys, tmp_path):
     code, _, err = run(capsys, "fly", "--config", tmp_path / "none.yaml")
     assert code == 2
-    assert "none.yaml: cannot read the configuration: No such file or directory" in err
+    assert "none.yaml: cannot read it: No such file or directory" in err
 
 
 def test_a_busy_port_is_named(capsys, tmp_path):
@@ -140,7 +143,7 @@ def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):
         ("flight: {programme: [trajectory], trajectory: /not/there.yaml}", "/not/there.yaml"),
         (
             f"flight: {{programme: [trajectory], trajectory: {far}}}",
-            "limits.fence_radius_m allows 50",
+            "shrink it or widen the fence",
         ),
     ):
         code, _, err = run(capsys, "check-config", config(tmp_path, text))

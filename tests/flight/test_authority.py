@@ -370,12 +370,13 @@ def test_the_pilot_takes_over_during_the_takeoff(tmp_path):
 
 
 def test_leaving_the_fence_hands_back_and_lands(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+    """In still air it would stay inside: open-loop steps know nothing of the wind."""
+    with mock_vehicle(tmp_path, wind={"speed_m_s": 5.0}) as mock:
         summary = fly(
             mock,
             tmp_path / "log",
             flight={"programme": ["steps"]},
-            limits={"fence_radius_m": 0.8},
+            limits={"fence_radius_m": 5.0},
         )
         state = mock.state()
     assert "beyond limits.fence_radius_m" in summary.result

@@ -1,12 +1,18 @@
 """Who the peer is: what strangers send is not taken, and they do not keep the vehicle out."""
 
 import asyncio
+from contextlib import asynccontextmanager, suppress
+from socket import AF_INET6, SOCK_DGRAM, socket
 
 import pytest
 
 from companion.attitude import BodyRates
-from companion.mavlink import Link, LinkSettings
+from companion.mavlink import EndpointError, Link, LinkSettings, LinkTimeout
+from companion.mavlink import peer as peer_module
+from companion.mavlink import tcp as tcp_module
 from companion.mavlink import udp as udp_module
+from companion.mavlink.endpoint import PeerAddress
+from companion.mavlink.named_peers import resolve
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)
@@ -78,5 +84,185 @@ def test_only_a_heartbeat_of_the_autopilot_makes_a_peer(run):
             assert samples == [4]
             assert link.stats.unclaimed == 4
             vehicle.close(), stranger.close()
+
+    run(scene())
+
+
+def test_a_peer_without_heartbeats_loses_its_place_on_the_ground_and_not_in_control(
+    run, quick, monkeypatch
+):
+    monkeypatch.setattr(peer_module, "CLAIM_LASTS_S", 0.1)
+
+    async def scene(controlling):
+        async with linked() as (link, first):
+            second = await FakeVehicle(link.local_address).open_udp()
+            end = asyncio.get_running_loop().time() + 0.5
+            while asyncio.get_running_loop().time() < end:
+                first.send(attitude(4))
+                second.send(heartbeat(0x00060000))
+                if controlling:
+                    link.send_setpoint(4, LEVEL, 0.5)
+                await asyncio.sleep(0.005)
+            second.close()
+            return link.state.mode, link.stats.peers
+
+    assert run(scene(controlling=True)) == ("AUTO.LOITER", 0)
+    assert run(scene(controlling=False)) == ("OFFBOARD", 1)
+
+
+def test_damaged_frames_do_not_hold_the_place(run, quick):
+    async def scene():
+        async with linked() as (link, first):
+            second = await FakeVehicle(link.local_address).open_udp()
+            damaged = bytearray(frames_of(heartbeat())[0])
+            damaged[-1] ^= 1
+
+            def replaced():
+                first.send_raw(bytes(damaged))
+                second.send(heartbeat(0x00060000))
+                return link.state.mode == "OFFBOARD"
+
+            await until(replaced)
+            second.close()
+
+    run(scene())
+
+
+def test_only_the_named_peer_is_heard(run):
+    async def scene():
+        notices = []
+        vehicle = await FakeVehicle().open_udp()
+        named = f"udpin://127.0.0.1:0?peer=localhost:{vehicle.address[1]}"
+        async with Link(LinkSettings(endpoint=named), notice=notices.append) as link:
+            stranger = await FakeVehicle(link.local_address).open_udp()
+            stranger.send(heartbeat(0x00060000), heartbeat(0x00060000))
+            vehicle.peer = link.local_address
+            vehicle.send(heartbeat())
+            assert (await link.wait_connected(5.0)).mode == "AUTO.LOITER"
+            [notice] = notices
+            assert f"what 127.0.0.1:{stranger.address[1]} sends is ignored" in notice
+            stranger.close()
+        vehicle.close()
+
+    run(scene())
+
+
+def test_a_named_host_fits_in_every_spelling():
+    async def scene():
+        named = await resolve([PeerAddress("127.0.0.1"), PeerAddress("::1", 5)], SOCK_DGRAM)
+        assert named.admit(("::ffff:127.0.0.1", 9, 0, 0))
+        assert named.admit(("::1", 5, 0, 0))
+        assert not named.admit(("::1", 6, 0, 0))
+        assert not named.admit(("127.0.0.2", 9))
+        with pytest.raises(EndpointError, match=r"peer 'no-such-host\.invalid' is unknown"):
+            await resolve([PeerAddress("no-such-host.invalid")], SOCK_DGRAM)
+
+    asyncio.run(scene())
+
+
+def test_the_rule_holds_over_ipv6(run):
+    async def scene():
+        async with Link(LinkSettings(endpoint="udpin://[::1]:0")) as link:
+            samples = []
+            link.on_attitude = lambda sample: samples.append(sample.time_boot_ms)
+            with (
+                socket(AF_INET6, SOCK_DGRAM) as vehicle,
+                socket(AF_INET6, SOCK_DGRAM) as stranger,
+            ):
+                frames = frames_of(heartbeat(), attitude(4))
+                vehicle.sendto(frames[0], link.local_address)
+                stranger.sendto(frames_of(attitude(3))[0], link.local_address)
+                vehicle.sendto(frames[1], link.local_address)
+                await until(lambda: samples)
+                assert samples == [4]
+
+    run(scene())
+
+
+@asynccontextmanager
+async def tcp_server(query=""):
+    """A listening link and what it said of itself."""
+    notices = []
+    settings = LinkSettings(endpoint=f"tcpin://127.0.0.1:0{query}")
+    async with Link(settings, notice=notices.append) as link:
+        yield link, notices
+
+
+async def client(link, *messages):
+    reader, writer = await asyncio.open_connection(*link.local_address)
+    for frame in frames_of(*messages):
+        writer.write(frame)
+    return reader, writer
+
+
+def test_a_silent_tcp_client_does_not_keep_the_vehicle_out(run, monkeypatch):
+    monkeypatch.setattr(tcp_module, "CLAIM_LASTS_S", 0.05)
+
+    async def scene():
+        async with tcp_server() as (link, _):
+            waiting = asyncio.create_task(link.wait_connected(5.0))
+            silent, writer = await client(link, attitude(4))
+            early, _ = await client(link, heartbeat())
+            with suppress(ConnectionResetError):  # turned away: the first has some time
+                assert await early.read() == b""
+            await asyncio.sleep(0.06)
+            _, vehicles = await client(link, heartbeat())
+            assert (await waiting).mode == "AUTO.LOITER"
+            assert (link.stats.frames, link.stats.unclaimed) == (1, 1)
+            assert (link.stats.peers, link.stats.reconnects) == (0, 0)
+            with suppress(ConnectionResetError):
+                while await silent.read(4096):
+                    pass
+            # One that brought a heartbeat is not replaced.
+            late, _ = await client(link, heartbeat(0x00060000))
+            await asyncio.sleep(0.06)
+            with suppress(ConnectionResetError):
+                assert await late.read() == b""
+            assert link.state.mode == "AUTO.LOITER"
+            vehicles.close()
+            await until(lambda: link.stats.reconnects == 1)
+            _, again = await client(link, heartbeat(0x00060000))
+            await until(lambda: link.state.mode == "OFFBOARD")
+            assert link.stats.peers == 1
+            again.close(), writer.close()
+
+    run(scene())
+
+
+def test_a_port_scan_does_not_end_what_waits_for_the_vehicle(run):
+    async def scene():
+        async with tcp_server() as (link, _):
+            waiting = asyncio.create_task(link.wait_connected(5.0))
+            _, scan = await client(link)
+            await asyncio.sleep(0.02)
+            scan.transport.abort()
+            await asyncio.sleep(0.02)
+            _, vehicle = await client(link, heartbeat())
+            assert (await waiting).mode == "AUTO.LOITER"
+            vehicle.close()
+
+    run(scene())
+
+
+def test_a_tcp_client_that_is_not_named_is_turned_away(run):
+    async def scene():
+        async with tcp_server("?peer=192.0.2.7") as (link, notices):
+            reader, _ = await client(link, heartbeat())
+            with suppress(ConnectionResetError):
+                assert await reader.read() == b""
+            assert link.stats.frames == 0
+            assert "is ignored" in notices[0]
+
+    run(scene())
+
+
+def test_telemetry_without_a_heartbeat_is_told_for_what_it_is(run):
+    async def scene():
+        async with Link(UDP) as link:
+            stranger = await FakeVehicle(link.local_address).open_udp()
+            stranger.send(attitude(1), attitude(2))
+            with pytest.raises(LinkTimeout, match="2 other frames with its ids"):
+                await link.wait_connected(0.1)
+            stranger.close()
 
     run(scene())

@@ -41,6 +41,12 @@ def inner_times(trajectory, count=101):
     return np.linspace(3.7 * STEP, trajectory.duration - 4.1 * STEP, count)
 
 
+def evenly(trajectory, step):
+    """Times from the beginning to the end, at most `step` seconds apart."""
+    count = int(np.ceil(trajectory.duration / step)) + 1
+    return np.linspace(0.0, trajectory.duration, count).tolist()
+
+
 def assert_rests_at_both_ends(trajectory):
     """Begins at (0, 0, 0) at rest, and rests at its end for ever."""
     end = trajectory.at(trajectory.duration).position

@@ -247,5 +247,5 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     with pytest.raises(TrajectoryError, match=r"none\.csv: cannot read it: No such file"):
         read_csv(tmp_path / "none.csv")
     (tmp_path / "picture.csv").write_bytes(b"\xff\xd8\xff\xe0")
-    with pytest.raises(TrajectoryError, match=r"picture\.csv: not a CSV file"):
+    with pytest.raises(TrajectoryError, match=r"picture\.csv: not a text file"):
         read_csv(tmp_path / "picture.csv")

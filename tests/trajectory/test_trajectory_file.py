@@ -16,6 +16,7 @@ from companion.yaml_file import ConfigError
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
+    evenly,
     inner_times,
 )
 
@@ -46,7 +47,7 @@ def test_a_shipped_trajectory_flies_as_its_first_lines_say(path):
     assert_derivatives_agree(trajectory, inner_times(trajectory), jumps)
     assert_rests_at_both_ends(trajectory)
     told = re.search(r"drag of 1/s it takes ([\d.]+)° of tilt and (\d+)°/s", path.read_text())
-    needs = demand(sampled(trajectory, 0.005), 1.0, 9.80665)
+    needs = demand(sampled(trajectory, evenly(trajectory, 0.005)), 1.0, 9.80665)
     if told:
         assert degrees(needs.tilt.max()) == pytest.approx(float(told[1]), abs=0.06)
         assert degrees(needs.tilt_rate.max()) == pytest.approx(float(told[2]), abs=0.6)

@@ -1,10 +1,8 @@
 """Whether the vehicle stays inside its fence, and would if it began to brake now.
 
 It is stopped in time: what counts is where it would come to a stop, after the time in which nothing
-happens yet, with the deceleration that is certain: v·t + v²/(2a).
+happens yet, with the deceleration that is certain (`Fence.stop`).
 """
-
-from math import hypot
 
 from companion.flight.safety.monitor import Judge
 from companion.flight.safety.snapshot import Snapshot
@@ -18,7 +16,8 @@ def outside(fence: Fence) -> Judge:
         motion = snapshot.motion
         if motion.offset is None:
             return None
-        return fence.breach(motion.offset, motion.height, motion.origin)
+        found = fence.breach(motion.offset, motion.height, motion.origin)
+        return None if found is None else str(found)
 
     return judge
 
@@ -31,15 +30,7 @@ def braking(fence: Fence) -> Judge:
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
-        fast = hypot(velocity[0], velocity[1])
-        share = fence.stop(fast) / fast if fast > 0.0 else 0.0
-        sunk = fence.stop(velocity[2])
-        stop = (
-            offset[0] + share * velocity[0],
-            offset[1] + share * velocity[1],
-            offset[2] + sunk,
-        )
-        found = fence.breach(stop, None if height is None else height - sunk, motion.origin)
+        found = fence.stop_breach(offset, velocity, height, motion.origin)
         return None if found is None else f"about to stop {found}"
 
     return judge

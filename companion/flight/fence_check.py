@@ -1,0 +1,123 @@
+"""Whether a maneuver stays inside the fence, judged before the flight by the monitor's own formula.
+
+`Fence.stop_breach` judges each moment of the reference as the braking monitor will judge the
+vehicle. The vehicle is not exactly on its reference: `MARGIN` is kept for that. So a reference that
+is accepted is not stopped by the monitor, as long as it is followed within the margin.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from companion.guidance.fence import Breach, Fence, Place
+from companion.guidance.reference import Vector
+from companion.trajectory.demand import Floats, Motion
+from companion.trajectory.feasibility import Violation
+
+MARGIN = 0.5
+"""Kept between the reference and the fence, m: for the tracking error, that of the speed included,
+and for the quarter of a metre between two looks."""
+
+_APART = 0.25
+"""Between two looks at a polygon, m."""
+
+_SHOWN = 4000
+"""Moments that are looked at to tell where a breach begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class FenceCheck:
+    """Judges motions that begin where control begins.
+
+    Attributes:
+        fence: as it is watched in flight.
+        height: of where control begins, above home, m.
+        origin: where control begins, or None: a fence on the map is not judged then.
+    """
+
+    fence: Fence
+    height: float
+    origin: Place | None = None
+
+    def __call__(self, motion: Motion) -> Violation | None:
+        """What the motion breaks; slowing it down helps only where braking breaks it."""
+        worst = self._worst(motion)
+        if worst is None:
+            return None
+        still = replace(motion, velocity=np.zeros_like(motion.velocity))
+        place = self._worst(still)
+        time, found = worst if place is None else place
+        begins = self._begins(motion if place is None else still, time)
+        brakes = place is None
+        text, remedy = _text(found, begins, brakes), _remedy(brakes)
+        return Violation(found.limit, begins, time, text, remedy, slowing_helps=brakes)
+
+    def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
+        """The worst breach and its time, s."""
+        columns = self.fence.stop(_columns(motion.position), _columns(motion.velocity))
+        stops = np.stack(columns, axis=1)
+        broken = [
+            (motion.times[k], found)
+            for k in self._candidates(stops)
+            if (found := self._breach(motion, k)) is not None
+        ]
+        if not broken:
+            return None
+        time, found = max(broken, key=lambda each: each[1].by)
+        return float(time), found
+
+    def _candidates(self, stops: Floats) -> list[int]:
+        """Among which moments the worst one is: the farthest, the highest, the lowest."""
+        distance = np.hypot(stops[:, 0], stops[:, 1])
+        found = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
+        if self.fence.polygon or (self.fence.places and self.origin):
+            ways = np.hypot(*np.diff(stops[:, :2], axis=0).T)
+            part = np.floor(np.concatenate(([0.0], np.cumsum(ways))) / _APART)
+            found.update(np.unique(part, return_index=True)[1].tolist())
+        return sorted(found)
+
+    def _breach(self, motion: Motion, k: int) -> Breach | None:
+        offset, velocity = _vector(motion.position[k]), _vector(motion.velocity[k])
+        fence = self.fence
+        if fence.places and self.origin is None:
+            fence = Fence(
+                fence.radius, fence.ceiling, fence.floor, (), (), fence.deceleration, fence.reaction
+            )
+        return fence.stop_breach(offset, velocity, self.height - offset[2], self.origin, MARGIN)
+
+    def _begins(self, motion: Motion, worst: float) -> float:
+        """When the first breach is, s."""
+        stride = max(1, motion.times.size // _SHOWN)
+        for k in range(0, motion.times.size, stride):
+            if motion.times[k] >= worst or self._breach(motion, k) is not None:
+                return float(min(motion.times[k], worst))
+        return worst
+
+
+def _text(found: Breach, time: float, brakes: bool) -> str:
+    if found.by > 0.0:
+        goes = "could not stop inside the fence" if brakes else "leaves the fence"
+        goes = f"it {goes}, by up to {found.by:.1f} m"
+    else:
+        goes = "it would stop too near to the fence" if brakes else "it comes too near to the fence"
+    return (
+        f"from {time:.2f} s on {goes} ({found.where}; {found.limit} is judged with {MARGIN:g} m "
+        "for the tracking error)"
+    )
+
+
+def _remedy(brakes: bool) -> str:
+    if brakes:
+        return (
+            "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
+        )
+    return "shrink it or widen the fence"
+
+
+def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+    return vectors[:, 0], vectors[:, 1], vectors[:, 2]
+
+
+def _vector(row: Floats) -> Vector:
+    north, east, down = row.tolist()
+    return north, east, down

@@ -1,0 +1,84 @@
+"""Where a maneuver takes the vehicle: its reference, and what follows of its open-loop commands.
+
+An open-loop step gives the acceleration that its tilt has while the height is held; how long the
+tilt takes to build up is left out, which shifts the way in time and hardly changes it.
+"""
+
+from collections.abc import Iterator
+from math import sqrt, tan
+from typing import NamedTuple
+
+from companion.guidance.horizontal import Horizontal, rotated
+from companion.guidance.programmes import Programme
+from companion.guidance.reference import GRAVITY, Pose, Reference, Vector
+
+_LARGEST_TILT = 1.4
+"""Rates that turn farther, rad, are nothing that is flown."""
+
+
+class Moment(NamedTuple):
+    """The vehicle at one time of a maneuver: s, m from where it began and m/s, NED."""
+
+    time: float
+    offset: Vector
+    velocity: Vector
+    acceleration: Vector
+
+
+def predicted(part: Programme, heading: float = 0.0, drag: float = 0.0) -> Iterator[Moment]:
+    """The maneuver at its `check_times`, begun at rest.
+
+    Args:
+        part: the maneuver.
+        heading: at its beginning, rad.
+        drag: linear, per mass, 1/s; against still air.
+    """
+    start = Pose((0.0, 0.0, 0.0), heading)
+    before, open_loop = 0.0, _OpenLoop(heading, drag)
+    for time in part.check_times():
+        reference = part.at(time, start)
+        between = part.at(0.5 * (before + time), start)
+        moment = Moment(
+            time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
+        )
+        yield moment if between.closed_loop else open_loop.carried(moment, between, time - before)
+        if reference.closed_loop:
+            open_loop = _OpenLoop(heading, drag)
+        before = time
+
+
+class _OpenLoop:
+    """Horizontal motion by commanded tilt, from rest."""
+
+    def __init__(self, heading: float, drag: float) -> None:
+        self._heading, self._drag = heading, drag
+        self._place = self._speed = (0.0, 0.0)
+        self._roll = self._pitch = 0.0
+
+    def carried(self, moment: Moment, reference: Reference, span: float) -> Moment:
+        """The moment `span` seconds later, with what the reference commands between."""
+        (north, east), (fast_north, fast_east) = self._place, self._speed
+        by_tilt = self._acceleration(reference, span)
+        pushed = by_tilt[0] - self._drag * fast_north, by_tilt[1] - self._drag * fast_east
+        self._place = (
+            north + span * (fast_north + 0.5 * span * pushed[0]),
+            east + span * (fast_east + 0.5 * span * pushed[1]),
+        )
+        self._speed = fast_north + span * pushed[0], fast_east + span * pushed[1]
+        return moment._replace(
+            offset=(*self._place, moment.offset[2]),
+            velocity=(*self._speed, moment.velocity[2]),
+            acceleration=(*by_tilt, moment.acceleration[2]),
+        )
+
+    def _acceleration(self, reference: Reference, span: float) -> Horizontal:
+        if reference.coefficients is not None:
+            north, east = reference.coefficients
+            lift = sqrt(max(1.0 - north * north - east * east, 0.01))
+            return GRAVITY * north / lift, GRAVITY * east / lift
+        if reference.body_rates is not None:
+            self._roll += span * reference.body_rates.roll
+            self._pitch += span * reference.body_rates.pitch
+        forward = -GRAVITY * tan(min(max(self._pitch, -_LARGEST_TILT), _LARGEST_TILT))
+        right = GRAVITY * tan(min(max(self._roll, -_LARGEST_TILT), _LARGEST_TILT))
+        return rotated(forward, right, self._heading)

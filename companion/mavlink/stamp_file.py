@@ -1,0 +1,109 @@
+"""The newest time stamps of signatures on disk: one file for each key, which does not tell the key.
+
+Source: the MAVLink message-signing guide, which asks that they outlive the program.
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from companion.mavlink.errors import SigningError
+from companion.mavlink.stamp_judge import MOST_TICKS, Stamps, Stream
+
+_FOLDER = Path("mavlink-companion", "signing")
+_MOST_BYTES = 1_000_000
+"""Above what 65536 streams of one vehicle take. Larger is no file of ours."""
+
+
+class StampFile:
+    """Time stamps in the user's state directory ($XDG_STATE_HOME, or ~/.local/state), mode 0600.
+
+    Args:
+        key: Whose stamps; the file's name is a hash of it.
+
+    Attributes:
+        path: The file.
+
+    Raises:
+        SigningError: There is no state directory.
+    """
+
+    def __init__(self, key: bytes) -> None:
+        name = hashlib.sha256(b"name of a time stamp file" + key).hexdigest()[:16]
+        self.path = _state_directory() / _FOLDER / f"{name}.json"
+
+    def load(self) -> tuple[Stamps, str | None]:
+        """What is kept, and what is to be told if that cannot be read. Never raises."""
+        try:
+            with self.path.open("rb") as file:
+                return _parsed(file.read(_MOST_BYTES)), None
+        except FileNotFoundError:
+            return Stamps(), None
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is damaged"
+            return Stamps(), (
+                f"the time stamps of signatures in {self.path} cannot be read ({reason}), so a "
+                "recording of an earlier flight may be taken for the vehicle; delete that file "
+                "once this computer's clock is right"
+            )
+
+    def save(self, stamps: Stamps) -> None:
+        """Replace the file as a whole.
+
+        Raises:
+            OSError: It cannot be written; the old one is as it was.
+        """
+        self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        text = json.dumps(
+            {
+                "date": stamps.date,
+                "sent": stamps.sent,
+                "streams": {"/".join(map(str, key)): kept for key, kept in stamps.streams.items()},
+            }
+        )
+        beside = self.path.with_suffix(f".{os.getpid()}")
+        try:
+            opened = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            with os.fdopen(opened, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(self.path)
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise
+
+
+def _state_directory() -> Path:
+    named = Path(os.environ.get("XDG_STATE_HOME", ""))
+    if named.is_absolute():  # the standard: any other is to be ignored
+        return named
+    try:
+        return Path.home() / ".local" / "state"
+    except RuntimeError:
+        raise SigningError(
+            "time stamps of signatures have no place: there is no home directory; set "
+            "XDG_STATE_HOME to a directory that can be written"
+        ) from None
+
+
+def _parsed(text: bytes) -> Stamps:
+    told = json.loads(text)
+    streams = {
+        _stream(name): tuple(_ticks(stamp) for stamp in stamps)
+        for name, stamps in told["streams"].items()
+    }
+    return Stamps(_ticks(told["date"]), _ticks(told["sent"]), streams)
+
+
+def _stream(name: str) -> Stream:
+    system, component, link = (int(part) for part in name.split("/"))
+    return system, component, link
+
+
+def _ticks(value: Any) -> int:
+    if type(value) is not int or not 0 <= value <= MOST_TICKS:
+        raise ValueError(value)
+    return value
