@@ -115,7 +115,12 @@ class Session:
             chronicle.look()
             flight.on_heartbeat()
 
+        def on_current_mode(_: object) -> None:
+            chronicle.look()
+            flight.on_current_mode()
+
         link.subscribe("HEARTBEAT", on_heartbeat)
+        link.subscribe("CURRENT_MODE", on_current_mode)
         # A task of its own, which `leave` can end without ending what writes the record.
         self._flying = asyncio.ensure_future(flight.run())
         try:
