@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
+from companion.flight.held_rates import HeldRates
 from companion.flight.safety import Action, Lookout, SafetyLadder, monitors
 from companion.flight.safety.monitor import Alarm, Monitor
 from companion.flight.safety.snapshot import (
@@ -150,10 +151,10 @@ class Climb:
 
 def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     """A look comes every 20 ms, and one that is late by less than 10 ms is none."""
-    state = SimpleNamespace(reset_counter=None)
+    state = SimpleNamespace(reset_counter=None, positions=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)
-    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0)
+    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0, held=HeldRates())
     lookout = Lookout(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
         lookout.listen(now)
