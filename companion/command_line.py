@@ -238,7 +238,13 @@ def _add_tools(commands: Commands) -> None:
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
     plot.set_defaults(run=tools.plot)
 
-    check = commands.add_parser("check-config", help="check a configuration file")
+    check = commands.add_parser(
+        "check-config",
+        help="check a configuration file",
+        description="Check a configuration file and what it includes. It is read as YAML 1.2 "
+        "(010 is ten, yes is a text; no aliases, no tags), up to 250 kB and 6000 values; the "
+        "schema names the smallest and the largest value of each key.",
+    )
     which = check.add_mutually_exclusive_group(required=True)
     which.add_argument("file", type=Path, nargs="?", metavar="FILE")
     which.add_argument("--schema", action="store_true", help="print the JSON Schema instead")

@@ -4,7 +4,7 @@ The defaults fly the bundled vehicle.
 """
 
 from math import hypot, radians, sin
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -33,6 +33,10 @@ from companion.config_sections import (
 )
 from companion.yaml_file import Section
 
+FileName = Annotated[str, Field(max_length=1000)]
+MOST_INCLUDED = 32
+"""Files that one configuration may include, those of its includes among them."""
+
 _TILT_SHARE = 0.75
 """Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
 
@@ -59,8 +63,11 @@ class Config(Section):
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
     """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
-    include: str | tuple[str, ...] = Field(default=(), exclude=True)
-    """Files whose keys are read as if they stood here, relative to this one; own keys win."""
+    include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
+        default=(), exclude=True
+    )
+    """Files whose keys are read as if they stood here, relative to this one; own keys win. They may
+    include others, up to four deep."""
 
     @property
     def planner_name(self) -> str:

@@ -2,37 +2,80 @@
 
 import json
 from collections.abc import Mapping
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
 from companion import yaml_file
-from companion.config import Config
-from companion.yaml_file import ConfigError
+from companion.config import MOST_INCLUDED, Config
+from companion.yaml_file import ConfigError, UnreadableFileError
 
 _INCLUDE = "include"
-_MAIN_FILE_ONLY = {
-    _INCLUDE: "an included file must not include another",
-    "mock": "the bundled vehicle reads its section from the main file alone",
-}
+_DEEPEST = 4
+"""Includes of includes."""
 
 
 def load(path: Path) -> Config:
     """Read and check a configuration file, and the files that its `include` names beside it.
 
-    Keys of the file itself win over included ones, those of a later file over an earlier one's.
+    Keys of a file win over those that it includes, those of a later file over an earlier one's.
 
     Raises:
-        ConfigError: a file is missing, not YAML, or holds an unknown key or a bad value.
+        ConfigError: a file is missing, includes itself, is not YAML, or holds an unknown key or a
+            bad value.
     """
     own = yaml_file.read(path, Config)
     data: dict[str, Any] = {}
     sources: dict[tuple[str, ...], str] = {}
-    for included in _included(path, own):
-        part = yaml_file.read(included, Config)
-        _check_part(included, part)
-        _merge(data, part, sources, str(included))
+    reading = _Reading(data, sources)
+    reading.add_included((path,), own)
     _merge(data, own, sources, str(path))
     return yaml_file.validated(data, str(path), Config, sources)
+
+
+class _Reading:
+    """Reads the files that a configuration includes, each below the one that includes it.
+
+    Args:
+        data: takes their keys.
+        sources: takes in which file each key stands.
+    """
+
+    def __init__(self, data: dict[str, Any], sources: dict[tuple[str, ...], str]) -> None:
+        self._data = data
+        self._sources = sources
+        self._count = 0
+
+    def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
+        """Add the files that the last one of `chain` includes; its keys are not among them.
+
+        Args:
+            chain: the file, and before it those by whose includes it is read.
+            keys: of the file.
+
+        Raises:
+            ConfigError: as `load`.
+        """
+        for path in _included(chain[-1], keys):
+            self._add((*chain, path))
+
+    def _add(self, chain: tuple[Path, ...]) -> None:
+        *_, by, path = chain
+        self._count += 1
+        if self._count > MOST_INCLUDED:
+            raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
+        if realpath(path) in map(realpath, chain[:-1]):
+            names = " includes ".join(str(one) for one in chain)
+            raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
+        if len(chain) - 1 > _DEEPEST:
+            raise ConfigError(f"{by}: an include must not be deeper than {_DEEPEST} files")
+        try:
+            part = yaml_file.read(path, Config)
+        except UnreadableFileError as error:
+            raise ConfigError(f"{error} (included by {by})") from error
+        _check_part(path, part)
+        self.add_included(chain, part)
+        _merge(self._data, part, self._sources, str(path))
 
 
 def _included(path: Path, own: dict[str, Any]) -> list[Path]:
@@ -41,17 +84,23 @@ def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
     ):
-        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {names!r}")
+        told = yaml_file.shortened(names)
+        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {told}")
     return [path.parent / name for name in names]
 
 
 def _check_part(included: Path, part: dict[str, Any]) -> None:
     for section, values in part.items():
-        if section in _MAIN_FILE_ONLY:
-            reason = _MAIN_FILE_ONLY[section]
-            raise ConfigError(f"{included}: `{section}` must not stand here: {reason}")
+        if section == "mock":
+            raise ConfigError(
+                f"{included}: `mock` must not stand here: "
+                "the bundled vehicle reads its section from the main file alone"
+            )
+        if section == _INCLUDE:
+            continue
         if section in Config.model_fields and not isinstance(values, dict):
-            raise ConfigError(f"{included}: `{section}` must hold keys, not {values!r}")
+            told = yaml_file.shortened(values)
+            raise ConfigError(f"{included}: `{section}` must hold keys, not {told}")
 
 
 def _merge(

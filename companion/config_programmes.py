@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from companion.config_sections import Positive, Seconds
+from companion.config_sections import Seconds
 from companion.yaml_file import Section
 
 
@@ -42,9 +42,9 @@ class CornersConfig(Section):
 class CircleConfig(Section):
     """Programme `circle`: laps at a steady speed, heading held."""
 
-    radius_m: Positive = 3.0
+    radius_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 3.0
     """Radius; the circle begins where the vehicle is and lies north of it."""
-    speed_m_s: Positive = 2.0
+    speed_m_s: Annotated[float, Field(ge=0.01, le=50.0)] = 2.0
     """Speed along the circle, reached and left smoothly."""
     laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     """How often round, gathering speed and braking included."""

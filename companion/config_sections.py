@@ -10,10 +10,8 @@ from typing import Annotated, Literal
 from pydantic import Field, StrictBool, model_validator
 
 from companion.attitude import PLANNER_NAMES
-from companion.yaml_file import Section
+from companion.yaml_file import PathKey, Section
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 
@@ -23,7 +21,7 @@ class LinkConfig(Section):
 
     backend: Literal["direct", "mavsdk"] = "direct"
     """direct, or mavsdk: MAVSDK holds the connection, and our frames go by it (extra `mavsdk`)."""
-    endpoint: str = "udpin://0.0.0.0:14540"
+    endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
     """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD; udpin and
     tcpin also take ?peer=HOST[:PORT], to hear no other."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
@@ -34,17 +32,17 @@ class LinkConfig(Section):
     """Our own system id; a companion computer shares its vehicle's."""
     source_component: Annotated[int, Field(ge=1, le=255)] = 191
     """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
-    signing_key_file: Path | None = None
+    signing_key_file: PathKey | None = None
     """File whose first line is the passphrase: sign what we send, refuse what is not signed."""
     lockstep: StrictBool = False
     """Run on the bundled vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
     """Asked of the autopilot for ATTITUDE_QUATERNION; the loop runs at what really arrives."""
-    min_attitude_rate_hz: Annotated[float, Field(ge=10.0)] = 50.0
+    min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
     """Refuse to fly if less than this arrives."""
     position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
     """Asked for LOCAL_POSITION_NED."""
-    min_position_rate_hz: Annotated[float, Field(ge=1.0)] = 10.0
+    min_position_rate_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 10.0
     """Refuse to fly if less than this arrives."""
 
     @model_validator(mode="after")
@@ -67,7 +65,9 @@ AUTO = "auto"
 class PlannerConfig(Section):
     """The attitude law."""
 
-    name: Annotated[str, Field(json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})] = AUTO
+    name: Annotated[
+        str, Field(max_length=50, json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})
+    ] = AUTO
     """auto: model-following where `vehicle` tells how the rate loop answers, else first-order.
     first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
     error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
@@ -134,15 +134,15 @@ class LimitsConfig(Section):
     """Smallest normalised thrust sent in flight."""
     max_thrust: Share = 0.9
     """Largest normalised thrust sent."""
-    max_climb_m_s: Positive = 2.0
+    max_climb_m_s: Annotated[float, Field(ge=0.1, le=20.0)] = 2.0
     """Largest upward speed that height hold asks for."""
-    max_descent_m_s: Positive = 1.0
+    max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
     """Largest downward speed that height hold asks for."""
-    fence_radius_m: Positive = 50.0
+    fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
     """Farthest from where control began; beyond it we hand back and land."""
-    fence_ceiling_m: Positive = 30.0
+    fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
     """Highest above where control began."""
-    fence_floor_m: Positive = 1.0
+    fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
     """Lowest above home; below it we hand back and land."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
     """Below this: no arming, and in flight hand back and land."""
@@ -169,7 +169,7 @@ class DeadmanConfig(Section):
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
     """Control that stood still this long is not taken up again: hand back. Keep it below the
     autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
-    deadline_ms: Positive = 4.0
+    deadline_ms: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
     """An answer that leaves later than this after its sample reached this computer (over TCP and
     serial: after it was read) counts as a missed deadline."""
 
@@ -188,22 +188,22 @@ class GuidanceConfig(Section):
     its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """How often guidance makes a new target."""
-    position_weight_per_s4: Positive = 40.0
+    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] = 40.0
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
     makes a stiffer hold. The gains follow from it (LQR)."""
-    velocity_weight_per_s2: NotNegative = 8.0
+    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] = 8.0
     """Weight of the horizontal velocity error; a larger one makes a calmer hold."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] = 5.0
     """How quickly wind is found, from how the vehicle moves against what its tilt gives."""
-    max_disturbance_m_s2: NotNegative = 6.0
+    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0)] = 6.0
     """Largest acceleration by wind that is believed."""
     lead: bool = True
     """Lead the targets through the known inner response, so that the vehicle is not late."""
-    height_gain_per_s: NotNegative = 1.5
+    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 1.5
     """Vertical speed per metre of height error."""
-    climb_gain_per_s: NotNegative = 3.5
+    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 3.5
     """Vertical acceleration per m/s of vertical speed error."""
-    drag_per_s: NotNegative = 0.0
+    drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
     """Linear drag per mass, fed forward on the reference's velocity."""
 
 
@@ -213,7 +213,7 @@ class NmpcConfig(Section):
     solver: Literal["hpipm", "acados"] = "hpipm"
     """hpipm (extra `nmpc`), or acados (extra `acados`): quicker, but it compiles C code when it
     meets a configuration for the first time (make and cc; seconds, kept in the user's cache)."""
-    python: Path | None = None
+    python: PathKey | None = None
     """Interpreter of the solver's process; null: ours. The extra `acados` brings a casadi of its
     own, so it needs an environment without the extra `nmpc`, with this program in it, too."""
 
@@ -249,20 +249,20 @@ class FlightConfig(Section):
     """Height above home to which the autopilot takes off."""
     programme: Annotated[
         tuple[Literal["hover", "steps", "circle", "corners", "identify", "trajectory"], ...],
-        Field(min_length=1),
+        Field(min_length=1, max_length=20),
     ] = (
         "hover",
         "steps",
         "circle",
     )
     """Flown in this order."""
-    trajectory: Path | None = None
+    trajectory: PathKey | None = None
     """File of what the programme `trajectory` follows: configs/trajectories/figure8.yaml, say."""
     slow_down: bool = False
     """Slow a trajectory down that the limits do not allow, instead of refusing it."""
     arm: StrictBool = False
     """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
-    accept: tuple[str, ...] = ()
+    accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
     """Unsafe findings of `companion doctor` with which it is flown all the same, by their names,
     such as COM_OF_LOSS_T; each is told in the flight's events."""
     connect_timeout_s: Seconds = 30.0
@@ -284,7 +284,9 @@ class RealtimeConfig(Section):
     """other: as every program. fifo: before all of them (SCHED_FIFO), while it has work."""
     priority: Annotated[int, Field(ge=1, le=90)] = 50
     """Of fifo; the kernel's own threads for interrupts have 50, and above 90 are watchdogs."""
-    cpu_affinity: tuple[Annotated[int, Field(ge=0, le=1023)], ...] = ()
+    cpu_affinity: Annotated[
+        tuple[Annotated[int, Field(ge=0, le=1023)], ...], Field(max_length=1024)
+    ] = ()
     """Run on these processors only, numbered from 0; none named: on any."""
     lock_memory: StrictBool = False
     """Keep all of the program's memory in RAM: no wait for the disk in the middle of a step."""
@@ -297,5 +299,5 @@ class RealtimeConfig(Section):
 class RecordingConfig(Section):
     """What is written down."""
 
-    directory: Path = Path("flights")
+    directory: PathKey = Path("flights")
     """Each flight makes a folder of its own in here."""

@@ -3,17 +3,27 @@
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
-import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+
+from companion import bounded_yaml
+from companion.bounded_file import FileRefusedError, read_text
+from companion.bounded_yaml import MOST_BYTES, YamlError
 
 Model = TypeVar("Model", bound=BaseModel)
+
+_LONGEST_PATH = 1000
+_FAULTS_TOLD = 5
+_LONGEST_TOLD = 60
+
+PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
+"""A key that names a file or a folder; `Section` sees to its length."""
 
 
 def is_path(text: str) -> bool:
     """Whether a text can name a file or a folder."""
-    return text.strip() != "" and "\0" not in text
+    return text.strip() != "" and "\0" not in text and len(text) <= _LONGEST_PATH
 
 
 class Section(BaseModel):
@@ -26,37 +36,35 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_boolean_number(cls, value: Any, field: ValidationInfo) -> Any:
-        """`true` counts as 1 to pydantic; to whoever wrote it, it does not."""
-        kind = cls.model_fields[str(field.field_name)].annotation
-        if isinstance(value, bool) and bool not in (kind, *get_args(kind)):
+        """`true` counts as 1 to pydantic, and `yes` as true; to YAML 1.2 neither does."""
+        wanted = bool in _kinds(cls.model_fields[str(field.field_name)].annotation)
+        if isinstance(value, bool) and not wanted:
             raise ValueError("must not be true or false")
+        if wanted and not isinstance(value, bool):
+            raise ValueError("must be true or false")
         return value
 
     @field_validator("*", mode="before")
     @classmethod
     def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
         """An empty path would be the folder itself, and no path holds a null character."""
-        kind = cls.model_fields[str(field.field_name)].annotation
-        if isinstance(value, str) and Path in (kind, *get_args(kind)) and not is_path(value):
+        kinds = _kinds(cls.model_fields[str(field.field_name)].annotation)
+        if isinstance(value, str) and Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
         return value
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    """A type and, of a union or an annotated one, those in it."""
+    return {annotation}.union(*(_kinds(part) for part in get_args(annotation)))
 
 
 class ConfigError(Exception):
     """What the user configured cannot be used; the message is complete and meant for the user."""
 
 
-class _UniqueKeys(yaml.SafeLoader):
-    """YAML in which a key stands once; plain YAML takes the last one in silence."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for (key_node, _), key in zip(node.value, keys, strict=True):
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key {key!r} stands there twice", problem_mark=key_node.start_mark
-                )
-        return super().construct_mapping(node, deep)
+class UnreadableFileError(ConfigError):
+    """There is no such file, or it is none that could be read."""
 
 
 def load(path: Path, model: type[Model]) -> Model:
@@ -72,14 +80,13 @@ def read(path: Path, model: type[BaseModel]) -> dict[str, Any]:
     """The keys and values of a YAML file, not yet checked against `model`.
 
     Raises:
-        ConfigError: the file is missing, not YAML, or holds no keys.
+        UnreadableFileError: the file is missing, no regular one, too large, or not UTF-8.
+        ConfigError: it is not YAML, or holds no keys.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot read the configuration: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: not a text file in UTF-8") from error
+        text = read_text(path, MOST_BYTES)
+    except FileRefusedError as error:
+        raise UnreadableFileError(f"{path}: {error}") from error
     return _keys(text, str(path), model)
 
 
@@ -94,11 +101,10 @@ def parse(text: str, name: str, model: type[Model]) -> Model:
 
 def _keys(text: str, name: str, model: type[BaseModel]) -> dict[str, Any]:
     try:
-        data = yaml.load(text, _UniqueKeys)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{name}, line {mark.line + 1}" if mark else name
-        raise ConfigError(f"{where}: not valid YAML: {getattr(error, 'problem', error)}") from error
+        data = bounded_yaml.parse(text)
+    except YamlError as error:
+        where = name if error.line is None else f"{name}, line {error.line}"
+        raise ConfigError(f"{where}: {error}") from error
     if data is None:
         data = {}
     if not isinstance(data, dict):
@@ -138,14 +144,27 @@ def validated(
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        details = _without_consequences(error.errors())
+        details = _without_consequences(error.errors(include_url=False))
         faults: dict[str, list[str]] = {}
         for detail in details:
             place = detail["loc"]
             file = (sources or {}).get(place[:2]) or (sources or {}).get(place[:1]) or name
-            faults.setdefault(file, []).append(_explain(place, detail, model))
-        sentences = [f"{file}: " + "; ".join(lines) for file, lines in faults.items()]
+            told = faults.setdefault(file, [])
+            told.append(_explain(place, detail, model) if len(told) < _FAULTS_TOLD else "")
+        sentences = [f"{file}: " + _joined(lines) for file, lines in faults.items()]
         raise ConfigError("; ".join(sentences)) from error
+
+
+def _joined(faults: list[str]) -> str:
+    """The first faults of a file; a thousand of them help nobody."""
+    more = len(faults) - _FAULTS_TOLD
+    return "; ".join(faults[:_FAULTS_TOLD]) + (f"; and {more} more" if more > 0 else "")
+
+
+def shortened(value: Any) -> str:
+    """A value as it is told to whoever wrote it."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
 
 
 def _without_consequences(details: list[Any]) -> list[Any]:
@@ -167,7 +186,7 @@ def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel
         message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
         if not where:
             return str(message)
-        value = "" if isinstance(detail["input"], dict) else f" (got {detail['input']!r})"
+        value = "" if isinstance(detail["input"], dict) else f" (got {shortened(detail['input'])})"
         return f"`{where}`: {message[:1].lower()}{message[1:]}{value}"
     known = _keys_beside(location, model)
     near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)

@@ -25,6 +25,7 @@ from sitl_mock.fault_config import Fault
 from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
 from sitl_mock.px4_parameters import PX4_PARAMETERS
 from sitl_mock.wiring import for_vehicle, parse_wiring
+from sitl_mock.yaml_file import load_yaml
 
 PORT_OFFSET = 40
 """The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
@@ -161,12 +162,12 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
 
 def _mock_section(path: Path) -> dict[str, Any]:
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = load_yaml(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError, TypeError, OverflowError) as error:
         problem = " ".join(str(error).split())
-        raise ConfigError(f"{path}: is not valid YAML: {problem}") from error
+        raise ConfigError(f"{path}: is not valid YAML: {problem:.300}") from error
     section = document.get("mock") if isinstance(document, dict) else document
     if section is None:
         section = {}

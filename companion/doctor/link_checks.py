@@ -16,6 +16,8 @@ _REACHED = 0.7
 """PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
 _COUNTABLE = 5.0
 """So many must be due while we listen for a rate to be told from a count."""
+_SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
+"""What is sent when it changes, and otherwise only so often, Hz, whatever is asked (PX4)."""
 _MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
 _CLOCKS_APART = 0.02
@@ -69,6 +71,7 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
             f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
             "ask for less, or let the autopilot's loop run faster",
         )
+    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
     countable = asked * evidence.window >= _COUNTABLE
     if achieved >= _REACHED * asked if countable else evidence.received[name] > 0:
         return None

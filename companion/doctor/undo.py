@@ -3,26 +3,32 @@
 import os
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated
 
-import yaml
+from pydantic import Field
 
+from companion import bounded_yaml
 from companion.doctor.evidence import Identity
 from companion.mavlink.link import Link
 from companion.yaml_file import ConfigError, Section
+
+Word = Annotated[str, Field(max_length=100)]
+LARGEST = 3.5e38
+"""PARAM_SET carries a 32-bit float."""
 
 
 class Undo(Section):
     """What to restore, and on which vehicle."""
 
-    autopilot: str
+    autopilot: Word
     """Name of the autopilot's family."""
-    system: int
+    system: Annotated[int, Field(ge=1, le=255)]
     """The vehicle's system id."""
-    uid: str | None
+    uid: Word | None
     """AUTOPILOT_VERSION's id of the hardware; null: it was not told."""
-    time: str
+    time: Word
     """When the first of them was set, UTC."""
-    parameters: dict[str, float]
+    parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
     """Old value of each, in the order in which they were set."""
 
     def meant_for(self, link: Link, identity: Identity) -> bool:
@@ -61,7 +67,7 @@ class UndoFile:
         grown = dict(self._undo.parameters)
         grown.setdefault(parameter, old)
         self._undo = self._undo.model_copy(update={"parameters": grown})
-        text = yaml.safe_dump(self._undo.model_dump(), sort_keys=False)
+        text = bounded_yaml.dump(self._undo.model_dump())
         part = self.path.with_suffix(".part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -66,13 +66,14 @@ class Deadlines:
 class ControlLoop:
     """Answers each fresh attitude sample with one setpoint; there is no other way to send one.
 
-    While `guarded` (the autopilot obeys us), a gap in the answers is not silently closed: the
-    autopilot may have left offboard meanwhile, and PX4 would enter it again on our next setpoint.
-    So the loop asks for the mode and waits for `resume`.
+    While `taking_over` or `guarded` (the autopilot may obey us, or does), a gap in the answers is
+    not silently closed: the autopilot may have left offboard meanwhile, and PX4 would enter it
+    again on our next setpoint. So the loop asks for the mode and waits for `resume`.
 
     Attributes:
         command: the newest command; guidance writes it, None means none yet.
         on: whether samples are answered at all.
+        taking_over: whether offboard was asked for, so that the autopilot may obey us any moment.
         guarded: whether a gap needs the autopilot's mode confirmed.
         held_back: a gap happened and `resume` has not come yet.
         resets: jumps of the estimate, which the planner does not see.
@@ -97,6 +98,7 @@ class ControlLoop:
     ) -> None:
         self.command: Command | None = None
         self.on = False
+        self.taking_over = False
         self.guarded = False
         self.held_back = False
         self.resets = EstimatorResets()
@@ -220,7 +222,7 @@ class ControlLoop:
         return dt
 
     def _after_gap(self, now: float) -> bool:
-        if not self.guarded:
+        if not (self.guarded or self.taking_over):
             return False
         if now - self._gap_from > self._deadlines.telemetry_stale and not self.held_back:
             self.held_back = True

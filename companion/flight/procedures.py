@@ -3,6 +3,7 @@
 import asyncio
 
 from companion.flight.ending import FlightEnded, internal
+from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import enter, order
 from companion.flight.rig import Rig
 from companion.flight.roles import in_role, in_roles, require_role
@@ -62,7 +63,7 @@ async def land(rig: Rig) -> None:
 
 
 async def disarm(rig: Rig) -> None:
-    """Wait for the autopilot to disarm itself; ask it to after a while."""
+    """Wait until the autopilot disarmed itself, or ask it to; leave it fit to be armed again."""
     rig.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:
@@ -76,11 +77,16 @@ async def disarm(rig: Rig) -> None:
         rig.detail = "the autopilot to accept disarming"
         await order(rig, rig.link.family.disarm(), in_roles(rig.link, {Role.LAND}), disarmed)
         await rig.until(disarmed)
+    await rig.fresh_heartbeat()
+    await leave_offboard(rig)
 
 
 def _require_landing(rig: Rig) -> None:
-    """The landing under way is ours until a pilot ends it; disarmed, any mode is."""
-    if rig.armed():
+    """The landing under way is ours until a pilot ends it; disarmed, any mode is.
+
+    PX4 goes to another mode when it disarms, and tells of that before it tells that it disarmed.
+    """
+    if rig.armed() and rig.link.state.heartbeat_is_newest:
         require_role(rig.link, {Role.LAND})
 
 

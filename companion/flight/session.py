@@ -5,9 +5,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-import yaml
-
-from companion import realtime
+from companion import bounded_yaml, realtime
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.chronicle import Chronicle
@@ -73,7 +71,7 @@ class Session:
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: what `realtime` requires is not granted; nothing was sent.
         """
-        flown = yaml.safe_dump(self._config.model_dump(mode="json"), sort_keys=False)
+        flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
@@ -117,7 +115,12 @@ class Session:
             chronicle.look()
             flight.on_heartbeat()
 
+        def on_current_mode(_: object) -> None:
+            chronicle.look()
+            flight.on_current_mode()
+
         link.subscribe("HEARTBEAT", on_heartbeat)
+        link.subscribe("CURRENT_MODE", on_current_mode)
         # A task of its own, which `leave` can end without ending what writes the record.
         self._flying = asyncio.ensure_future(flight.run())
         try:

@@ -21,9 +21,9 @@ class CaseLimits(Section):
 
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=75.0)] | None = None
     """Largest tilt of the target."""
-    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0)] | None = None
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """W_M, largest roll-pitch rate."""
-    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0)] | None = None
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """Which limit the proposed method uses; paper: equation 33, needs max_tilt_deg."""
@@ -36,12 +36,19 @@ class Case(Section):
     """Acceleration coefficients [north, east] at the start; their length is sin(tilt)."""
     target: Pair
     """Acceleration coefficients [north, east] of the target."""
-    headings_deg: Annotated[tuple[float, ...], Field(min_length=1, max_length=360)] = (0.0,)
+    headings_deg: Annotated[
+        tuple[Annotated[float, Field(ge=-360.0, le=360.0)], ...],
+        Field(min_length=1, max_length=360),
+    ] = (0.0,)
     """Tilt-yaw headings at which it is flown."""
-    methods: Annotated[tuple[str, ...], Field(min_length=1)] = LAW_NAMES
+    methods: Annotated[
+        tuple[Annotated[str, Field(max_length=50)], ...],
+        Field(min_length=1, max_length=len(LAW_NAMES)),
+    ] = LAW_NAMES
     """Planners to compare."""
     rates_hz: Annotated[
-        tuple[Annotated[float, Field(ge=10.0, le=1000.0)], ...], Field(min_length=1)
+        tuple[Annotated[float, Field(ge=10.0, le=1000.0)], ...],
+        Field(min_length=1, max_length=100),
     ] = (250.0,)
     """Sample rates of the planner; with the inner loop each must divide 1000."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=50.0)] = 5.0

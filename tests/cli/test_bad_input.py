@@ -97,7 +97,7 @@ def test_a_wrong_configuration_is_refused_with_what_where_and_how(capsys, tmp_pa
 def test_a_missing_file_is_named(capsys, tmp_path):
     code, _, err = run(capsys, "fly", "--config", tmp_path / "none.yaml")
     assert code == 2
-    assert "none.yaml: cannot read the configuration: No such file or directory" in err
+    assert "none.yaml: cannot read it: No such file or directory" in err
 
 
 def test_a_busy_port_is_named(capsys, tmp_path):

@@ -75,7 +75,7 @@ def test_the_command_line_and_the_record_of_a_flight_see_the_merged_keys(files):
         ("vehicle: 3", "a.yaml: `vehicle` must hold keys, not 3"),
         ("- vehicle", "a.yaml: expected keys such as"),
         ("vehicle: {lag_ms: 1, lag_ms: 2}", "a.yaml, line 1: not valid YAML"),
-        ("include: b.yaml", "a.yaml: `include` must not stand here: an included file must not"),
+        ("include: 3", "a.yaml: `include` must be a file or a list of files, not 3"),
         ("mock: {seed: 3}", "a.yaml: `mock` must not stand here"),
     ],
 )
@@ -94,13 +94,55 @@ def test_faults_of_several_files_are_told_each_of_its_own(files):
         load(main_file)
 
 
-def test_a_missing_included_file_is_named(files):
-    main_file = files(main="include: a.yaml\n")
-    with pytest.raises(ConfigError, match=r"a\.yaml: cannot read the configuration: No such file"):
+def test_a_missing_included_file_is_named_with_the_file_that_includes_it(files):
+    main_file = files(main="include: a.yaml\n", a="include: b.yaml\n")
+    words = r"b\.yaml: cannot read it: No such file.*\(included by .*a\.yaml\)"
+    with pytest.raises(ConfigError, match=words):
         load(main_file)
 
 
-@pytest.mark.parametrize("value", ["3", "[3]", "{a: b}", "", '""', "[' ']", '"a\\0b"'])
+def test_an_included_file_may_include_and_its_own_keys_win(files, tmp_path):
+    (tmp_path / "parts").mkdir()
+    main_file = files(
+        main="include: parts/a.yaml\nvehicle: {lag_ms: 1}\n",
+        **{
+            "parts/a": "include: [b.yaml, b.yaml]\nvehicle: {lag_ms: 2, dead_time_ms: 2}\n",
+            "parts/b": "vehicle: {lag_ms: 3, dead_time_ms: 3, yaw_lag_ms: 3}\n",
+        },
+    )
+    vehicle = load(main_file).vehicle
+    assert (vehicle.lag_ms, vehicle.dead_time_ms, vehicle.yaw_lag_ms) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        ({"main": "include: main.yaml"}, "main.yaml: a file must not include itself"),
+        (
+            {"main": "include: a.yaml", "a": "include: ./main.yaml"},
+            r"include itself: .*main\.yaml includes .*a\.yaml includes .*main\.yaml",
+        ),
+        (
+            {"main": "include: a0.yaml"} | {f"a{n}": f"include: a{n + 1}.yaml" for n in range(9)},
+            "a3.yaml: an include must not be deeper than 4 files",
+        ),
+        ({"main": f"include: [{'a.yaml, ' * 33}]", "a": ""}, "more than 32 files are included"),
+        (
+            {
+                "main": f"include: [{'a.yaml, ' * 30}]",
+                "a": f"include: [{'b.yaml, ' * 30}]",
+                "b": "",
+            },
+            "more than 32 files are included",
+        ),
+    ],
+)
+def test_includes_that_never_end_are_refused_in_one_sentence(files, texts, words):
+    with pytest.raises(ConfigError, match=words):
+        load(files(**texts))
+
+
+@pytest.mark.parametrize("value", ["3", "[3]", "{a: b}", "", '""', "[' ']"])
 def test_what_is_not_a_file_name_cannot_be_included(files, value):
     main_file = files(main=f"include: {value}\n")
     with pytest.raises(ConfigError, match="`include` must be a file or a list of files, not"):

@@ -4,6 +4,7 @@ from contextlib import asynccontextmanager, contextmanager
 
 import yaml
 
+from companion import bounded_yaml
 from companion.config_file import load
 from companion.doctor.consultation import patient
 from companion.flight.assembly import open_link
@@ -32,7 +33,7 @@ def config_file(folder, mock, **changes):
         "recording": {"directory": str(folder / "flights")},
     }
     path = folder / "my.yaml"
-    path.write_text(yaml.safe_dump(merged(merged(data, places), changes)))
+    path.write_text(bounded_yaml.dump(merged(merged(data, places), changes)))
     return path
 
 

@@ -6,8 +6,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-import yaml
-
+from companion import bounded_yaml
 from companion.config import Config
 from companion.demo import free_port
 from companion.flight.observer import Silent
@@ -102,7 +101,7 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings)
     port, control_port = free_port(), free_port()
     config, words = folder / "mock.yaml", folder / "mock.log"
     quick = {**QUICK_MOCK, "autopilot": autopilot, "parameters": QUICK_PARAMETERS[autopilot]}
-    config.write_text(yaml.safe_dump({"mock": merged(quick, settings)}))
+    config.write_text(bounded_yaml.dump({"mock": merged(quick, settings)}))
     arguments = ["--headless", "--config", str(config)]
     arguments += ["--port", str(port), "--control-port", str(control_port)]
     process = mock_start.start(arguments + ["--lockstep"] * in_lockstep, words)
@@ -117,7 +116,7 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings)
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
     link = {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep}
     flight = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
-    text = yaml.safe_dump(merged(merged(flight, {"link": link}), changes))
+    text = bounded_yaml.dump(merged(merged(flight, {"link": link}), changes))
     folder.mkdir(exist_ok=True)
     return Session(
         parse(text, "test", Config), folder, observer or Silent(), ask_landing or decline

@@ -172,9 +172,11 @@ def test_idle_sends_neither_rates_nor_thrust():
     assert [answer[1:] for answer in bench.sent] == 2 * [(BodyRates(0.0, 0.0, 0.0), 0.0)]
 
 
-def test_after_a_gap_it_waits_for_the_mode_once_guarded():
+@pytest.mark.parametrize("what", ["guarded", "taking_over"])
+def test_after_a_gap_it_waits_for_the_mode(what):
+    """The autopilot may obey us from the moment it is asked to, before it says that it does."""
     bench = Bench()
-    bench.loop.guarded = True
+    setattr(bench.loop, what, True)
     bench.run(10)
     bench.time += 0.2
     bench.run(10)

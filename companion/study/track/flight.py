@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
-from companion import demo
+from companion import bounded_yaml, demo
 from companion.config import Config
 from companion.config_file import changed, load
 from companion.flight.session import Session
@@ -86,8 +85,8 @@ def fly(task: Task) -> Tracked:
         wire, watch_port = demo.udp_wire(), demo.free_port()
         shipped = load(demo.default_config())
         vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
-        vehicle.write_text(yaml.safe_dump({"mock": _vehicle(shipped, task, watch_port)}))
-        course.write_text(yaml.safe_dump(task.course.file))
+        vehicle.write_text(bounded_yaml.dump({"mock": _vehicle(shipped, task, watch_port)}))
+        course.write_text(bounded_yaml.dump(task.course.file))
         config = _configured(shipped, task, course, wire.endpoint)
         watch = TruthWatch(watch_port)
         session = Session(config, folder, watch, _never)

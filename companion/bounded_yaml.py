@@ -1,0 +1,186 @@
+"""YAML as plain values, read within bounds: a file from anywhere must cost neither time nor memory.
+
+Numbers and words mean what YAML 1.2 says (its core schema): 010 is ten, 1:30 and a date are texts,
+and so are yes, no, on and off. Tags and aliases are refused: no file of ours needs them, and a few
+lines of aliases stand for gigabytes.
+"""
+
+import re
+from typing import Any
+
+import yaml
+
+MOST_BYTES = 250_000
+"""Of a file; a thousand waypoints take 50 kB."""
+MOST_NODES = 6000
+"""Keys, values, lists and mappings together."""
+DEEPEST = 20
+"""Levels of lists and mappings."""
+LONGEST_TEXT = 4096
+"""Characters of a value."""
+LONGEST_KEY = 100
+"""Characters of a key."""
+LONGEST_NUMBER = 40
+"""Characters of a number."""
+
+_WORDS = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+}
+_INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(
+    r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+)
+_NO_TEXT = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
+
+
+class YamlError(Exception):
+    """A text cannot be read.
+
+    Args:
+        problem: what is wrong.
+        line: where, from 1; None: in the file as a whole.
+    """
+
+    def __init__(self, problem: str, line: int | None = None) -> None:
+        super().__init__(problem)
+        self.line = line
+
+
+def parse(text: str) -> Any:
+    """The one document in a YAML text as dicts with texts as keys, lists and scalars.
+
+    Raises:
+        YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or is out of bounds.
+    """
+    builder = _Builder()
+    try:
+        for event in yaml.parse(text, yaml.SafeLoader):
+            builder.take(event)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise YamlError(f"not valid YAML: {error.problem}", line) from error
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise YamlError(f"not valid YAML: {error.reason}", line) from error
+    except (ValueError, OverflowError) as error:  # an escape beyond all characters, say
+        raise YamlError(f"not valid YAML: {error}") from error
+    return builder.root
+
+
+def dump(data: dict[str, Any]) -> str:
+    """YAML of plain values that `parse` reads as they were."""
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Puts into quotes what is a number to YAML 1.1 or 1.2, but was a text: 12e5, 0o17."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        """`parse` reads none."""
+        return True
+
+
+for _pattern, _tag in ((_INTEGER, "int"), (_FLOAT, "float")):
+    _Dumper.add_implicit_resolver(
+        f"tag:yaml.org,2002:{_tag}", re.compile(f"(?:{_pattern.pattern})$"), list("-+.0123456789")
+    )
+
+
+class _Builder:
+    """Makes values of a parser's events; nothing is called recursively, however deep they nest.
+
+    Attributes:
+        root: the document so far.
+    """
+
+    def __init__(self) -> None:
+        self.root: Any = None
+        self._open: list[dict[str, Any] | list[Any]] = []
+        self._keys: list[str | None] = []
+        self._nodes = 0
+        self._documents = 0
+
+    def take(self, event: yaml.Event) -> None:
+        """The next event."""
+        line = event.start_mark.line + 1 if event.start_mark else 1
+        match event:
+            case yaml.DocumentStartEvent():
+                self._documents += 1
+                if self._documents > 1:
+                    raise YamlError("not valid YAML: more than one document", line)
+            case yaml.AliasEvent():
+                raise YamlError(f"write out what the alias *{event.anchor:.40} stands for", line)
+            case yaml.ScalarEvent():
+                self._add(_scalar(event, line), event, line)
+            case yaml.SequenceStartEvent():
+                self._begin([], event, line)
+            case yaml.MappingStartEvent():
+                self._begin({}, event, line)
+            case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
+                self._open.pop()
+                self._keys.pop()
+
+    def _begin(
+        self, node: dict[str, Any] | list[Any], event: yaml.CollectionStartEvent, line: int
+    ) -> None:
+        self._add(node, event, line)
+        self._open.append(node)
+        self._keys.append(None)
+        if len(self._open) > DEEPEST:
+            raise YamlError(f"nested deeper than {DEEPEST} levels", line)
+
+    def _add(
+        self, value: Any, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int
+    ) -> None:
+        self._nodes += 1
+        if self._nodes > MOST_NODES:
+            raise YamlError(f"more than {MOST_NODES} keys and values", line)
+        if event.tag is not None:
+            raise YamlError(f"tags such as {event.tag:.40} are not read", line)
+        if not self._open:
+            self.root = value
+            return
+        into, key = self._open[-1], self._keys[-1]
+        if isinstance(into, list):
+            into.append(value)
+        elif key is None:
+            self._keys[-1] = _new_key(value, into, line)
+        else:
+            into[key] = value
+            self._keys[-1] = None
+
+
+def _new_key(key: Any, into: dict[str, Any], line: int) -> str:
+    if not isinstance(key, str):
+        raise YamlError(f"a key must be a word, not {key!r:.40}", line)
+    if len(key) > LONGEST_KEY:
+        raise YamlError(f"the key {key[:20]!r}... is longer than {LONGEST_KEY} characters", line)
+    if key in into:
+        raise YamlError(f"not valid YAML: the key {key!r} stands there twice", line)
+    return key
+
+
+def _scalar(event: yaml.ScalarEvent, line: int) -> Any:
+    text: str = event.value
+    if len(text) > LONGEST_TEXT:
+        raise YamlError(f"a value is longer than {LONGEST_TEXT} characters", line)
+    if _NO_TEXT.search(text):
+        raise YamlError("a value holds a control character", line)
+    return _plain(text, line) if event.style is None else text
+
+
+def _plain(text: str, line: int) -> Any:
+    """What a value without quotation marks means in YAML 1.2's core schema."""
+    if text in _WORDS:
+        return _WORDS[text]
+    whole = _INTEGER.fullmatch(text)
+    if not whole and not _FLOAT.fullmatch(text):
+        return text
+    if len(text) > LONGEST_NUMBER:
+        raise YamlError(f"a number is longer than {LONGEST_NUMBER} characters", line)
+    if whole:
+        return int(text, {"0o": 8, "0x": 16}.get(text[:2], 10))
+    return float(text.replace(".", "", 1) if text.lstrip("+-")[1:2].isalpha() else text)
