@@ -9,6 +9,7 @@ from pathlib import Path
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
+from companion.flight.asking_again import AskingAgain
 from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
@@ -249,10 +250,12 @@ def assemble(
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
-    watch = Watch(rig, ladder, clock)
+    asking_again = AskingAgain(link, config.link)
+    watch = Watch(rig, ladder, asking_again, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = rig.note = preflight.note = link.clock.on_event = flight.note
+    ladder.note = rig.note = preflight.note = flight.note
+    link.clock.on_event = asking_again.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:
