@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import isfinite
+from statistics import median
 from types import TracebackType
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -40,6 +41,8 @@ class Ear:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._stamps: list[tuple[float, float]] = []
+        self._ages: list[float] = []
+        self._timeline = link.clock.timeline
         self._unusable = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
@@ -81,6 +84,8 @@ class Ear:
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
             unusable=self._unusable,
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
+            age=median(self._ages) if self._ages and self._link.clock.age_known else None,
+            clock_change=self._clock_change,
         )
 
     @property
@@ -104,8 +109,17 @@ class Ear:
         ):
             self._companions.add(source)
 
+    @property
+    def _clock_change(self) -> str:
+        clock = self._link.clock
+        return clock.last_change if clock.timeline != self._timeline else ""
+
     def _on_attitude(self, message: Message) -> None:
-        self._stamps.append((self._clock(), message.time_boot_ms / 1000.0))
+        now, clock = self._clock(), self._link.clock
+        self._stamps.append((now, message.time_boot_ms / 1000.0))
+        age = clock.age(clock.vehicle_time(message.time_boot_ms), now)
+        if age is not None:
+            self._ages.append(age)
         rates = message.rollspeed, message.pitchspeed, message.yawspeed
         usable = is_unit((message.q1, message.q2, message.q3, message.q4))
         self._unusable += not (usable and all(map(isfinite, rates)))

@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.doctor.listening import Ear
+from companion.mavlink.vehicle_clock import VehicleClock
 from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
 
 COMPANION, GROUND_STATION = 18, 6
@@ -90,7 +91,8 @@ def test_samples_that_cannot_be_answered(values):
         callbacks[name] = callback
         return lambda: None
 
-    with Ear(SimpleNamespace(on_foreign=None, subscribe=subscribe), lambda: 0.0) as ear:
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with Ear(link, lambda: 0.0) as ear:
         callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
         callbacks["ATTITUDE_QUATERNION"](attitude(4))
     assert (ear.samples.heard, ear.samples.unusable) == (2, 1)
@@ -104,12 +106,13 @@ def test_pauses_and_stamps_of_the_samples():
         callbacks[name] = callback
         return lambda: None
 
-    link = SimpleNamespace(on_foreign=None, subscribe=subscribe)
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
     with Ear(link, lambda: next(times)) as ear:
         assert ear.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
-    heard, pause, not_newer, rate, unusable = ear.samples
+    heard, pause, not_newer, rate, age, change, unusable = ear.samples
+    assert (age, change) == (None, "")
     assert (heard, not_newer, unusable) == (11, 2, 0)
     assert abs(pause - 0.3) < 1e-9
     assert abs(rate - 1.8 / 1.2) < 1e-9
