@@ -64,7 +64,7 @@ class ArduPilotStreams:
         """Return the interval in us that is set for a message, -1 if it is not streamed."""
         return self._intervals.get(message_id, -1)
 
-    def due(self, slot_us: int) -> list[int]:
+    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
         """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent."""
         due = []
         for message_id, interval in self._intervals.items():

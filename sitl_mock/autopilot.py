@@ -157,7 +157,7 @@ class Autopilot:
     def _send_due(self, slot_us: int) -> None:
         builders, silenced = self._rules.builders, self.effects.silenced
         for link in self.links:
-            for message_id in link.streams.due(slot_us):
+            for message_id in link.streams.due(slot_us, self.state.status_us):
                 builder = builders.get(message_id)
                 if builder is None or silenced(message_id):
                     continue

@@ -5,7 +5,8 @@ from sitl_mock.parameters import ParameterTable
 from sitl_mock.px4_modes import PILOTED
 from sitl_mock.state import BatteryWarning, State
 
-_NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND})
+NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND})
+"""Modes that forbid arming; they are not gone back to after disarming, either."""
 
 
 def arming_problem(
@@ -53,6 +54,6 @@ def _mode_problem(mode: Mode, *, offboard_alive: bool, pilot: bool) -> str | Non
         return "no offboard signal"
     if mode in PILOTED and not pilot:
         return "no manual control input"
-    if mode in _NEVER_ARMED_IN:
+    if mode in NEVER_ARMED_IN:
         return "mode is not suitable for arming"
     return None

@@ -8,7 +8,7 @@ from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
 from sitl_mock.personality import Occasion
-from sitl_mock.px4_checks import arming_problem
+from sitl_mock.px4_checks import NEVER_ARMED_IN, arming_problem
 from sitl_mock.px4_failsafe import Announce, Failsafe
 from sitl_mock.px4_health import HealthReport
 from sitl_mock.px4_mode_control import Px4ModeControl
@@ -22,6 +22,8 @@ from sitl_mock.wire import Message
 
 PREFLIGHT_MARGIN_US = 1_000_000
 """Armed but never flown, the vehicle disarms this much after COM_DISARM_PRFLT (measured 11 s)."""
+STATUS_PERIOD_US = 500_000
+"""The vehicle's status is published this often, and whenever it changes (measured)."""
 
 
 class Px4Commander:
@@ -64,6 +66,7 @@ class Px4Commander:
         self._landed_since_us = 0
         self._crashed = False
         self._asked_takeoff_z: float | None = None
+        self._status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
@@ -113,7 +116,7 @@ class Px4Commander:
             asked = struct.pack("<I", custom_mode(mode))
             self._announce(Occasion.MODE_DENIED, mode.name.capitalize(), asked)
             return TEMPORARILY_REJECTED
-        state.intended_mode = mode
+        self._intend(mode)
         self.failsafe.clear()
         if mode is Mode.TAKEOFF:
             self._asked_takeoff_z = takeoff_z
@@ -193,9 +196,10 @@ class Px4Commander:
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
-                    state.intended_mode = Mode.LOITER
+                    self._intend(Mode.LOITER)
                 self._enter(Mode.LOITER)
             self._disarm_on_ground()
+        self._publish_status()
 
     @property
     def _at_sticks(self) -> bool:
@@ -230,12 +234,27 @@ class Px4Commander:
     def _stop_motors(self, occasion: Occasion) -> None:
         state = self._state
         state.armed = False
-        # A finished landing leaves LOITER behind (recorded); OFFBOARD by command stays OFFBOARD.
-        if state.mode in (Mode.LAND, Mode.RTL, Mode.TAKEOFF):
-            state.intended_mode = Mode.LOITER
+        # Measured: a landing entered from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
+        state.intended_mode = state.after_disarming
         self.failsafe.clear()
         self._enter(state.intended_mode)
         self._announce(occasion, "")
+
+    def _intend(self, mode: Mode) -> None:
+        """Note the mode that the user wants.
+
+        On disarming the last one comes back that may be armed; measured: TAKEOFF does not count.
+        """
+        self._state.intended_mode = mode
+        if mode not in NEVER_ARMED_IN and mode is not Mode.TAKEOFF:
+            self._state.after_disarming = mode
+
+    def _publish_status(self) -> None:
+        """Publish the status when it changed, else twice a second."""
+        state = self._state
+        status = (state.armed, state.mode, state.intended_mode, state.failsafe)
+        if status != self._status or state.time_us - state.status_us >= STATUS_PERIOD_US:
+            self._status, state.status_us = status, state.time_us
 
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:

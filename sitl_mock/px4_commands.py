@@ -4,7 +4,7 @@ from math import isfinite, isnan
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.commander import ACCEPTED, DENIED, TEMPORARILY_REJECTED
+from sitl_mock.commander import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED
 from sitl_mock.commands import Command, Commands
 from sitl_mock.geodesy import Geodetic, Origin, to_local
 from sitl_mock.link import Link
@@ -109,6 +109,7 @@ class Px4Commands(Commands):
 
     def _set_interval(self, command: Command, link: Link) -> int:
         message_id, interval_us = command.parameters[:2]
-        if isfinite(message_id) and isfinite(interval_us):
-            link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
-        return ACCEPTED
+        if not (isfinite(message_id) and isfinite(interval_us)):
+            return ACCEPTED
+        refused = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
+        return ACCEPTED if refused is None else FAILED

@@ -11,17 +11,20 @@ from collections.abc import Mapping
 SLOT_US = {250: 4000, 800: 2500}
 """Slot period in us of vehicle time by inner loop rate in Hz."""
 
+HEARTBEAT, CURRENT_MODE = 0, 436
+
 BUSY_RUN = 4
 """A stream sent in this many slots running misses the next one (250 Hz loop only, measured)."""
 
 
 class _Stream:
-    __slots__ = ("interval_us", "last_us", "run")
+    __slots__ = ("interval_us", "last_us", "run", "status_us")
 
     def __init__(self, interval_us: int, last_us: int) -> None:
         self.interval_us = interval_us
         self.last_us = last_us
         self.run = 0
+        self.status_us = -1
 
 
 class Px4Streams:
@@ -43,8 +46,10 @@ class Px4Streams:
         """Ask for a message every ``interval_us``; 0 = the rate at boot, negative = never.
 
         Returns:
-            why it is refused: PX4 refuses nothing, so None.
+            why it is refused, None if it is not; PX4 refuses nothing but to change HEARTBEAT.
         """
+        if message_id == HEARTBEAT:
+            return "the rate of HEARTBEAT is fixed"
         interval = round(interval_us)
         if interval == 0:
             interval = self._defaults.get(message_id, -1)
@@ -59,12 +64,17 @@ class Px4Streams:
         stream = self._streams.get(message_id)
         return -1 if stream is None else stream.interval_us
 
-    def due(self, slot_us: int) -> list[int]:
-        """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent."""
+    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
+        """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent.
+
+        CURRENT_MODE is sent once for each publication of the vehicle's status, the newest of which
+        came at ``status_us``, however often the message is asked for (measured: 2 Hz of 20 asked).
+        """
         due = []
         for message_id, stream in self._streams.items():
             waited = slot_us - stream.last_us
-            if waited < stream.interval_us:
+            nothing_new = message_id == CURRENT_MODE and stream.status_us == status_us
+            if waited < stream.interval_us or nothing_new:
                 stream.run = 0
                 continue
             if self._misses and stream.run >= BUSY_RUN:
@@ -74,5 +84,6 @@ class Px4Streams:
             on_time = 2 * waited < 3 * stream.interval_us
             stream.last_us = stream.last_us + stream.interval_us if on_time else slot_us
             stream.run += 1
+            stream.status_us = status_us
             due.append(message_id)
         return due

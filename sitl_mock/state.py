@@ -56,6 +56,8 @@ class State:
     Times are vehicle time in us since boot. ``shown_us`` is what telemetry carries as the time; it
     differs from ``time_us`` only while a fault freezes the clock. ``contact`` is touching the
     ground, ``landed`` what the land detector makes of it; ``flown``: took off since arming.
+    ``status_us``: when the status was last published, which tells of mode and arming.
+    ``after_disarming``: the mode that PX4 goes to when it disarms.
     ``height_controlled`` and ``position_controlled``: ArduPilot's controllers run. ``aborted``: its
     process has ended, and nothing comes any more.
     """
@@ -67,6 +69,8 @@ class State:
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER
     intended_mode: Mode = Mode.LOITER
+    after_disarming: Mode = Mode.LOITER
+    status_us: int = 0
     failsafe: bool = False
     prearm_problem: str | None = "system is booting"
     contact: bool = True

@@ -16,5 +16,5 @@ class StreamSchedule(Protocol):
     def interval(self, message_id: int) -> int:
         """Return the interval in us that is set for a message, -1 if it is not streamed."""
 
-    def due(self, slot_us: int) -> list[int]:
+    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
         """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent."""

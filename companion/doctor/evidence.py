@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from companion.guidance import Sequence
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
@@ -53,6 +54,7 @@ class LinkQuality(NamedTuple):
         reconnects: How often the connection was opened again.
         round_trip: Shortest of late by TIMESYNC, s; `None` if it was never answered.
         jitter: By how much the round trips differed, s.
+        other_clock: Whether TIMESYNC counts another clock than the samples' stamps.
         notices: What keeps the two sides from understanding each other.
     """
 
@@ -64,6 +66,7 @@ class LinkQuality(NamedTuple):
     round_trip: float | None
     jitter: float | None
     notices: tuple[str, ...] = ()
+    other_clock: bool = False
 
     @property
     def loss(self) -> float:
@@ -79,12 +82,16 @@ class SampleTimes(NamedTuple):
         longest_pause: Between two of them by our clock, s.
         not_newer: Stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
+        age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
+        clock_change: How the vehicle's clock jumped or restarted meanwhile, in words, or empty.
     """
 
     heard: int = 0
     longest_pause: float = 0.0
     not_newer: int = 0
     clock_rate: float | None = None
+    age: float | None = None
+    clock_change: str = ""
 
 
 class Company(NamedTuple):
@@ -121,6 +128,7 @@ class Evidence:
         identity: What the autopilot is.
         stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
+        programme: What is to be flown; `None` where nothing is.
     """
 
     family: AutopilotFamily
@@ -136,6 +144,7 @@ class Evidence:
     identity: Identity
     stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
+    programme: Sequence | None = None
 
     @property
     def awaits_position(self) -> bool:

@@ -46,7 +46,7 @@ async def offboard(rig: Rig) -> None:
     rig.lookout.begin(asyncio.get_running_loop().time())
     await _take_over(rig)
     rig.guide.hold_here()
-    rig.loop.guarded = True
+    rig.loop.guarded, rig.loop.taking_over = True, False
     await asyncio.sleep(_SETTLING)
 
 
@@ -97,6 +97,7 @@ async def _take_over(rig: Rig) -> None:
     # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
     await rig.until(lambda: _commands_flight(rig), "a target from guidance")
     rig.detail = "the autopilot to obey our rates"
+    rig.loop.taking_over = True
     command = rig.link.family.take_over()
     if command is None:
         # The mode we know may be a second old; never take the vehicle from a pilot who took it.

@@ -105,16 +105,23 @@ class Flight:
 
     def on_heartbeat(self) -> None:
         """Judge at once what the heartbeat that just came says."""
-        try:
-            self._watch.on_heartbeat(self.phase)
-        except FlightEnded as ended:
-            self.end(ended)
+        self._heed(self._watch.on_heartbeat)
+
+    def on_current_mode(self) -> None:
+        """Judge at once what the CURRENT_MODE that just came says."""
+        self._heed(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
         """Write down and show that something happened."""
         time = self._clock() - self._began
         self.events.append((time, text))
         self._observer.event(time, text)
+
+    def _heed(self, judge: Callable[[Phase], None]) -> None:
+        try:
+            judge(self.phase)
+        except FlightEnded as ended:
+            self.end(ended)
 
     async def _fly_all(self) -> None:
         """Run all phases; from the first again if another vehicle may stand there than was checked.

@@ -13,7 +13,7 @@ _TRIES = 4
 _SHOWS = 3.0
 """After its first command a take-off shows within so long, s; it takes longer than a mode does."""
 _ENTERED = 1.0
-"""A mode whose command was accepted shows in a heartbeat within so long, s, or was left again."""
+"""A mode whose command was accepted shows within this time, s, or was left again."""
 
 Done = Callable[[], bool]
 """Whether the vehicle does what was ordered; may end the flight instead."""
@@ -70,12 +70,12 @@ async def enter(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
     accepted = asyncio.get_running_loop().time()
 
     def entered() -> bool:
-        heartbeat = rig.link.state.heartbeat
+        state = rig.link.state
         if done():
             return True
-        if heartbeat is not None and heartbeat.received > accepted + _ENTERED:
+        if state.mode_received > accepted + _ENTERED:
             raise FlightEnded(
-                f"the mode was accepted and left again, not by us: {heartbeat.mode}", Exit.LET_GO
+                f"the mode was accepted and left again, not by us: {state.mode}", Exit.LET_GO
             )
         return False
 

@@ -4,6 +4,7 @@ from companion.doctor import vehicle_checks
 from companion.doctor.evidence import Stage
 from companion.doctor.finding import Finding
 from companion.flight.ending import Exit, FlightEnded
+from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import order
 from companion.flight.programmes import require_inside
 from companion.flight.rig import Rig
@@ -30,13 +31,14 @@ async def checks(rig: Rig) -> None:
     rig.same_vehicle.begin()
     rig.detail = "asking for telemetry"
     await rig.preflight.ask_for_telemetry()
+    await leave_offboard(rig)
     await rig.until(lambda: _ready(rig))
     # Counted only now: a position is not sent before the estimator has one.
     rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
     evidence = await rig.preflight.require(Stage.GROUND)
-    heartbeats = evidence.streams["HEARTBEAT"].achieved
-    if heartbeats > 0.0:
-        limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats)
+    heartbeats = evidence.streams.get("HEARTBEAT")  # PX4's is not asked for: its rate is fixed
+    if heartbeats is not None and heartbeats.achieved > 0.0:
+        limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
         rig.same_vehicle.heartbeat_limit = limit
     _require_inside_map(rig)
     _tell_dead_man(rig, evidence.survey.values)

@@ -58,7 +58,7 @@ class Rig:
     def release(self) -> None:
         """Stop answering samples: from here on nothing is sent that steers."""
         self.loop.on = False
-        self.loop.guarded = False
+        self.loop.guarded = self.loop.taking_over = False
         self.guide.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:

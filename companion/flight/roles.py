@@ -28,7 +28,7 @@ def require_role(link: Link, allowed: Set[Role]) -> None:
         return
     who = (
         "the autopilot's failsafe took over"
-        if link.state.failsafe
+        if link.state.mode_by_failsafe
         else "the pilot or another station took over"
     )
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.LET_GO)

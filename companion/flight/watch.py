@@ -2,14 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
+from math import inf
 
+from companion.flight.asking_again import AskingAgain
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.phases import Phase
 from companion.flight.rig import Rig
 from companion.flight.roles import require_role, roles_of
 from companion.flight.safety import Action, SafetyLadder
 from companion.flight.safety.monitor import EXITS
+from companion.mavlink.records import outdated
 from companion.mavlink.roles import Role
+
+_STATUS_PERIOD = 0.45
+"""PX4 sends CURRENT_MODE every 0.5 s while nothing changes; one that comes sooner is news."""
 
 
 class Watch:
@@ -18,13 +24,23 @@ class Watch:
     Args:
         rig: the parts of the flight.
         ladder: judges what it sees while the autopilot obeys us.
+        asking_again: asks for telemetry that has become too rare.
         clock: our clock, s.
     """
 
-    def __init__(self, rig: Rig, ladder: SafetyLadder, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        ladder: SafetyLadder,
+        asking_again: AskingAgain,
+        clock: Callable[[], float],
+    ) -> None:
         self._rig = rig
         self._ladder = ladder
         self._clock = clock
+        self._asking_again = asking_again
+        self._status_at = -inf
+        self._status_question: asyncio.Task[None] | None = None
         self._question: asyncio.Task[None] | None = None
 
     def judge(self, phase: Phase) -> None:
@@ -45,24 +61,51 @@ class Watch:
             self._judge_heartbeat()
 
     def on_heartbeat(self, phase: Phase) -> None:
-        """A heartbeat came: it tells whether we may go on after a gap.
+        """A heartbeat came: judge what it says.
 
         Raises:
             FlightEnded: as `judge`.
         """
         self._rig.same_vehicle.note_heartbeat()
         self.judge(phase)
-        if self._rig.loop.held_back and Role.OFFBOARD in roles_of(self._rig.link):
-            self._rig.loop.resume()
+
+    def on_current_mode(self, phase: Phase) -> None:
+        """CURRENT_MODE came: twice a second, and at once when the vehicle's status changes.
+
+        One that comes early may mean that it disarmed, or is in a failsafe. Only a heartbeat tells
+        of those, so one is asked for.
+
+        Raises:
+            FlightEnded: as `judge`.
+        """
+        now = self._clock()
+        early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
+        asking = self._status_question is not None and not self._status_question.done()
+        if early and not asking:
+            self._status_question = asyncio.create_task(self._rig.fresh_heartbeat())
+        self.judge(phase)
 
     def ask_mode(self) -> None:
-        """Ask for a heartbeat now rather than wait for the next one."""
+        """Ask for the mode now, and go on after a gap if the vehicle still obeys us."""
         # Without an answer the silence limit decides.
-        self._question = asyncio.create_task(self._rig.fresh_heartbeat())
+        self._question = asyncio.create_task(self._confirm())
+
+    async def _confirm(self) -> None:
+        """Wait for a heartbeat that is fresh: one that waited to be read may say what was."""
+        await self._rig.fresh_heartbeat()
+        loop, state = self._rig.loop, self._rig.link.state
+        roles = roles_of(self._rig.link)
+        # While we take over, the stream is needed before offboard is entered; in a failsafe that
+        # came in between it would end the failsafe.
+        entering = loop.taking_over and Role.READY in roles and not state.failsafe
+        if loop.held_back and (Role.OFFBOARD in roles or entering):
+            loop.resume()
 
     def _climb(self, now: float) -> None:
         """Let the ladder look, and do what it says."""
-        verdict = self._ladder.step(self._rig.lookout.snapshot(now))
+        snapshot = self._rig.lookout.snapshot(now)
+        self._asking_again.look(snapshot.health)
+        verdict = self._ladder.step(snapshot)
         if verdict is None:
             return
         if verdict.action is Action.HOLD:
@@ -73,8 +116,13 @@ class Watch:
         raise FlightEnded(verdict.reason, EXITS[verdict.action])
 
     def _judge_heartbeat(self) -> None:
-        heartbeat, limit = self._rig.link.state.heartbeat, self._rig.same_vehicle.heartbeat_limit
-        if heartbeat is None or self._clock() - heartbeat.received > limit:
+        state, now = self._rig.link.state, self._clock()
+        if now - state.mode_received > self._rig.same_vehicle.heartbeat_limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
+            )
+        if state.heartbeat is None or outdated(state.heartbeat.received, now):
+            raise FlightEnded(
+                "no heartbeat from the vehicle, so whether it is armed is not known any more",
+                Exit.LET_GO,
             )

@@ -58,13 +58,17 @@ class ArduPilot:
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
             **FLIGHT_RATES,
+            # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
+            "HEARTBEAT": 10.0,
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
         }
     )
     interval_step_us = 1000
-    dead_man = DeadMan("GUID_TIMEOUT", "it levels and keeps its height, and does not hold")
+    dead_man = DeadMan(
+        "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
+    )
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

@@ -19,16 +19,16 @@ class DeadMan(NamedTuple):
     Attributes:
         parameter: Sets for how long, in s, it holds the last rates; see `AutopilotFamily`.
         then: What follows, in words.
+        brakes: Whether it stops the vehicle then.
     """
 
     parameter: str
     then: str
+    brakes: bool
 
 
 FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
     {
-        # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
-        "HEARTBEAT": 10.0,
         "ATTITUDE_QUATERNION": 250.0,
         "LOCAL_POSITION_NED": 50.0,
         "EXTENDED_SYS_STATE": 5.0,

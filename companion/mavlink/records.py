@@ -39,6 +39,20 @@ class Heartbeat(NamedTuple):
     system_status: int
 
 
+class CurrentMode(NamedTuple):
+    """CURRENT_MODE of the autopilot.
+
+    Attributes:
+        received: Event-loop time, s.
+        mode: The mode's name in the words of its family.
+        intended: The mode that its user asked for last; differs where a failsafe acts.
+    """
+
+    received: float
+    mode: str
+    intended: str
+
+
 class LocalPosition(NamedTuple):
     """LOCAL_POSITION_NED.
 

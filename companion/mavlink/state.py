@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from math import isfinite
+from math import inf, isfinite
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
@@ -12,6 +12,7 @@ from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
     GPS_FIX_3D,
     Battery,
+    CurrentMode,
     Estimator,
     GlobalPosition,
     Gps,
@@ -41,6 +42,7 @@ _UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 @dataclass
 class _Values:
     heartbeat: Heartbeat | None = None
+    current_mode: CurrentMode | None = None
     landed_state: Landed | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
@@ -50,6 +52,7 @@ class _Values:
     home: Home | None = None
     estimator: Estimator | None = None
     armings: int = 0
+    positions: int = 0
     prearm: Prearm | None = None
     gps_was_good: bool = False
     reset_counter: int | None = None
@@ -60,6 +63,7 @@ class VehicleState(_Values):
 
     Attributes:
         heartbeat: See `Heartbeat`.
+        current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
         landed_state: See `Landed`; `landed` and `taking_off` heed its age.
         position: See `LocalPosition`; the newest by its own time stamp.
         battery: See `Battery`.
@@ -68,6 +72,8 @@ class VehicleState(_Values):
         gps: See `Gps`.
         home: See `Home`.
         estimator: See `Estimator`.
+        positions: How many positions were taken.
+        heartbeat_is_newest: Whether HEARTBEAT told the mode last, and so tells of arming as newly.
         armings: How often it was seen to become armed.
         prearm: See `Prearm`.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
@@ -89,10 +95,13 @@ class VehicleState(_Values):
         self._stats, self._assembler, self._clock = stats, texts, clock
         self._vehicle_clock = vehicle_clock
         self.texts = texts.texts
+        self.heartbeat_is_newest = True
+        self._base_mode = 0
         self.family: AutopilotFamily | None = None
         self.unsupported: UnsupportedAutopilot | None = None
         for name, callback in {
             "HEARTBEAT": self._on_heartbeat,
+            "CURRENT_MODE": self._on_current_mode,
             "EXTENDED_SYS_STATE": self._on_extended_sys_state,
             "LOCAL_POSITION_NED": self._on_local_position,
             "SYS_STATUS": self._on_sys_status,
@@ -116,8 +125,17 @@ class VehicleState(_Values):
 
     @property
     def mode(self) -> str | None:
-        """Name of the present mode."""
-        return self.heartbeat.mode if self.heartbeat else None
+        """Name of the present mode, by whichever of HEARTBEAT and CURRENT_MODE came last."""
+        heartbeat, current = self.heartbeat, self.current_mode
+        if heartbeat is None:
+            return None
+        return heartbeat.mode if current is None or self.heartbeat_is_newest else current.mode
+
+    @property
+    def mode_received(self) -> float:
+        """When the present mode was last told, s of our clock; -inf if it never was."""
+        told = (self.heartbeat, self.current_mode)
+        return max((each.received for each in told if each is not None), default=-inf)
 
     @property
     def armed(self) -> bool | None:
@@ -128,6 +146,14 @@ class VehicleState(_Values):
     def failsafe(self) -> bool:
         """Whether the autopilot says that it is in a failsafe."""
         return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
+
+    @property
+    def mode_by_failsafe(self) -> bool:
+        """Whether a failsafe chose the present mode, as far as the autopilot tells."""
+        current = self.current_mode
+        if current is None or self.heartbeat_is_newest:
+            return self.failsafe
+        return self.failsafe or current.mode != current.intended
 
     @property
     def landed(self) -> bool:
@@ -207,6 +233,18 @@ class VehicleState(_Values):
             armed,
             message.system_status,
         )
+        self._base_mode = message.base_mode
+        self.heartbeat_is_newest = True
+
+    def _on_current_mode(self, message: Message) -> None:
+        if self.family is None:
+            return  # what the number means is not known yet
+        mode, intended = (
+            self.family.mode_name(self._base_mode, number)
+            for number in (message.custom_mode, message.intended_custom_mode)
+        )
+        self.current_mode = CurrentMode(self._clock(), mode, intended)
+        self.heartbeat_is_newest = False
 
     def _on_extended_sys_state(self, message: Message) -> None:
         self.landed_state = Landed(self._clock(), message.landed_state)
@@ -231,6 +269,7 @@ class VehicleState(_Values):
         ):
             self._stats.outdated += 1
         else:
+            self.positions += 1
             self.position = LocalPosition(now, stamp, values[:3], values[3:])
 
     def _on_sys_status(self, message: Message) -> None:

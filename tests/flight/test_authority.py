@@ -26,6 +26,8 @@ from companion.mavlink.state import VehicleState
 from tests.flight.fly import fly, mock_vehicle, session_for
 from tests.flight.others import When, station
 
+HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
+
 
 class OnEvent(Silent):
     """Calls `action` once, when an event with this text happens."""
@@ -144,8 +146,9 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
     assert min(m.thrust for m in setpoints if m._timestamp > took_over) > 0.3
 
 
-def test_without_heartbeats_the_vehicle_is_let_go(tmp_path):
-    fault = {"kind": "stop_telemetry", "messages": ["HEARTBEAT"], "after_offboard_s": 2.0}
+def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
+    silent = ["HEARTBEAT", "CURRENT_MODE"]
+    fault = {"kind": "stop_telemetry", "messages": silent, "after_offboard_s": 2.0}
     takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.5}
     with mock_vehicle(tmp_path, faults=[fault, takeover]) as mock:
         summary = fly(mock, tmp_path / "log")
@@ -153,6 +156,15 @@ def test_without_heartbeats_the_vehicle_is_let_go(tmp_path):
     assert "no heartbeat" in summary.result
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
     assert not [command for at, command, _ in commands(summary) if at > took_over + 1.0]
+
+
+def test_without_heartbeats_the_vehicle_is_let_go_though_its_mode_is_told(tmp_path):
+    """Only they tell whether it is armed."""
+    fault = {"kind": "stop_telemetry", "messages": ["HEARTBEAT"], "after_offboard_s": 2.0}
+    with mock_vehicle(tmp_path, faults=[fault]) as mock:
+        summary = fly(mock, tmp_path / "log", hover={"duration_s": 9.0})
+    assert "whether it is armed is not known" in summary.result
+    assert summary.events[-1][1] == Exit.LET_GO.value
 
 
 def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
@@ -174,7 +186,7 @@ def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go(tmp_path):
         assert mock.state()["armed"]
     assert (summary.phase, "no heartbeat" in summary.result) == ("takeoff", True)
     began = next(at for at, text in summary.events if "TAKEOFF" in text)
-    assert summary.events[-1][0] < began + 4.0
+    assert summary.events[-1][0] < began + 5.0  # 1 s of climb, three heartbeats missed
 
 
 def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
@@ -183,7 +195,8 @@ def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
         summary = fly(mock, tmp_path / "log", observer, flight={"takeoff_height_m": 20.0})
         assert mock.state()["mode"] == "LOITER"
     assert "the climb was stopped" in summary.result
-    assert [command for _, command, _ in commands(summary)][-1] == TAKEOFF
+    asked = [command for _, command, _ in commands(summary)]
+    assert [command for command in asked if command != MAV_CMD_REQUEST_MESSAGE][-1] == TAKEOFF
 
 
 def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
@@ -369,8 +382,11 @@ def test_the_pilot_takes_over_during_the_takeoff(tmp_path):
     assert state["mode"] == "POSCTL"
 
 
-def test_leaving_the_fence_hands_back_and_lands(tmp_path):
-    """In still air it would stay inside: open-loop steps know nothing of the wind."""
+def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold(tmp_path):
+    """PX4 goes back to OFFBOARD when it disarms, where it never is ready to be armed again.
+
+    In still air it would stay inside the fence: open-loop steps know nothing of the wind.
+    """
     with mock_vehicle(tmp_path, wind={"speed_m_s": 5.0}) as mock:
         summary = fly(
             mock,
@@ -380,8 +396,9 @@ def test_leaving_the_fence_hands_back_and_lands(tmp_path):
         )
         state = mock.state()
     assert "beyond limits.fence_radius_m" in summary.result
-    assert summary.events[-1][1] == "disarmed"
-    assert (state["on_ground"], state["crashed"]) == (True, False)
+    said = [text for _, text in summary.events if not text.startswith("autopilot: ")]
+    assert said[-3:] == ["disarmed", HOLD_ASKED, "mode AUTO.LOITER"]
+    assert (state["mode"], state["on_ground"], state["crashed"]) == ("LOITER", True, False)
 
 
 def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ Each row of docs/exits.md, on both autopilots where they differ.
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -222,7 +223,8 @@ def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(
         state = mock.until(lambda state: state["landed"])
     assert frozen["time"] - frozen["last_setpoint"] < 1.3
     assert state["last_setpoint"] == frozen["last_setpoint"]
-    assert (state["crashed"], state["mode"]) == (False, "LAND")
+    # Disarmed, PX4 goes back to the mode that its user chose last.
+    assert (state["crashed"], state["mode"]) == (False, "LAND" if state["armed"] else "OFFBOARD")
     texts = [event["text"] for event in result["events"]]
     assert any(reason in text for reason in told for text in [result["result"], *texts])
 
@@ -256,7 +258,7 @@ def test_frozen_in_flight_ardupilot_levels_and_thawed_it_is_asked_to_hold(tmp_pa
         process.send_signal(signal.SIGCONT)
         result = finish(process, 1)
         state = mock.state()
-    assert result["result"] == "attitude arrives later than deadman.telemetry_stale_ms"
+    assert re.fullmatch(r"this computer stood still for \d+\.\d s", result["result"])
     assert state["last_setpoint"] == frozen["last_setpoint"]
     assert (state["crashed"], state["mode"]) == (False, "BRAKE")
 

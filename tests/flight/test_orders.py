@@ -39,14 +39,14 @@ class Vehicle:
 
     def __init__(self, *answers):
         self.answers = list(answers)
-        self.mode, self.failsafe, self.sent = Role.OFFBOARD, False, 0
+        self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.family = self.state = self
         self.now = 0.0
         self.same_vehicle = SimpleNamespace(require=lambda: None)
 
     @property
-    def heartbeat(self):
-        return SimpleNamespace(received=asyncio.get_running_loop().time(), mode=self.mode.value)
+    def mode_received(self):
+        return asyncio.get_running_loop().time()
 
     def roles(self, mode):
         return frozenset({mode})
@@ -112,5 +112,5 @@ def test_it_is_given_four_times_at_most():
 
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
     monkeypatch.setattr("companion.flight.orders._ENTERED", 0.01)
-    with pytest.raises(FlightEnded, match="left again, not by us: hold"):
+    with pytest.raises(FlightEnded, match=r"left again, not by us: Role\.HOLD"):
         run(Vehicle((None, Role.HOLD)), enter)

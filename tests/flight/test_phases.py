@@ -20,7 +20,7 @@ class Vehicle:
     def __init__(self, family, base_mode, custom_mode):
         self.family, self.state = family, self
         self.mode = family.mode_name(base_mode, custom_mode)
-        self.failsafe = False
+        self.mode_by_failsafe = False
 
 
 def phases(family):

@@ -74,9 +74,11 @@ def test_a_family_is_complete(family):
         family.set_mode("WARP")
     for name in family.wanted_rates:
         Router(LinkStats()).subscribe(name, lambda _: None)
-    assert {"HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HOME_POSITION"} <= set(
+    assert {"ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HOME_POSITION"} <= set(
         family.wanted_rates
     )
+    # What tells of a takeover sooner than a heartbeat at 1 Hz does.
+    assert ("HEARTBEAT" in family.wanted_rates) != ("CURRENT_MODE" in family.wanted_rates)
     assert family.dead_man.parameter in {rule.name for rule in family.parameters}
 
 

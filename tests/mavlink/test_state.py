@@ -4,6 +4,7 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import development
 
 from companion.mavlink.codec import decode
 from companion.mavlink.router import Router
@@ -53,6 +54,43 @@ def test_heartbeats(bench, base_mode, custom_mode, mode, armed):
     assert state.heartbeat.received == 10.0
     assert state.heartbeat.system_status == 4
     assert not state.failsafe
+
+
+def px4_heartbeat(custom_mode, base_mode=157):
+    return dialect.MAVLink_heartbeat_message(2, 12, base_mode, custom_mode, 4, 3)
+
+
+def test_the_mode_is_what_came_last_of_heartbeat_and_current_mode(bench):
+    offboard, hold = 0x00060000, 0x03040000
+    bench.take(development.MAVLink_current_mode_message(0, offboard, offboard))
+    assert bench.state.mode is None  # no heartbeat told yet what the number means
+    bench.take(px4_heartbeat(offboard, 129))
+    bench.now += 0.1
+    bench.take(development.MAVLink_current_mode_message(0, hold, hold))
+    assert (bench.state.mode, bench.state.mode_received) == ("AUTO.LOITER", 10.1)
+    assert (bench.state.armed, bench.state.heartbeat.received) == (True, 10.0)
+    assert not bench.state.heartbeat_is_newest
+    bench.now += 0.1
+    bench.take(px4_heartbeat(offboard, 129))
+    assert (bench.state.mode, bench.state.mode_received) == ("OFFBOARD", 10.2)
+    assert bench.state.heartbeat_is_newest
+
+
+def test_a_mode_that_nobody_asked_for_is_a_failsafes(bench):
+    """PX4 tells of the mode before its next heartbeat tells of the failsafe (recorded)."""
+    landing, offboard = 0x06040000, 0x00060000
+    bench.take(px4_heartbeat(offboard, 129))
+    bench.take(development.MAVLink_current_mode_message(0, landing, landing))
+    assert not bench.state.mode_by_failsafe
+    bench.take(development.MAVLink_current_mode_message(0, landing, offboard))
+    assert bench.state.mode_by_failsafe
+    assert not bench.state.failsafe
+
+
+def test_current_mode_does_not_hide_that_ardupilot_obeys_rates(bench):
+    bench.take(dialect.MAVLink_heartbeat_message(2, 3, 209, 4, 4, 3))
+    bench.take(development.MAVLink_current_mode_message(0, 4, 4))
+    assert bench.state.mode == "GUIDED by rates"
 
 
 def test_failsafe_is_seen(bench):

@@ -164,7 +164,10 @@ def test_the_failsafe_lands_a_vehicle_whose_program_died():
     rig.run_until(lambda: not rig.state.armed, 60.0)
     assert rig.truth.on_ground
     assert not rig.truth.crashed
-    assert rig.state.mode.name == "LOITER"
+    # As the real one: it is left where its user had put it, and cannot be armed there.
+    assert rig.state.mode.name == "OFFBOARD"
+    rig.run(0.1)
+    assert rig.state.prearm_problem == "no offboard signal"
 
 
 ACCEPTED_SETPOINTS = {

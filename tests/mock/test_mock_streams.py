@@ -1,7 +1,7 @@
 """Telemetry rates: the defaults, and what is achieved when something else is asked."""
 
 import pytest
-from mock_rig import ACCEPTED, Rig
+from mock_rig import ACCEPTED, FAILED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
 ATTITUDE_QUATERNION = dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
@@ -92,3 +92,23 @@ def test_in_lockstep_the_companion_gets_no_streamed_system_time():
     rig = Rig()
     rig.run(3.0)
     assert rig.messages("SYSTEM_TIME") == []
+
+
+def test_heartbeats_rate_cannot_be_changed():
+    rig = Rig()
+    for interval in (100_000, 0, -1):
+        assert rig.command(511, 0, interval) == FAILED
+        assert achieved(rig, "HEARTBEAT", 2.0) == 1
+
+
+def test_current_mode_comes_twice_a_second_and_at_once_when_the_mode_changes():
+    """Measured: asked for at 20 Hz, 2 Hz; a change of mode shows after 25 to 65 ms."""
+    rig = Rig()
+    rig.command(511, dialect.MAVLINK_MSG_ID_CURRENT_MODE, 50_000)
+    assert achieved(rig, "CURRENT_MODE", 4.0) == pytest.approx(2.0, abs=0.3)
+    for wait, main in ((0.11, 3), (0.37, 4), (0.27, 2)):
+        rig.run(wait)
+        commanded = rig.time
+        assert rig.command(176, 1, main, 3 if main == 4 else 0) == ACCEPTED
+        rig.run(0.065)
+        assert rig.messages("CURRENT_MODE", since=commanded)[-1].custom_mode >> 16 & 0xFF == main

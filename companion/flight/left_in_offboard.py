@@ -1,0 +1,42 @@
+"""A vehicle that stands disarmed in offboard is asked to hold: it could not be armed again.
+
+PX4 goes back to the last mode that its user chose when it disarms. After a landing that began in
+OFFBOARD, by our command or by its failsafe, that is OFFBOARD, and without setpoints its pre-arm
+checks fail there for ever (measured).
+"""
+
+from companion.flight.ending import Exit, FlightEnded
+from companion.flight.orders import enter
+from companion.flight.rig import Rig
+from companion.flight.roles import in_role, require_role
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.roles import Role
+
+
+async def leave_offboard(rig: Rig) -> None:
+    """Ask a vehicle that stands disarmed in offboard to hold, and wait until it does.
+
+    Nothing is asked of a vehicle that is armed or in any other mode.
+
+    Raises:
+        FlightEnded: Somebody else changed its mode meanwhile, or it does not want to hold.
+    """
+    if rig.armed() or not in_role(rig.link, Role.OFFBOARD):
+        return
+    mode = rig.link.state.mode
+    rig.note(f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold")
+    rig.detail = f"the autopilot to leave {mode}"
+
+    def ours() -> None:
+        if rig.armed():
+            raise FlightEnded("somebody else armed the vehicle", Exit.LET_GO)
+        require_role(rig.link, {Role.OFFBOARD})
+
+    try:
+        await enter(rig, rig.link.family.hold(), ours, lambda: in_role(rig.link, Role.HOLD))
+    except (CommandRefused, CommandTimeout) as error:
+        raise FlightEnded(
+            f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
+            f"command another mode ({error})",
+            Exit.LEAVE,
+        ) from error
