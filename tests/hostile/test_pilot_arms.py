@@ -4,7 +4,7 @@ from tests.hostile import actions
 from tests.hostile.actions import arms, parameter, switches, together
 from tests.hostile.endings import never_armed, never_took_off, never_took_over, ok, on_the_ground
 from tests.hostile.personality import ARDUPILOT, BOTH, PX4
-from tests.hostile.scenario import Scenario, flights
+from tests.hostile.scenario import Scenario, flights, in_turn
 
 ARMED, HANDED_OVER = 1.0, 1.6
 PILOT = (("checked", ARMED, arms), ("checked", HANDED_OVER, switches("READY")))
@@ -66,7 +66,7 @@ def others(kind):
     yield row("battery at 3 % for a moment before the pilot arms", script, (), kind)
 
 
-@flights([scenario for kind in BOTH for scenario in on_ground(kind)])
+@flights(in_turn(on_ground))
 def test_what_went_bad_on_the_ground_forbids_the_take_off(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
 

@@ -2,11 +2,13 @@
 
 from tests.hostile import personality as kinds
 from tests.hostile.actions import (
+    arms,
     clock,
     clock_from_now,
     late,
     silent,
     streams,
+    switches,
     tells,
     timesync,
     together,
@@ -176,8 +178,24 @@ WRAPPING = (
     Scenario(
         "the vehicle's time since boot wraps in the checks",
         (("start", 0.0, runs_from(WRAP_S - 1.9)),),
-        (ok,),
+        (says("wrapped"),),
         rules=RESTARTED,
+    ),
+    *(
+        Scenario(
+            "the vehicle's time since boot wraps before the pilot arms",
+            (
+                ("start", 0.0, runs_from(WRAP_S - 3.3)),
+                ("checked", 2.0, arms),
+                ("checked", 2.6, switches("READY")),
+            ),
+            (ok, says("wrapped")),
+            (kind,),
+            mode=mode,
+            rules=RESTARTED,
+            changes={"flight": {"arm": False}},
+        )
+        for kind, mode in ((PX4, "PILOT"), (ARDUPILOT, "STABILIZE"))
     ),
 )
 ON_THE_GROUND = tuple(
