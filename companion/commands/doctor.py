@@ -16,17 +16,20 @@ from companion.config_file import changed, load
 from companion.doctor.consultation import Patient, patient
 from companion.doctor.evidence import Evidence
 from companion.doctor.examination import examine
-from companion.doctor.finding import Finding
+from companion.doctor.finding import Finding, Key
 from companion.doctor.gathering import identify
 from companion.doctor.repair import Answer, Outcome, mend, require_disarmed, restore
 from companion.doctor.report import as_dict, outcome_as_dict, outcome_line, tables
 from companion.doctor.undo import Undo, UndoFile
 from companion.flight.assembly import open_link
+from companion.flight.programmes import programme
+from companion.guidance import Sequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
+from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.parameter_survey import survey
 from companion.terminal import read_line
 from companion.yaml_file import ConfigError
@@ -67,6 +70,16 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
+def _flown(config: Config) -> tuple[Sequence | None, list[Finding]]:
+    """What is to be flown, or why it cannot be."""
+    try:
+        return programme(config), []
+    except ConfigError as error:
+        found = f"what is configured cannot be flown: {error}"
+        because = "`companion fly` refuses it"
+        return None, [Finding(Key.PROGRAMME, Verdict.INEFFECTIVE, found, because)]
+
+
 class _Visit:
     """What one call of the command does; `result` is what `--json` prints."""
 
@@ -87,7 +100,9 @@ class _Visit:
                 evidence = await vehicle.evidence(wait)
             except (LinkTimeout, LinkLost) as error:
                 return self._told(vehicle.silent(error))
-            findings = examine(config, evidence)
+            flown, refusals = _flown(config)
+            evidence = replace(evidence, programme=flown)
+            findings = [*refusals, *examine(config, evidence)]
             code = self._told(findings)
             if fix:
                 code = await self._mend(vehicle, evidence, findings, unasked=unasked)
@@ -128,7 +143,8 @@ class _Visit:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.family.parameters))
-        code = self._told(examine(config, evidence))
+        _, refusals = _flown(config)
+        code = self._told([*refusals, *examine(config, evidence)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

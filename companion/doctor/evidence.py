@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
+from companion.guidance import Sequence
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.parameter_survey import Survey
 from companion.mavlink.state import VehicleState
@@ -121,6 +122,7 @@ class Evidence:
         identity: What the autopilot is.
         stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
+        programme: What is to be flown; `None` where nothing is.
     """
 
     family: AutopilotFamily
@@ -136,6 +138,7 @@ class Evidence:
     identity: Identity
     stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
+    programme: Sequence | None = None
 
     @property
     def awaits_position(self) -> bool:

@@ -6,6 +6,7 @@ from companion.config import Config
 from companion.doctor import configuration_checks, link_checks, vehicle_checks
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding
+from companion.doctor.offboard_loss import offboard_loss
 from companion.doctor.parameter_findings import parameters
 from companion.mavlink.parameter_rules import Verdict
 
@@ -27,6 +28,7 @@ CHECKS: tuple[Check, ...] = (
     link_checks.delays,
     link_checks.clocks,
     parameters,
+    offboard_loss,
     configuration_checks.planner,
     configuration_checks.dead_time,
     configuration_checks.accepted,

@@ -101,6 +101,8 @@ def _errors(slopes: Floats, residual: Floats, weights: int) -> Floats:
     alike = float(residual[1:] @ residual[:-1]) / squares if squares > 0.0 else 0.0
     alike = min(max(alike, 0.0), 0.99)
     variance = squares / freedom * (1.0 + alike) / (1.0 - alike)
-    covariance = np.linalg.pinv(slopes.T @ slopes) * variance
+    # Slopes near the smallest number there is have no inverse: nothing is determined by them.
+    with np.errstate(over="ignore", invalid="ignore"):
+        covariance = np.linalg.pinv(slopes.T @ slopes) * variance
     errors: Floats = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    return errors
+    return np.where(np.isnan(errors), np.inf, errors)

@@ -19,7 +19,7 @@ from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.preflight import Preflight
 from companion.flight.preparation import SLOWEST_HEARTBEAT
-from companion.flight.programmes import programme
+from companion.flight.programmes import programme, unbegun
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
@@ -238,10 +238,9 @@ def assemble(
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
     same_vehicle = SameVehicle(link, SLOWEST_HEARTBEAT)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = Preflight(config, link, same_vehicle)
-    rig = Rig(
-        config, link, loop, guide, lookout, programme(config), ground, preflight, same_vehicle
-    )
+    flown = programme(config)
+    preflight = Preflight(config, link, same_vehicle, unbegun(flown))
+    rig = Rig(config, link, loop, guide, lookout, flown, ground, preflight, same_vehicle)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     watch = Watch(rig, ladder, clock)
     loop.ask_mode = watch.ask_mode

@@ -12,6 +12,7 @@ from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
 from companion.flight.ending import FlightEnded
 from companion.flight.same_vehicle import SameVehicle
+from companion.guidance import Sequence
 from companion.mavlink.link import Link
 from companion.mavlink.parameter_rules import Verdict
 from companion.mavlink.streams import StreamRate
@@ -32,11 +33,20 @@ class Preflight:
 
     Attributes:
         note: takes what is amiss without forbidding a flight, once each.
+
+    Args:
+        config: what the vehicle is to be flown with.
+        link: to it.
+        same_vehicle: whether it still is the vehicle that was checked.
+        programme: what is to be flown; nobody else asks it for references.
     """
 
-    def __init__(self, config: Config, link: Link, same_vehicle: SameVehicle) -> None:
+    def __init__(
+        self, config: Config, link: Link, same_vehicle: SameVehicle, programme: Sequence
+    ) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
+        self._programme, self._weighed = programme, False
         self._clock = asyncio.get_running_loop().time
         self._granted: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
@@ -50,7 +60,7 @@ class Preflight:
             CommandTimeout: the autopilot did not answer.
             LinkLost: the connection dropped meanwhile.
         """
-        self._gathered_at = -inf
+        self._gathered_at, self._weighed = -inf, False
         wanted = wanted_rates(self._config, self._link)
         self._granted = await self._link.set_rates(wanted, window_s=0.1)
         for message, rate in self._granted.items():
@@ -71,8 +81,14 @@ class Preflight:
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
-        self._heed(examine(self._config, replace(evidence, stage=stage)))
+        self._heed(examine(self._config, self._for(stage, evidence)))
         return evidence
+
+    def _for(self, stage: Stage, evidence: Evidence) -> Evidence:
+        """The evidence for a stage; what is flown is weighed once a vehicle: it takes a while."""
+        programme = None if self._weighed else self._programme
+        self._weighed = True
+        return replace(evidence, stage=stage, programme=programme)
 
     def _heed(self, findings: list[Finding]) -> None:
         """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""

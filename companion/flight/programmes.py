@@ -49,6 +49,16 @@ def programme(config: Config) -> Sequence:
     return Sequence([_part(config, name) for name in config.flight.programme])
 
 
+def unbegun(sequence: Sequence) -> Sequence:
+    """The same, as if nobody had asked it for a reference yet: `Follow` keeps where it began."""
+    return Sequence(
+        [
+            replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
+            for part in sequence.parts
+        ]
+    )
+
+
 def require_inside(config: Config, parts: Iterable[Programme], origin: Place | None) -> None:
     """See that all programmes stay inside the fence, with a polygon on the map if there is one.
 

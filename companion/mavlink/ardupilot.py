@@ -66,7 +66,9 @@ class ArduPilot:
         }
     )
     interval_step_us = 1000
-    dead_man = DeadMan("GUID_TIMEOUT", "it levels and keeps its height, and does not hold")
+    dead_man = DeadMan(
+        "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
+    )
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

@@ -19,10 +19,12 @@ class DeadMan(NamedTuple):
     Attributes:
         parameter: Sets for how long, in s, it holds the last rates; see `AutopilotFamily`.
         then: What follows, in words.
+        brakes: Whether it stops the vehicle then.
     """
 
     parameter: str
     then: str
+    brakes: bool
 
 
 FLIGHT_RATES: Mapping[str, float] = MappingProxyType(

@@ -7,7 +7,7 @@ from companion.mavlink.parameter_rules import Check, Complaint, Setup, Values, V
 
 UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
 
-_LONGEST_HELD = 2.0
+LONGEST_HELD = 2.0
 """0.4 rad/s held for 1 s became 24° of tilt (measured on PX4); twice that is not flown out, s."""
 
 _SAME_HOVER = 1.4
@@ -74,9 +74,14 @@ def bit_clear(verdict: Verdict, bit: int, because: str) -> Check:
     return check
 
 
+def shortest_hold(silence_limit: float) -> float:
+    """How long the autopilot must hold the last rates at least, s, so that we give up first."""
+    return 1.5 * silence_limit
+
+
 def rates_held(value: float, _: Values, setup: Setup) -> Complaint | None:
     """How long the autopilot holds the last rates: not for long, but longer than we take."""
-    right = max(1.0, 1.5 * setup.silence_limit)
+    right = shortest_hold(setup.silence_limit)
     if value <= setup.silence_limit:
         return Complaint(
             UNSAFE,
@@ -84,7 +89,7 @@ def rates_held(value: float, _: Values, setup: Setup) -> Complaint | None:
             f"{1e3 * setup.silence_limit:g}), so a short gap ends in its failsafe",
             right,
         )
-    if value > _LONGEST_HELD:
+    if value > LONGEST_HELD:
         return Complaint(
             UNSAFE,
             f"when our setpoints stop the last rates are held for {value:g} s: 0.4 rad/s become "

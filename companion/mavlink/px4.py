@@ -82,7 +82,7 @@ class Px4:
         }
     )
     interval_step_us = 1
-    dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says")
+    dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True)
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

@@ -79,8 +79,8 @@ def test_every_key_is_described():
 
 
 def test_the_bundled_vehicle_is_configured_with_its_defaults():
-    """As its comment says, but for one parameter; the default of every key that is shown, too."""
-    safer = MockSettings(parameters={"COM_LOW_BAT_ACT": 3})
+    """As its comment says, but for two parameters; the default of every key that is shown, too."""
+    safer = MockSettings(parameters={"COM_LOW_BAT_ACT": 3, "COM_OF_LOSS_T": 0.75})
     assert load_settings(CONFIGS / "mock-px4.yaml", {}) == safer
     shown = yaml.safe_load((CONFIGS / "mock-px4.yaml").read_text())["mock"]
     assert list(shown) == list(MockSettings.model_fields)

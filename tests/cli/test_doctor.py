@@ -23,7 +23,7 @@ WRONG = {
     "ardupilot": {"GUID_OPTIONS": 1, "ATC_ANGLE_BOOST": 1, "FS_THR_ENABLE": 0},
 }
 MENDED = {
-    "px4": {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 5.0, "CBRK_SUPPLY_CHK": 0.0},
+    "px4": {"COM_OF_LOSS_T": 0.75, "COM_OBL_RC_ACT": 5.0, "CBRK_SUPPLY_CHK": 0.0},
     "ardupilot": {"GUID_OPTIONS": 9.0, "ATC_ANGLE_BOOST": 0.0, "FS_THR_ENABLE": 1.0},
 }
 PLANE, PX4 = 1, 12
@@ -103,9 +103,9 @@ def test_it_asks_on_a_terminal(capsys, tmp_path, monkeypatch):
         code, out, _ = doctor(capsys, "--config", config_file(tmp_path, mock), "--fix")
         values = held(tmp_path, mock, ("COM_OF_LOSS_T", "COM_OBL_RC_ACT"))
     os.close(ours)
-    assert (code, values) == (1, {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 7.0})
-    assert out.count("Set COM_OF_LOSS_T from 5 to 1? [y]es, [n]o, [a]ll, [q]uit") == 2
-    assert "COM_OF_LOSS_T: 5 → 1, read back" in out
+    assert (code, values) == (1, {"COM_OF_LOSS_T": 0.75, "COM_OBL_RC_ACT": 7.0})
+    assert out.count("Set COM_OF_LOSS_T from 5 to 0.75? [y]es, [n]o, [a]ll, [q]uit") == 2
+    assert "COM_OF_LOSS_T: 5 → 0.75, read back" in out
     assert "Undo with: companion doctor --config FILE --undo" in out
 
 

@@ -1,11 +1,12 @@
 """The safety ladder: every monitor by its own breach, how long it must last, and what follows."""
 
 from math import cos, inf, radians, sin
+from types import SimpleNamespace
 
 import pytest
 
 from companion.config import Config
-from companion.flight.safety import Action, SafetyLadder, monitors
+from companion.flight.safety import Action, Lookout, SafetyLadder, monitors
 from companion.flight.safety.monitor import Alarm, Monitor
 from companion.flight.safety.snapshot import (
     Autopilot,
@@ -68,12 +69,17 @@ def unanswered(reason, **changes):
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
 WARN, HOLD, HAND_BACK, LAND, LET_GO = Action
+STOOD_STILL = "this computer stood still for 0.4 s"
 BREACHES = [
     ("unheard", control(**SILENT, heard=OLD), LET_GO, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
     ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
+    ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
+    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LET_GO, 0.0, STOOD_STILL),
     ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
@@ -137,6 +143,22 @@ class Climb:
             if verdict is not None:
                 return verdict, 0.02 * step
         return None, None
+
+
+def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
+    """A look comes every 20 ms, and one that is late by less than 10 ms is none."""
+    state = SimpleNamespace(reset_counter=None)
+    link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
+    resets = SimpleNamespace(on_counter=lambda *_: None)
+    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0)
+    lookout = Lookout(link, loop, None, real_time=True)
+    for now in (0.0, 0.02, 0.05, 0.48, 0.5):
+        lookout.listen(now)
+    assert lookout.stood_still(since=0.02) == pytest.approx(0.4)
+    assert lookout.stood_still(since=0.49) == 0.0
+    lookout.listen(3.53)
+    assert lookout.stood_still(since=0.49) == pytest.approx(3.0)
+    assert lookout.stood_still(since=3.53) == 0.0
 
 
 @pytest.mark.parametrize(

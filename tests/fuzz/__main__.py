@@ -33,7 +33,9 @@ def main() -> int:
     warnings.filterwarnings("ignore", category=HypothesisWarning)  # of long cases
     seed = secrets.randbits(32) if options.seed is None else options.seed
     out = options.out or Path(tempfile.mkdtemp(prefix="fuzz-found-"))
-    searches = [Search(TARGETS[name]) for name in options.target or TARGETS]
+    out.mkdir(parents=True, exist_ok=True)
+    running = out / "running.json"
+    searches = [Search(TARGETS[name], running) for name in options.target or TARGETS]
     seconds = 60.0 * options.minutes / len(searches)
     rounds = max(1, round(seconds / _ROUND_S))
     print(f"seed {seed}, failures go to {out}", flush=True)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from tests.fuzz.frames import frame_of
 from tests.fuzz.judge import Judge
 from tests.fuzz.messages import EVERY, sends
 from tests.fuzz.vehicle import STEP, Vehicle
@@ -13,6 +14,7 @@ from tests.fuzz.wires import Wire
 
 Event = dict[str, Any]
 _UPLINK_S = 0.004
+_EVENT = 410
 _KINDS = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
 
 
@@ -129,6 +131,9 @@ class Channel:
                 self._inject(event, event.get("count", 1))
             case "bytes":
                 self._deliver(bytes.fromhex(event["hex"]), self._loop.time())
+            case "event":
+                frame = frame_of(_EVENT, bytes.fromhex(event["payload"]))
+                self._deliver(frame, self._loop.time())
             case "stamps":
                 self._shift_ms += event["by_ms"]
                 self._judge.clock_set()

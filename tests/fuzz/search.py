@@ -1,5 +1,6 @@
 """Tries cases of a target until time is over, and makes each failure small."""
 
+import faulthandler
 import re
 import time
 import traceback
@@ -12,7 +13,7 @@ from typing import Any
 from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
 from hypothesis.errors import HypothesisException
 
-from tests.fuzz.target import Case, Target, case_text
+from tests.fuzz.target import WALL_FACTOR, Case, Target, case_text
 
 _BATCH = 400
 """Cases after which hypothesis begins with a new seed."""
@@ -33,12 +34,14 @@ class Search:
 
     Attributes:
         target: what is fuzzed.
+        running: file of the case that is being tried.
         cases: how many were tried.
         slowest: processor time of the slowest that was not ended, s.
         failures: the smallest case and the error of each kind of failure.
     """
 
     target: Target
+    running: Path
     cases: int = 0
     slowest: float = 0.0
     failures: dict[str, tuple[Case, BaseException]] = field(default_factory=dict)
@@ -84,12 +87,17 @@ class Search:
             return  # small enough
         self.cases += 1
         began = time.process_time()
+        # A loop in C hears no alarm: then the program ends, and the case stands in `running`.
+        self.running.write_text(case_text(case), encoding="utf-8")
+        faulthandler.dump_traceback_later(2.0 * WALL_FACTOR * self.target.seconds, exit=True)
         try:
             self.target.run(case)
         except Exception as error:
             self._note(case, error)
         else:
             self.slowest = max(self.slowest, time.process_time() - began)
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
     def _note(self, case: Case, error: Exception) -> None:
         """Keep a failure, and raise it if it is the one that is being made smaller."""

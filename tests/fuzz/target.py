@@ -3,6 +3,7 @@
 import json
 import resource
 import signal
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ CORPUS = Path(__file__).parent / "corpus"
 
 WALL_FACTOR = 10.0
 """A case may take this many times its processor time on the clock: others use the machine, too."""
+
+_AGAIN_S = 0.1
+"""After an alarm that was lost the next one comes so soon."""
 
 MEMORY_BYTES = 1 << 30
 """A case may add this much to the addresses that the process has; more is a `MemoryError`."""
@@ -76,17 +80,20 @@ def watchdog(seconds: float) -> Iterator[None]:
         signal.SIGPROF: (signal.ITIMER_PROF, seconds),
         signal.SIGALRM: (signal.ITIMER_REAL, seconds * WALL_FACTOR),
     }
-    before = {number: signal.signal(number, ring) for number in clocks}
+    handlers = {number: signal.signal(number, ring) for number in clocks}
+    began = time.monotonic()
+    # pytest-timeout counts by ITIMER_REAL, too; it gets back what it had left.
+    left = {timer: signal.setitimer(timer, limit, _AGAIN_S)[0] for timer, limit in clocks.values()}
     try:
-        for timer, limit in clocks.values():
-            signal.setitimer(timer, limit, 0.1)
         yield
     except _Alarm as alarm:
-        raise HungError(f"took more than {seconds:g} s of processor time") from alarm
+        limits = f"{seconds:g} s of processor time or {seconds * WALL_FACTOR:g} s"
+        raise HungError(f"took more than {limits}") from alarm
     finally:
-        for timer, _ in clocks.values():
-            signal.setitimer(timer, 0.0)
-        for number, handler in before.items():
+        for timer, seconds_left in left.items():
+            still = max(_AGAIN_S, seconds_left - (time.monotonic() - began))
+            signal.setitimer(timer, still if seconds_left else 0.0)
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

@@ -11,9 +11,6 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from hypothesis import strategies as st
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from companion.config import Config
 from companion.flight.session import Session
 from companion.mavlink.link import Link
@@ -21,7 +18,7 @@ from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
 from tests.fuzz.family import ARDUPILOT, PX4
 from tests.fuzz.judge import Judge
-from tests.fuzz.messages import EVERY
+from tests.fuzz.scripts import cases
 from tests.fuzz.target import Case, Target
 from tests.fuzz.vehicle import Vehicle
 
@@ -163,89 +160,4 @@ def _configuration(case: Case) -> dict[str, Any]:
     }
 
 
-# --- cases
-
-_PHASES = ("connect", "checks", "stream", "arm", "takeoff", "offboard", "programme", "hand back")
-_PHASES += ("land", "disarm")
-_LIKELY = st.sampled_from((*_PHASES, "takeoff", "offboard", "offboard", "programme", "programme"))
-_values = st.one_of(
-    st.sampled_from((0, 1, -1, 2, 3, 4, 5, 255, 65535, 2**31, 2**32 - 1, -(2**31), 2**63 - 1)),
-    st.sampled_from((float("nan"), float("inf"), -float("inf"), 1e-40, 3.4e38, -3.4e38, 0.0)),
-    st.floats(width=32),
-    st.integers(-300, 300),
-    st.floats(-50.0, 50.0).map(lambda by: {"add": by}),
-)
-_NAMES = tuple(EVERY)
-_FIELDS = {
-    kind.msgname: tuple(kind.fieldnames)
-    for kind in dialect.mavlink_map.values()
-    if kind.msgname in EVERY
-    or kind.msgname in ("COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "TIMESYNC", "STATUSTEXT")
-}
-_seconds = st.one_of(st.floats(0.02, 3.0), st.sampled_from((0.03, 0.1, 0.3, 0.6, 1.2, 6.0)))
-_COMMANDS = (400, 176, 22, 21, 511, 512)
-
-_kinds = st.sampled_from(
-    (
-        *("field", "field", "field", "say", "say", "silence", "silence", "delay", "hold"),
-        *("copies", "swap", "stamps", "restart", "mode", "armed", "deaf", "ack", "jump"),
-        *("interrupt", "bytes"),
-    )
-)
-
-
-@st.composite
-def _events(draw: Any) -> dict[str, Any]:
-    """One thing that goes wrong."""
-    event: dict[str, Any] = {"phase": draw(_LIKELY), "after": draw(st.floats(0.0, 2.0))}
-    event["kind"] = kind = draw(_kinds)
-    if kind in ("field", "silence", "delay", "hold", "copies", "swap", "deaf"):
-        event["seconds"] = draw(_seconds)
-    match kind:
-        case "field":
-            event["message"] = draw(st.sampled_from(_NAMES))
-            event["field"] = draw(st.sampled_from(_FIELDS[event["message"]]))
-            event["value"] = draw(_values)
-        case "say":
-            event["message"] = name = draw(st.sampled_from(sorted(_FIELDS)))
-            fields = st.dictionaries(st.sampled_from(_FIELDS[name]), _values, max_size=3)
-            event["fields"] = draw(fields)
-            event["count"] = draw(st.sampled_from((1, 1, 2, 20)))
-            event["source"] = draw(st.sampled_from(([1, 1], [1, 1], [1, 2], [2, 1], [255, 190])))
-        case "silence":
-            some = st.lists(st.sampled_from(_NAMES), min_size=1, max_size=3, unique=True)
-            event["messages"] = draw(st.one_of(st.none(), some))
-        case "delay":
-            event["by"] = draw(st.sampled_from((0.01, 0.05, 0.12, 0.3, 1.0)))
-        case "copies":
-            event["count"] = draw(st.integers(0, 4))
-        case "stamps":
-            ahead = st.sampled_from((1, 50, 1000, 60_000, 2**31, 2**32 - 30_000))
-            event["by_ms"] = draw(ahead) * draw(st.sampled_from((1, -1)))
-        case "mode":
-            event["mode"] = draw(st.sampled_from(sorted(_MODES)))
-        case "armed":
-            event["armed"] = draw(st.booleans())
-        case "ack":
-            event["command"] = draw(st.sampled_from(_COMMANDS))
-            event["result"] = draw(st.sampled_from((0, 1, 2, 3, 4, 5, 6, 200)))
-        case "jump":
-            event["by"] = draw(st.lists(st.floats(-20.0, 20.0), min_size=3, max_size=3))
-        case "bytes":
-            event["hex"] = draw(st.binary(max_size=40)).hex()
-    return event
-
-
-_MODES = {*PX4.ours, *PX4.foreign, *ARDUPILOT.ours, *ARDUPILOT.foreign, 2**32 - 1}
-_programmes = st.sampled_from((["hover"], ["hover"], ["hover"], ["steps"], ["circle"], ["corners"]))
-_cases = st.fixed_dictionaries(
-    {
-        "family": st.sampled_from(("px4", "ardupilot")),
-        "arm": st.sampled_from((True, True, False)),
-        "planner": st.sampled_from(("auto", "first-order", "exact", "quaternion", "so3", "euler")),
-        "programme": _programmes,
-        "events": st.lists(_events(), max_size=5),
-    }
-)
-
-TARGET = Target("telemetry", _cases, _check, seconds=20.0)
+TARGET = Target("telemetry", cases, _check, seconds=20.0)

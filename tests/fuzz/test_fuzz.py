@@ -18,27 +18,14 @@ EXAMPLES = {
 }
 """Some seconds of processor time in all."""
 
-AWAITED: dict[str, str] = {
-    "configuration": "the bounded YAML reader",
-    "recordings": "the bounded YAML reader",
-    "trajectories": "the bounded YAML reader",
-}
-"""Targets with cases that still fail, and what they wait for."""
-
-
-def _marks(name):
-    reason = AWAITED.get(name)
-    return [] if reason is None else [pytest.mark.xfail(run=False, reason=reason)]
-
-
 FOUND = [
-    pytest.param(name, path, id=f"{name}-{path.stem}", marks=_marks(name))
+    pytest.param(name, path, id=f"{name}-{path.stem}")
     for name, target in TARGETS.items()
     for path in target.corpus()
 ]
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=_marks(name)) for name in TARGETS])
+@pytest.mark.parametrize("name", TARGETS)
 def test_some_cases_of_each_target(name):
     @settings(
         max_examples=EXAMPLES[name],

@@ -104,8 +104,8 @@ def test_a_good_vehicle_is_found_good_by_every_rule(family):
 
 
 MISTAKES = [
-    (PX4, {"COM_OF_LOSS_T": 5.0}, UNSAFE, 1.0),
-    (PX4, {"COM_OF_LOSS_T": 0.3}, UNSAFE, 1.0),
+    (PX4, {"COM_OF_LOSS_T": 5.0}, UNSAFE, 0.75),
+    (PX4, {"COM_OF_LOSS_T": 0.3}, UNSAFE, 0.75),
     (PX4, {"COM_OBL_RC_ACT": 7.0}, UNSAFE, 5.0),
     (PX4, {"COM_RC_OVERRIDE": 1.0}, INEFFECTIVE, 3.0),
     (PX4, {"COM_RC_STICK_OV": 80.0}, INEFFECTIVE, 30.0),
@@ -128,7 +128,7 @@ MISTAKES = [
     (PX4, {"FD_FAIL_R": 30.0}, INEFFECTIVE, 60.0),
     (ARDUPILOT, {"GUID_OPTIONS": 5.0}, UNSAFE, 13.0),
     (ARDUPILOT, {"ATC_ANGLE_BOOST": 1.0}, UNSAFE, 0.0),
-    (ARDUPILOT, {"GUID_TIMEOUT": 3.0}, UNSAFE, 1.0),
+    (ARDUPILOT, {"GUID_TIMEOUT": 3.0}, UNSAFE, 0.75),
     (ARDUPILOT, {"ATC_RATE_FF_ENAB": 0.0}, INEFFECTIVE, 1.0),
     (ARDUPILOT, {"ATC_INPUT_TC": 1.0}, INEFFECTIVE, 0.15),
     (ARDUPILOT, {"ATC_ACC_P_MAX": 500.0}, INEFFECTIVE, None),

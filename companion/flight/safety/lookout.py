@@ -117,12 +117,17 @@ class Lookout:
                 self._heard_at,
                 self._guide.fresh_position() is not None,
                 None if clock.timeline == self._timeline else clock.last_change,
+                self.stood_still(since=loop.last_answer),
             ),
             self._health(),
             self._resets(now),
             state.gps_was_good,
             self._good_flags,
         )
+
+    def stood_still(self, since: float) -> float:
+        """For how long our own timer did not run since then, s."""
+        return sum(look.late for look in self._counted if look.now > since)
 
     def _motion(self) -> Motion:
         guide, loop, start = self._guide, self._loop, self._start

@@ -7,6 +7,9 @@ from companion.flight.unanswered import Unanswered
 _HEARD = 0.3
 """Nothing at all from the vehicle for this long, s: it would not be heard taking over, either."""
 
+_OURS = 0.5
+"""Beyond this share of the silence it is of our own making."""
+
 
 def silence(limit: float, *, heard: bool) -> Judge:
     """No setpoint left for longer than `limit` s, while the vehicle is `heard` or is not."""
@@ -21,6 +24,9 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
 
 def _why(now: float, control: Control, limit: float) -> str:
+    if control.stood_still > _OURS * (now - control.answered):
+        # What came meanwhile was read late, and nobody could notice that it came in time.
+        return f"this computer stood still for {control.stood_still:.1f} s"
     if now - control.sampled > limit:
         return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
     reason = control.reason

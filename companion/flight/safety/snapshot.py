@@ -58,6 +58,7 @@ class Control(NamedTuple):
         position_fresh: the newest position is one to fly by.
         clock_change: how the vehicle's clock has jumped or restarted since control began, in
             words, or None.
+        stood_still: for how long our own timer did not run since a setpoint left, s.
     """
 
     answered: float = inf
@@ -68,6 +69,7 @@ class Control(NamedTuple):
     heard: float = inf
     position_fresh: bool = True
     clock_change: str | None = None
+    stood_still: float = 0.0
 
 
 class Health(NamedTuple):

@@ -1,0 +1,74 @@
+"""How far the last rates carry a vehicle: by hand where that can be, and its limits."""
+
+from math import cos, hypot, pi
+
+import pytest
+
+from companion.guidance import GRAVITY
+from companion.guidance.fence import Fence
+from companion.guidance.offboard_loss import Flown, Loss, path_thrust, reach
+
+LEVEL, NOTHING = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.0)
+FENCE = Fence(50.0, 30.0, 1.0, (), (), 2.5, 0.3)
+PX4 = Loss(1.0, brakes=True, drag=0.0, max_tilt_rate=pi, fence=FENCE)
+ARDUPILOT = PX4._replace(brakes=False)
+
+
+def flown(velocity=NOTHING, thrust=LEVEL, turn=NOTHING):
+    return Flown(NOTHING, velocity, thrust, turn)
+
+
+def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it():
+    there = reach(flown(), PX4._replace(held=0.0))
+    assert there.away < 0.1
+    assert max(there.up, there.down) < 0.1
+    assert hypot(*there.place) == 0.0
+    assert reach(flown(), PX4).away < 2.0
+
+
+def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_reckons():
+    """A fraction over, for feedback."""
+    there = reach(flown(velocity=(5.0, 0.0, 0.0)), PX4)
+    assert there.place == pytest.approx((5.0 * 1.1 + FENCE.stop(NOTHING, (5.0, 0.0, 0.0))[0], 0.0))
+    assert there.away == pytest.approx(there.place[0] + there.spread)
+    assert 0.0 < there.spread < 5.0
+
+
+def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
+    east = flown(velocity=(0.0, 5.0, 0.0))
+    slippery, dragged = (reach(east, ARDUPILOT._replace(drag=drag)) for drag in (0.0, 0.5))
+    assert slippery.place[1] > 5.5 + 5.0 / 0.2  # unknown drag: the least that any vehicle has
+    assert 5.0 / 0.5 < dragged.place[1] < 0.6 * slippery.place[1]
+
+
+def test_rates_that_are_held_turn_the_thrust_and_the_longer_the_worse():
+    rolling = flown(turn=(0.5 * GRAVITY, 0.0, 0.0))  # 0.5 rad/s northwards from level
+    short, long = (reach(rolling, PX4._replace(held=held)) for held in (0.5, 1.5))
+    assert 0.0 < short.place[0] < long.place[0] / 5.0
+    assert short.down < long.down
+    slower = reach(rolling, PX4._replace(held=1.5, max_tilt_rate=0.2))
+    assert slower.place[0] < 0.5 * long.place[0]
+    assert slower.down < long.down
+
+
+def test_a_tilted_vehicle_that_turns_through_level_climbs_by_its_surplus_of_thrust():
+    tilted = path_thrust((5.0, 0.0, 0.0), NOTHING, 0.0)
+    back = (-5.0, 0.0, 0.0)
+    surplus = hypot(5.0, GRAVITY) - GRAVITY
+    there = reach(flown(thrust=tilted, turn=back), PX4)
+    assert 0.1 < there.up < 2.0 * surplus  # which it has for some of a second
+    assert there.up > reach(flown(), PX4).up
+
+
+def test_upside_down_it_falls_for_as_long_as_it_takes_to_level():
+    fast = flown(turn=(3.0 * GRAVITY, 0.0, 0.0))
+    there = reach(fast, PX4)
+    fallen = 0.5 * GRAVITY * (1.0 - cos(1.5)) * 1.0
+    assert there.down > fallen
+    assert reach(fast, PX4._replace(max_tilt_rate=1.5)).down < 0.5 * there.down
+
+
+def test_drag_is_part_of_the_thrust_that_a_path_takes():
+    assert path_thrust((1.0, 0.0, -0.5), (2.0, -3.0, 1.0), 0.5) == pytest.approx(
+        (2.0, -1.5, -0.5 - GRAVITY)
+    )
