@@ -162,7 +162,8 @@ class _TcpPassing(_Passing):
             self.hang_up()
 
     def program_sent(self) -> None:
-        assert self.program is not None
+        if self.program is None:
+            return  # hung up since the selector saw this
         try:
             data = self.program.recv(65536)
         except OSError:
