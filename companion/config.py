@@ -3,7 +3,7 @@
 The defaults fly the bundled vehicle.
 """
 
-from math import hypot, radians, sin
+from math import ceil, cos, degrees, floor, hypot, radians, sin
 from typing import Annotated, Any
 
 from pydantic import Field, model_validator
@@ -31,6 +31,8 @@ from companion.config_sections import (
     ThrustConfig,
     VehicleConfig,
 )
+from companion.guidance.thrust import FOR_TILT, largest_tilt
+from companion.guidance.thrust_curve import ThrustCurve
 from companion.yaml_file import Section
 
 FileName = Annotated[str, Field(max_length=1000)]
@@ -97,6 +99,7 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             not limits.min_thrust < thrust.hover_thrust < limits.max_thrust,
             "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust",
         ),
+        *_thrust_contradictions(config),
         (
             config.deadman.target_stale_ms < 2000.0 / config.guidance.rate_hz,
             "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
@@ -113,6 +116,28 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
             "limits.max_tilt_deg",
         ),
         *(_identify_contradictions(config) if "identify" in flown else ()),
+    ]
+
+
+def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
+    """As `_contradictions`, of the thrust that the height takes at the largest tilt."""
+    limits, thrust = config.limits, config.thrust
+    curve = ThrustCurve(thrust.curve_factor)
+    hover = curve.share(thrust.hover_thrust)
+    # An autopilot that makes up for tilt may do it with all the thrust there is.
+    most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
+    tilt = degrees(largest_tilt(hover, most))
+    needed = hover / cos(radians(limits.max_tilt_deg)) / FOR_TILT
+    remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
+    if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
+        remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"
+    return [
+        (
+            hover < most and tilt < limits.max_tilt_deg,
+            f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
+            f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} it holds the "
+            f"height up to {tilt:.0f}°; {remedy}",
+        )
     ]
 
 

@@ -22,7 +22,8 @@ class LinkConfig(Section):
     backend: Literal["direct", "mavsdk"] = "direct"
     """direct, or mavsdk: MAVSDK holds the connection, and our frames go by it (extra `mavsdk`)."""
     endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
-    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD."""
+    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD; udpin and
+    tcpin also take ?peer=HOST[:PORT], to hear no other."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
     """System id of the autopilot; every other system is ignored."""
     target_component: Annotated[int, Field(ge=1, le=255)] = 1

@@ -54,6 +54,7 @@ class LinkQuality(NamedTuple):
         reconnects: How often the connection was opened again.
         round_trip: Shortest of late by TIMESYNC, s; `None` if it was never answered.
         jitter: By how much the round trips differed, s.
+        other_clock: Whether TIMESYNC counts another clock than the samples' stamps.
         notices: What keeps the two sides from understanding each other.
     """
 
@@ -65,6 +66,7 @@ class LinkQuality(NamedTuple):
     round_trip: float | None
     jitter: float | None
     notices: tuple[str, ...] = ()
+    other_clock: bool = False
 
     @property
     def loss(self) -> float:
@@ -80,12 +82,16 @@ class SampleTimes(NamedTuple):
         longest_pause: Between two of them by our clock, s.
         not_newer: Stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
+        age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
+        clock_change: How the vehicle's clock jumped or restarted meanwhile, in words, or empty.
     """
 
     heard: int = 0
     longest_pause: float = 0.0
     not_newer: int = 0
     clock_rate: float | None = None
+    age: float | None = None
+    clock_change: str = ""
 
 
 class Company(NamedTuple):

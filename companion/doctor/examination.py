@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 
 from companion.config import Config
-from companion.doctor import configuration_checks, link_checks, vehicle_checks
+from companion.doctor import clock_checks, configuration_checks, link_checks, vehicle_checks
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding
 from companion.doctor.offboard_loss import offboard_loss
@@ -26,7 +26,8 @@ CHECKS: tuple[Check, ...] = (
     link_checks.streams,
     link_checks.losses,
     link_checks.delays,
-    link_checks.clocks,
+    clock_checks.age,
+    clock_checks.clocks,
     parameters,
     offboard_loss,
     configuration_checks.planner,

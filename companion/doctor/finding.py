@@ -34,6 +34,7 @@ class Key(StrEnum):
     RECONNECTS = "link.reconnects"
     ROUND_TRIP = "link.round_trip"
     JITTER = "link.jitter"
+    AGE = "link.age"
     PAUSES = "link.pauses"
     SIGNING = "link.signing"
     ENDPOINT = "link.endpoint"

@@ -16,6 +16,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.parameter_survey import survey
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate
+from companion.mavlink.telemetry_delay import DelayUnknown
 
 _WARNING = 4
 """MAV_SEVERITY: this and below is a warning or worse."""
@@ -119,4 +120,5 @@ def _quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQua
         round_trip=link.timesync.round_trip_s,
         jitter=link.timesync.jitter_s,
         notices=notices,
+        other_clock=link.clock.delay.unknown is DelayUnknown.OTHER_CLOCK,
     )

@@ -20,10 +20,6 @@ _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
 """What is sent when it changes, and otherwise only so often, Hz, whatever is asked (PX4)."""
 _MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
-_CLOCKS_APART = 0.02
-"""By this share the two clocks may differ in rate; crystals differ by less than 0.0002, while a
-simulation that does not keep up with real time differs by more."""
-_SAMPLES_NEEDED = 10
 
 
 def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -172,31 +168,6 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "setpoints pause with it",
             "find what holds the messages up: a router, Wi-Fi, a busy computer",
             "ATTITUDE_QUATERNION",
-        )
-
-
-def clocks(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the vehicle's time goes on as time does: the law counts by it."""
-    samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
-    if samples.not_newer:
-        yield Finding(
-            Key.CLOCK,
-            UNSAFE if samples.not_newer > _MANY_LOST * samples.heard else INEFFECTIVE,
-            f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
-            "before",
-            "they are not answered, and the flight is given up when that lasts",
-            "let one link alone bring attitude; start the autopilot anew if its clock stands still",
-            source,
-        )
-    elif samples.heard >= _SAMPLES_NEEDED and samples.clock_rate is not None:
-        apart = abs(samples.clock_rate - 1.0) > _CLOCKS_APART
-        yield Finding(
-            Key.CLOCK,
-            INEFFECTIVE if apart else SAFE,
-            f"the vehicle's clock runs at {samples.clock_rate:.3f} of ours",
-            "limits in time, such as the deadman's, are not what they say" if apart else "",
-            "run a simulation at the speed of real time, or in lockstep" if apart else "",
-            source,
         )
 
 

@@ -1,6 +1,7 @@
 """An ear on the link for a while: when samples come, who else speaks, how the estimate jumps."""
 
 from collections.abc import Callable
+from statistics import median
 from types import TracebackType
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -38,6 +39,8 @@ class Ear:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._stamps: list[tuple[float, float]] = []
+        self._ages: list[float] = []
+        self._timeline = link.clock.timeline
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
         self._steering: set[tuple[int, int]] = set()
@@ -77,6 +80,8 @@ class Ear:
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
+            age=median(self._ages) if self._ages and self._link.clock.age_known else None,
+            clock_change=self._clock_change,
         )
 
     @property
@@ -100,8 +105,17 @@ class Ear:
         ):
             self._companions.add(source)
 
+    @property
+    def _clock_change(self) -> str:
+        clock = self._link.clock
+        return clock.last_change if clock.timeline != self._timeline else ""
+
     def _on_attitude(self, message: Message) -> None:
-        self._stamps.append((self._clock(), message.time_boot_ms / 1000.0))
+        now, clock = self._clock(), self._link.clock
+        self._stamps.append((now, message.time_boot_ms / 1000.0))
+        age = clock.age(clock.vehicle_time(message.time_boot_ms), now)
+        if age is not None:
+            self._ages.append(age)
 
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate

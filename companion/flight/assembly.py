@@ -9,6 +9,7 @@ from pathlib import Path
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
+from companion.flight.asking_again import AskingAgain
 from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
@@ -19,12 +20,12 @@ from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.preflight import Preflight
 from companion.flight.preparation import SLOWEST_HEARTBEAT
-from companion.flight.programmes import programme, unbegun
+from companion.flight.programmes import unbegun
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
 from companion.flight.watch import Watch
-from companion.guidance import HoverThrust, ThrustSettings
+from companion.guidance import HoverThrust, Sequence, ThrustSettings
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
@@ -201,9 +202,17 @@ class Assembled:
 
 
 def assemble(
-    config: Config, link: Link, observer: Observer, ask_landing: AskLanding, folder: Path
+    config: Config,
+    link: Link,
+    observer: Observer,
+    ask_landing: AskLanding,
+    folder: Path,
+    maneuvers: Sequence,
 ) -> Assembled:
-    """Wire the rooms together over an open link; what is noted in flight waits in `folder`."""
+    """Wire the rooms together over an open link, to fly `maneuvers`.
+
+    What is noted in flight waits in `folder`.
+    """
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
     thrust = hover_thrust(config)
@@ -238,14 +247,15 @@ def assemble(
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
     same_vehicle = SameVehicle(link, SLOWEST_HEARTBEAT)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    flown = programme(config)
-    preflight = Preflight(config, link, same_vehicle, unbegun(flown))
-    rig = Rig(config, link, loop, guide, lookout, flown, ground, preflight, same_vehicle)
+    preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
+    rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
-    watch = Watch(rig, ladder, clock)
+    asking_again = AskingAgain(link, config.link)
+    watch = Watch(rig, ladder, asking_again, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = rig.note = preflight.note = link.clock.on_event = flight.note
+    ladder.note = rig.note = preflight.note = flight.note
+    link.clock.on_event = asking_again.note = flight.note
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:

@@ -1,5 +1,6 @@
 """The way of one sample: attitude in, body rates out, or a stated reason why not."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nan
@@ -17,6 +18,7 @@ from companion.attitude import (
 )
 from companion.attitude.rotation import within_limits
 from companion.flight.estimator_resets import EstimatorResets
+from companion.flight.held_rates import HeldRates
 from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
@@ -28,6 +30,9 @@ SendSetpoint = Callable[[int, BodyRates, float], bool]
 
 _LONGEST_STEP = 0.1
 """A planner never integrates over more than this, s."""
+
+_GAPS = 32
+"""So many of the latest gaps are kept; far fewer end a flight."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 
@@ -83,6 +88,9 @@ class ControlLoop:
         last_answer, last_sample: when a setpoint last left, and when a sample last came, s on our
             clock.
         samples, setpoints, missed_deadlines: counts since the loop was made.
+        held: for how long each setpoint stood until the next one, gaps left out.
+        gaps: when the latest gaps ended, s on our clock: nothing was answered for longer than
+            `Deadlines.telemetry_stale` while `guarded`.
         unanswered: how many samples were not answered, by reason.
         reason: why the newest sample was not answered, or None.
     """
@@ -107,6 +115,8 @@ class ControlLoop:
         self.is_same_vehicle: Callable[[], bool] = lambda: True
         self.last_answer = self.last_sample = -inf
         self.samples = self.setpoints = self.missed_deadlines = 0
+        self.held = HeldRates()
+        self.gaps: deque[float] = deque(maxlen=_GAPS)
         self.unanswered = dict.fromkeys(Unanswered, 0)
         self.reason: Unanswered | None = None
         self._planner = planner
@@ -226,6 +236,7 @@ class ControlLoop:
             return False
         if now - self._gap_from > self._deadlines.telemetry_stale and not self.held_back:
             self.held_back = True
+            self.gaps.append(now)
             self.ask_mode()
         return self.held_back
 
@@ -238,6 +249,9 @@ class ControlLoop:
     ) -> None:
         self.setpoints += 1
         self.thrust = thrust
+        interval = sample.received - self.last_answer
+        if interval <= self._deadlines.telemetry_stale:
+            self.held.add(interval)
         self.last_answer = self._gap_from = sample.received
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9

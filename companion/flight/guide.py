@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from math import degrees, dist, nan
+from math import degrees, dist, nan, sin
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -22,6 +22,7 @@ from companion.guidance import (
     Situation,
     VehicleMotion,
 )
+from companion.guidance.horizontal import limited
 from companion.guidance.linear import ReferenceAt
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
@@ -176,7 +177,7 @@ class Guide:
         reference_at = self._reference(situation.now)
         reference = reference_at(now)
         command = self._guidance.command(reference_at, now, situation)
-        target, down = self._predicted(now, command, situation)
+        target, down = self._height_first(*self._predicted(now, command, situation))
         self.estimate.vertical = GRAVITY - down if self._loop.guarded else GRAVITY
         self._loop.command = Command(
             target,
@@ -197,6 +198,16 @@ class Guide:
 
     def _heading(self) -> float:
         return heading(self._loop.resets.attitude(self._q))
+
+    def _height_first(self, target: Target, down: float) -> tuple[Target, float]:
+        """The command with no more tilt than leaves the thrust for its height.
+
+        Whoever made it: open-loop steps, predictive control and the lead do not ask what the
+        vehicle's thrust has turned out to be.
+        """
+        most = sin(self.learning.largest_tilt(down))
+        north, east = limited(target.north, target.east, most)
+        return target._replace(north=north, east=east), down
 
     def _predicted(
         self, now: float, linear: tuple[Target, float], situation: Situation
@@ -244,12 +255,12 @@ class Guide:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
         within = self._clock() - self.begun_at
-        if self._programme.at(within, self.pose).body_rates is None or tilt <= self._max_tilt:
+        most = min(self._max_tilt, self.learning.largest_tilt())
+        if self._programme.at(within, self.pose).body_rates is None or tilt <= most:
             return
-        self.given_up = (
-            f"{self._programme.name} was given up at {degrees(tilt):.0f}° of tilt, more than "
-            "limits.max_tilt_deg"
-        )
+        whose = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
+        name, lean = self._programme.name, f"{degrees(tilt):.0f}° of tilt"
+        self.given_up = f"{name} was given up at {lean}, more than {whose}"
         self.hold_here()
 
     def _note_tracking(

@@ -1,7 +1,8 @@
 """What the hover thrust is learned from: motion, whose thrust it was, and the voltage."""
 
 from companion.attitude import Quaternion
-from companion.guidance import HoverThrust
+from companion.guidance import GRAVITY, HoverThrust
+from companion.guidance.thrust import largest_tilt
 from companion.mavlink.state import VehicleState
 
 _CLEAR = 1.0
@@ -32,6 +33,15 @@ class HoverLearning:
     def thrust_limits(self) -> tuple[float, float]:
         """Smallest and largest specific thrust there is, as far as is known, m/s²."""
         return self._hover_thrust.smallest, self._hover_thrust.largest
+
+    @property
+    def hover(self) -> float:
+        """Normalised thrust at hover, as far as is known."""
+        return self._hover_thrust.learned
+
+    def largest_tilt(self, acceleration_down: float = 0.0) -> float:
+        """Largest tilt at which the thrust there is still gives a vertical acceleration, rad."""
+        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted)
 
     def stand(self) -> None:
         """The vehicle stands on the ground."""

@@ -1,6 +1,7 @@
 """What is done under our control and after it, one coroutine a phase."""
 
 import asyncio
+from math import degrees
 
 from companion.flight.ending import FlightEnded, internal
 from companion.flight.left_in_offboard import leave_offboard
@@ -12,6 +13,9 @@ from companion.mavlink.roles import Role
 _SELF_DISARM = 8.0
 """How long the autopilot may take to disarm itself after landing, s."""
 
+_LEAST_TILT = 5.0
+"""A vehicle whose thrust allows less, °, cannot be held against a breeze."""
+
 _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
@@ -19,6 +23,8 @@ async def programme(rig: Rig) -> None:
     """Fly the programme to its end, or until it is given up."""
     now = asyncio.get_running_loop().time
     began, sent = now(), rig.loop.setpoints
+    thrust = _ThrustForTilt(rig)
+    thrust.look()
     rig.guide.follow(rig.programme)
 
     def over() -> bool:
@@ -26,11 +32,41 @@ async def programme(rig: Rig) -> None:
         rig.rate_hz = (rig.loop.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         if rig.guide.given_up is not None:
             raise FlightEnded(rig.guide.given_up)
+        thrust.look()
         part, _ = rig.programme.part_at(elapsed)
         rig.detail = f"{part.name}, {elapsed:.0f} of {rig.programme.duration:.0f} s flown"
         return rig.guide.finished
 
     await rig.until(over)
+
+
+class _ThrustForTilt:
+    """Tells when the vehicle's thrust allows less tilt than the configuration does."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._told = False
+
+    def look(self) -> None:
+        """Tell it once; end the flight where there is no thrust to tilt with at all.
+
+        Raises:
+            FlightEnded: the hover takes all of the thrust.
+        """
+        limits, learning = self._rig.config.limits, self._rig.guide.learning
+        tilt, hover = degrees(learning.largest_tilt()), learning.hover
+        if tilt < _LEAST_TILT:
+            raise FlightEnded(
+                f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
+                f"{limits.max_thrust:g} leaves nothing to steer with"
+            )
+        if tilt < limits.max_tilt_deg and not self._told:
+            self._told = True
+            self._rig.note(
+                f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
+                f"{limits.max_thrust:g} holds the height up to {tilt:.0f}° of tilt: no more is "
+                f"asked for, although limits.max_tilt_deg is {limits.max_tilt_deg:g}"
+            )
 
 
 async def hand_back(rig: Rig) -> None:

@@ -11,6 +11,7 @@ from companion.flight.assembly import Assembled, assemble, open_link, realtime_w
 from companion.flight.chronicle import Chronicle
 from companion.flight.flight import AskLanding
 from companion.flight.observer import Observer
+from companion.flight.programmes import programme
 from companion.mavlink.link import Link
 from companion.mavlink.samples import AttitudeSample
 from companion.recording.summary import Summary
@@ -67,12 +68,15 @@ class Session:
         """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
 
         Raises:
+            ConfigError: what is to be flown cannot be; nothing was sent.
             LinkError: the link could not be opened; nothing was sent.
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: what `realtime` requires is not granted; nothing was sent.
         """
         flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
+        # Judged before the link is opened: it takes up to a second, and the link must be read.
+        maneuvers = programme(self._config)
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 
@@ -85,7 +89,12 @@ class Session:
         ):
             async with open_link(self._config, tlog, self.note) as link:
                 self._assembled = assemble(
-                    self._config, link, self._observer, self._ask_landing, self._folder
+                    self._config,
+                    link,
+                    self._observer,
+                    self._ask_landing,
+                    self._folder,
+                    maneuvers,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)

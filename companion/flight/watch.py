@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable
 from math import inf
 
+from companion.flight.asking_again import AskingAgain
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.phases import Phase
 from companion.flight.rig import Rig
@@ -23,13 +24,21 @@ class Watch:
     Args:
         rig: the parts of the flight.
         ladder: judges what it sees while the autopilot obeys us.
+        asking_again: asks for telemetry that has become too rare.
         clock: our clock, s.
     """
 
-    def __init__(self, rig: Rig, ladder: SafetyLadder, clock: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        ladder: SafetyLadder,
+        asking_again: AskingAgain,
+        clock: Callable[[], float],
+    ) -> None:
         self._rig = rig
         self._ladder = ladder
         self._clock = clock
+        self._asking_again = asking_again
         self._status_at = -inf
         self._status_question: asyncio.Task[None] | None = None
         self._question: asyncio.Task[None] | None = None
@@ -94,7 +103,9 @@ class Watch:
 
     def _climb(self, now: float) -> None:
         """Let the ladder look, and do what it says."""
-        verdict = self._ladder.step(self._rig.lookout.snapshot(now))
+        snapshot = self._rig.lookout.snapshot(now)
+        self._asking_again.look(snapshot.health)
+        verdict = self._ladder.step(snapshot)
         if verdict is None:
             return
         if verdict.action is Action.HOLD:

@@ -82,6 +82,12 @@ class HoverThrust:
         return self._specific(self._settings.highest)
 
     @property
+    def largest_tilted(self) -> float:
+        """The same along the axis of a tilted vehicle: an autopilot may make up for tilt itself."""
+        settings = self._settings
+        return self._specific(1.0 if settings.tilt_compensated else settings.highest)
+
+    @property
     def smallest(self) -> float:
         """Smallest specific thrust that is given out, m/s²."""
         return self._specific(self._settings.lowest)

@@ -1,10 +1,13 @@
 """Thrust: from the wanted acceleration to specific thrust in m/s², height first."""
 
-from math import hypot, sqrt
+from math import acos, hypot, sqrt
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY, Vector
+
+FOR_TILT = 0.95
+"""Share of the largest thrust that may be spent on tilt; what is left climbs against a gust."""
 
 _MIN_COSINE = 0.5
 """Beyond 60° of tilt height is given up rather than thrust raised without end."""
@@ -34,12 +37,25 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
     return min(max(cosine, -1.0), 1.0)
 
 
+def largest_tilt(lift: float, largest: float) -> float:
+    """The largest tilt at which the thrust still gives the lift, rad; 0 where none is to spare.
+
+    Args:
+        lift: upward part of the specific thrust, m/s².
+        largest: specific thrust, m/s².
+    """
+    if lift >= FOR_TILT * largest:
+        return 0.0
+    return acos(max(lift, 0.0) / (FOR_TILT * largest))
+
+
 def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     """The acceleration nearest to `wanted` that thrust within its limits gives.
 
     What thrust cannot give is taken from the horizontal part, whose direction is kept: the target's
-    tilt shrinks and the height stays. Only with too little thrust asked for, as in a fast descent,
-    the vertical part gives way, for thrust cannot be less.
+    tilt shrinks and the height stays. The last of the thrust (`FOR_TILT`) is kept for the height.
+    Only with too little thrust asked for, as in a fast descent, the vertical part gives way, for
+    thrust cannot be less.
 
     Args:
         wanted: acceleration NED, m/s².
@@ -51,7 +67,8 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     """
     north, east, down = wanted
     lift = min(max(GRAVITY - down, 0.0), largest)
-    length, most = hypot(north, east), sqrt(largest * largest - lift * lift)
+    spare = (FOR_TILT * largest) ** 2 - lift * lift
+    length, most = hypot(north, east), sqrt(max(spare, 0.0))
     if length > most:
         north, east, length = north * most / length, east * most / length, most
     if lift * lift + length * length < smallest * smallest:

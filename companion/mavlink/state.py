@@ -52,6 +52,7 @@ class _Values:
     home: Home | None = None
     estimator: Estimator | None = None
     armings: int = 0
+    positions: int = 0
     prearm: Prearm | None = None
     gps_was_good: bool = False
     reset_counter: int | None = None
@@ -71,6 +72,7 @@ class VehicleState(_Values):
         gps: See `Gps`.
         home: See `Home`.
         estimator: See `Estimator`.
+        positions: How many positions were taken.
         heartbeat_is_newest: Whether HEARTBEAT told the mode last, and so tells of arming as newly.
         armings: How often it was seen to become armed.
         prearm: See `Prearm`.
@@ -267,6 +269,7 @@ class VehicleState(_Values):
         ):
             self._stats.outdated += 1
         else:
+            self.positions += 1
             self.position = LocalPosition(now, stamp, values[:3], values[3:])
 
     def _on_sys_status(self, message: Message) -> None:

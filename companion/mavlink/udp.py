@@ -99,7 +99,8 @@ class UdpTransport:
             opened.close()
             raise EndpointError(_why(self._endpoint, error)) from error
         self._connected = isinstance(self._endpoint, UdpOut)
-        self._peer = opened.getpeername() if self._connected else None
+        if self._connected:
+            self._peer = opened.getpeername()
         watch(self._loop, opened.fileno(), self._read)
         return opened
 
@@ -119,17 +120,24 @@ class UdpTransport:
     def _read_first(self) -> None:
         try:
             data, stamps, _, address = self._socket.recvmsg(_MAX_DATAGRAM, _STAMP_SPACE)
-            who = spelled(address)
-            if not self._named.admit(address):
-                self._receiver.stranger(who)
-            elif self._receiver.claim(data, _arrival_ns(stamps), who) or (
-                self._receiver.may_answer(who)
-            ):
+            if self._takes(data, _arrival_ns(stamps), address):
                 self._socket.connect(address)
                 self._peer = self._socket.getpeername()
                 self._connected = self._heard = True
         except OSError:
             return
+
+    def _takes(self, data: bytes, received_ns: int, address: Any) -> bool:
+        """Whether the sender of a datagram is the peer from now on."""
+        who = spelled(address)
+        if not self._named.admit(address):
+            self._receiver.stranger(who)
+            return False
+        if address == self._peer and not self._receiver.claim_lapsed():
+            taken = self._receiver.receive(data, received_ns)  # it was only silent
+        else:
+            taken = self._receiver.claim(data, received_ns, who)
+        return taken or self._receiver.may_answer(who)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(_PEER_SILENCE_S, self._check_peer)

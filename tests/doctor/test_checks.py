@@ -9,7 +9,7 @@ import pytest
 
 from companion.config import Config
 from companion.config_file import changed
-from companion.doctor import configuration_checks, link_checks, vehicle_checks
+from companion.doctor import clock_checks, configuration_checks, link_checks, vehicle_checks
 from companion.doctor.evidence import Company, Evidence, Identity, LinkQuality, SampleTimes
 from companion.doctor.examination import examine, forbidding, result
 from companion.doctor.finding import Key
@@ -113,11 +113,30 @@ def test_what_comes_late(quality, pause, expected):
 
 
 @pytest.mark.parametrize(
+    ("age", "other_clock", "expected"),
+    [
+        (0.012, False, {}),
+        (0.099, False, {}),
+        (0.4, False, {Key.AGE: UNSAFE}),
+        (None, False, {}),  # that nobody answers TIMESYNC is said where its round trip is
+        (None, True, {Key.AGE: INEFFECTIVE}),
+    ],
+)
+def test_how_old_attitude_is_when_it_arrives(age, other_clock, expected):
+    link = QUALITY._replace(other_clock=other_clock)
+    evidence = replace(GOOD, link=link, samples=GOOD.samples._replace(age=age))
+    assert found(clock_checks.age, evidence) == expected
+
+
+@pytest.mark.parametrize(
     ("samples", "expected"),
     [
         ({"clock_rate": 1.019}, {}),
         ({"clock_rate": 20.0}, {Key.CLOCK: INEFFECTIVE}),
-        ({"clock_rate": 0.97}, {Key.CLOCK: INEFFECTIVE}),
+        ({"clock_rate": 0.994}, {}),
+        ({"clock_rate": 0.97}, {Key.CLOCK: UNSAFE}),
+        ({"clock_rate": 0.97, "longest_pause": 0.1}, {Key.CLOCK: INEFFECTIVE}),
+        ({"clock_change": "the vehicle's clock jumped"}, {Key.CLOCK: UNSAFE}),
         ({"heard": 9, "clock_rate": 0.5}, {}),
         ({"not_newer": 40}, {Key.CLOCK: INEFFECTIVE}),
         ({"not_newer": 41}, {Key.CLOCK: UNSAFE}),
@@ -125,7 +144,7 @@ def test_what_comes_late(quality, pause, expected):
 )
 def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
     evidence = replace(GOOD, samples=GOOD.samples._replace(**samples))
-    assert found(link_checks.clocks, evidence) == expected
+    assert found(clock_checks.clocks, evidence) == expected
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.doctor.listening import Ear
+from companion.mavlink.vehicle_clock import VehicleClock
 from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
 
 COMPANION, GROUND_STATION = 18, 6
@@ -80,12 +81,13 @@ def test_pauses_and_stamps_of_the_samples():
         callbacks[name] = callback
         return lambda: None
 
-    link = SimpleNamespace(on_foreign=None, subscribe=subscribe)
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
     with Ear(link, lambda: next(times)) as ear:
         assert ear.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
-    heard, pause, not_newer, rate = ear.samples
+    heard, pause, not_newer, rate, age, change = ear.samples
+    assert (age, change) == (None, "")
     assert (heard, not_newer) == (11, 2)
     assert abs(pause - 0.3) < 1e-9
     assert abs(rate - 1.8 / 1.2) < 1e-9

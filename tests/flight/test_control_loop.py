@@ -243,6 +243,41 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
     assert all(reason.words for reason in Unanswered)
 
 
+@pytest.mark.parametrize(
+    ("intervals", "rate"),
+    [
+        (250 * [0.004], 250.0),
+        (12 * [1 / 12], 12.0),
+        (12 * [0.08, *20 * [0.0]], 25.0),  # a pause and then 21 at once
+        (50 * [0.015, 0.025], 50.0),  # ordinary unevenness is no lower rate
+    ],
+)
+def test_the_rate_of_answers_counts_bursts_as_what_they_are(intervals, rate):
+    bench = Bench()
+    bench.run(10)
+    before, stamp = bench.loop.held.copy(), bench.time - 7.0
+    for interval in intervals:
+        bench.time += interval
+        stamp += sum(intervals) / len(intervals)
+        bench.refresh()
+        bench.sample(vehicle_time=min(stamp, bench.time - 7.0))
+    assert bench.loop.held.rate_since(before) == pytest.approx(rate, rel=0.01)
+
+
+def test_gaps_are_counted_and_are_no_part_of_the_rate():
+    bench = Bench()
+    bench.loop.guarded = True
+    bench.run(50)
+    before = bench.loop.held.copy()
+    for _ in range(3):
+        bench.time += 0.2
+        bench.run(1)
+        bench.loop.resume()
+        bench.run(10)
+    assert len(bench.loop.gaps) == 3
+    assert bench.loop.held.rate_since(before) == pytest.approx(250.0)
+
+
 ASKED = BodyRates(0.3, -0.4, 0.5)
 
 

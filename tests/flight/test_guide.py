@@ -24,7 +24,7 @@ HERE = (3.0, 4.0, -5.0)
 class HoverSpy:
     """Counts what it is told."""
 
-    smallest, largest = 2.0, 18.0
+    smallest, largest, largest_tilted = 2.0, 18.0, 18.0
 
     def __init__(self):
         self.observed = self.paused = 0

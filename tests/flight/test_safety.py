@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
+from companion.flight.held_rates import HeldRates
 from companion.flight.safety import Action, Lookout, SafetyLadder, monitors
 from companion.flight.safety.monitor import Alarm, Monitor
 from companion.flight.safety.snapshot import (
@@ -119,6 +120,9 @@ BREACHES = [
     ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m off"),
     ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),
     ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
+    ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "could not be answered 3 times"),
+    ("answer rate", health(answer_rate=49.0), HAND_BACK, 1.0, "answered at 49 Hz, below link.min"),
+    ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
     ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
     ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the answers"),
@@ -147,10 +151,10 @@ class Climb:
 
 def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     """A look comes every 20 ms, and one that is late by less than 10 ms is none."""
-    state = SimpleNamespace(reset_counter=None)
+    state = SimpleNamespace(reset_counter=None, positions=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)
-    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0)
+    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0, held=HeldRates())
     lookout = Lookout(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
         lookout.listen(now)

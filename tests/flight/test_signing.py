@@ -1,9 +1,19 @@
 """Keys that fit and keys that do not, both ways, over the real socket; wrong system ids too."""
 
+import time
+from pathlib import Path
+
 import pytest
 
 from companion.demo import wire_like
-from companion.mavlink import Link, LinkSettings, LinkTimeout, Signing, lockstep
+from companion.mavlink import (
+    Link,
+    LinkSettings,
+    LinkTimeout,
+    Signing,
+    key_from_passphrase_file,
+    lockstep,
+)
 from companion.mavlink import loop as link_loop
 from tests.flight.fly import mock_vehicle, session_for
 
@@ -45,6 +55,29 @@ def test_keys_that_do_not_fit(theirs, ours, said, keys, tmp_path):
     else:
         assert truth["signing"]["accepted"] == 0
         assert truth["signing"]["unsigned" if ours is None else "refused"] > 0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_with_the_clock_months_back_the_vehicle_is_heard_and_obeys(autopilot, keys, tmp_path):
+    """It refuses stamps that are older than what it knows, so ours must follow its own."""
+    key, notices = key_from_passphrase_file(Path(keys["right"])), []
+
+    async def ask(port):
+        ours = Signing(key, clock=lambda: time.time() - 90 * 86400.0)
+        settings = LinkSettings(f"udpin://127.0.0.1:{port}", signing=ours)
+        async with Link(settings, notice=notices.append) as link:
+            await link.wait_connected(10.0)
+            await link.request_message("AUTOPILOT_VERSION")
+
+    with mock_vehicle(
+        tmp_path, in_lockstep=False, autopilot=autopilot, **signed(keys["right"])
+    ) as mock:
+        mock.state()
+        link_loop.run(ask(mock.port))
+        truth = mock.state()
+    assert truth["signing"]["accepted"] > 0
+    assert truth["signing"]["refused"] == 0
+    assert any("days behind the vehicle, which has our key" in notice for notice in notices)
 
 
 def test_another_system_id_is_not_heard(tmp_path):

@@ -20,7 +20,7 @@ SHIPPED = yaml.safe_load((CONFIGS / "mock-px4.yaml").read_text())
 FAST = {
     "planner": {"name": "auto"},
     "vehicle": yaml.safe_load((CONFIGS / "vehicle-px4.yaml").read_text())["vehicle"],
-    "limits": {"max_tilt_deg": 58, "max_tilt_rate_deg_s": 250},
+    "limits": {"max_tilt_deg": 54, "max_tilt_rate_deg_s": 250},
     "link": {"position_rate_hz": 30},
     "guidance": SHIPPED["guidance"],
     "thrust": SHIPPED["thrust"],

@@ -8,14 +8,14 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from tests.fuzz.frames import frame_of
 from tests.fuzz.judge import Judge
-from tests.fuzz.messages import EVERY, sends
+from tests.fuzz.messages import EVERY, KINDS, sends
 from tests.fuzz.vehicle import STEP, Vehicle
 from tests.fuzz.wires import Wire
 
 Event = dict[str, Any]
 _UPLINK_S = 0.004
 _EVENT = 410
-_KINDS = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
+_KINDS = {kind.msgname: kind for kind in KINDS.values()}
 
 
 class Channel:

@@ -18,6 +18,7 @@ from companion.config_file import load
 from companion.flight.assembly import assemble, link_settings, planner, rate_limits
 from companion.flight.observer import Silent
 from companion.flight.outer_loop import predictive_settings
+from companion.flight.programmes import programme
 from companion.mavlink.link import Link
 from companion.yaml_file import ConfigError
 from tests.fuzz import trajectories
@@ -80,9 +81,8 @@ async def _assembled(config: Config, folder: Path) -> None:
         return False
 
     link = Link(link_settings(config), None)
-    assembled = assemble(config, link, Silent(), ask, folder)
-    programme = assembled.rig.programme
-    assert 0.0 < programme.duration < inf
+    assembled = assemble(config, link, Silent(), ask, folder, programme(config))
+    assert 0.0 < assembled.rig.programme.duration < inf
     assembled.close()
 
 

@@ -2,7 +2,11 @@
 
 from typing import NamedTuple
 
+from companion.mavlink.codec import CRC_EXTRA
+
 BRAKE = 17
+TOLD_AT_ONCE = 436 in CRC_EXTRA
+"""Whether the program listens to CURRENT_MODE, by which PX4 tells a mode at once."""
 HOME_ALTITUDE = 500.0
 """Above mean sea level, m."""
 
@@ -21,6 +25,11 @@ class Family(NamedTuple):
     def is_ardupilot(self) -> bool:
         """Whether GUIDED is take-off and offboard at once."""
         return self.autopilot == 3
+
+    @property
+    def tells_mode(self) -> bool:
+        """Whether CURRENT_MODE of it counts."""
+        return TOLD_AT_ONCE and not self.is_ardupilot
 
     @property
     def ours(self) -> set[int]:

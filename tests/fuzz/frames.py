@@ -29,8 +29,9 @@ _UNIX_S = 1_767_225_600.0
 """The computer's date, 2026."""
 _STAMP = int((_UNIX_S - 1_420_070_400) * 1e5)
 _ENDPOINTS = {False: "udpin://127.0.0.1:0", True: "tcp://127.0.0.1:5760"}
-_EVENTS = {410: 160, 411: 106}
-"""CRC_EXTRA of EVENT and CURRENT_EVENT_SEQUENCE (MAVLink common), which pymavlink lacks."""
+_LACKED = {410: 160, 411: 106, 436: 193}
+"""CRC_EXTRA of EVENT, CURRENT_EVENT_SEQUENCE and CURRENT_MODE (MAVLink common), which pymavlink's
+dialect of ArduPilot lacks."""
 _HEARD = (
     *("HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "SYS_STATUS", "STATUSTEXT"),
     *("EXTENDED_SYS_STATE", "BATTERY_STATUS", "ATTITUDE_TARGET", "GLOBAL_POSITION_INT", "ODOMETRY"),
@@ -69,7 +70,7 @@ def _scan(chunks: list[bytes], pieces: list[bytes], case: Case) -> None:
 
 def _intact(frame: Frame) -> None:
     """See that pymavlink takes the frame, and reads the same from it."""
-    if frame.message_id in _EVENTS:
+    if frame.message_id in _LACKED:
         assert frame.raw == frame_of(
             frame.message_id,
             frame.payload,
@@ -138,7 +139,10 @@ _payloads = st.one_of(
     st.binary(min_size=250, max_size=255),
 )
 _ids = st.one_of(
-    st.sampled_from([_NUMBERS[name] for name in _HEARD if name in _NUMBERS] + [410, 411]),
+    st.sampled_from(
+        [_NUMBERS[name] for name in _HEARD if name in _NUMBERS]
+        + [number for number in _LACKED if number in CRC_EXTRA]
+    ),
     st.sampled_from(sorted(dialect.mavlink_map)),
 )
 _sources = st.one_of(
@@ -161,7 +165,7 @@ def frame_of(
 ) -> bytes:
     """A frame by the MAVLink serialization guide, checked and signed by pymavlink's own means."""
     if extra is None:
-        extra = _EVENTS.get(number)
+        extra = _LACKED.get(number)
         extra = dialect.mavlink_map[number].crc_extra if extra is None else extra
     payload = payload[:255]
     if version == 1:

@@ -3,9 +3,8 @@
 from math import hypot, inf, isfinite, radians
 from typing import Any
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import development as dialect
 
-from tests.fuzz.family import Family
 from tests.fuzz.vehicle import Vehicle
 
 _ASKS = {dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAV_CMD_SET_MESSAGE_INTERVAL}
@@ -35,6 +34,7 @@ class Judge:
         self._thrusts = limits["min_thrust"], limits["max_thrust"]
         self._stale = config["deadman"]["telemetry_stale_ms"] * 1e-3
         self._taken_by: str | None = None
+        self._armed = False
         self._sample: tuple[int, float, float, float] | None = None
         self._answered = False
         self._answered_stamps: set[int] = set()
@@ -57,6 +57,8 @@ class Judge:
             self._answered = False
         elif message.get_type() == "HEARTBEAT":
             self._heartbeat(message)
+        elif message.get_type() == "CURRENT_MODE" and self._vehicle.family.tells_mode:
+            self._mode(message.custom_mode)
 
     def clock_set(self) -> None:
         """The vehicle's stamps begin anew."""
@@ -67,12 +69,15 @@ class Judge:
         self._sample = None
 
     def _heartbeat(self, message: Any) -> None:
-        family: Family = self._vehicle.family
-        if message.autopilot != family.autopilot or not message.base_mode & 128:
-            return
-        flying = dialect.MAV_CMD_NAV_TAKEOFF in self.commands
-        if flying and message.custom_mode not in family.ours:
-            self._taken_by = self._taken_by or f"mode {message.custom_mode}"
+        if message.autopilot == self._vehicle.family.autopilot:
+            self._armed = bool(message.base_mode & 128)
+            self._mode(message.custom_mode)
+
+    def _mode(self, mode: int) -> None:
+        """A mode is told: one that is not ours, of an armed vehicle, is somebody's."""
+        flying = self._armed and dialect.MAV_CMD_NAV_TAKEOFF in self.commands
+        if flying and mode not in self._vehicle.family.ours:
+            self._taken_by = self._taken_by or f"mode {mode}"
 
     # --- from the companion
 

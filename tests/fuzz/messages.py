@@ -4,12 +4,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from pymavlink.dialects.v20 import development
 
 from tests.fuzz.family import ARDUPILOT, HOME_ALTITUDE, PX4, Family
 
 if TYPE_CHECKING:
     from tests.fuzz.vehicle import Vehicle
 
+KINDS = {**development.mavlink_map, **dialect.mavlink_map}
+"""Message classes by number."""
 _ON_GROUND, _IN_AIR, _TAKING_OFF = 1, 2, 3
 _LATITUDE, _LONGITUDE, _ALTITUDE = 473_977_420, 85_455_940, int(HOME_ALTITUDE * 1e3)
 
@@ -59,6 +62,7 @@ BUILDERS: dict[str, Callable[["Vehicle"], Any]] = {
         _us(v), 1, 12, *v.position, v.q, *v.velocity, 0, 0, 0, [0.0] * 21, [0.0] * 21
     ),
     "HEARTBEAT": _heartbeat,
+    "CURRENT_MODE": lambda v: development.MAVLink_current_mode_message(0, v.mode, v.mode),
     "SYS_STATUS": lambda _: dialect.MAVLink_sys_status_message(
         *(0x1FFFFFFF,) * 3, 100, 16000, 500, 90, *(0,) * 6
     ),
@@ -87,6 +91,7 @@ EVERY = {
     "ATTITUDE_TARGET": 4,
     "ODOMETRY": 4,
     "HEARTBEAT": 20,
+    "CURRENT_MODE": 2,
     "SYS_STATUS": 20,
     "BATTERY_STATUS": 40,
     "ESTIMATOR_STATUS": 8,
@@ -96,7 +101,12 @@ EVERY = {
     "GLOBAL_POSITION_INT": 20,
 }
 """Every how many steps of the vehicle each is sent."""
-_ONLY = {"ODOMETRY": PX4, "ESTIMATOR_STATUS": PX4, "EKF_STATUS_REPORT": ARDUPILOT}
+_ONLY = {
+    "CURRENT_MODE": PX4,
+    "ODOMETRY": PX4,
+    "ESTIMATOR_STATUS": PX4,
+    "EKF_STATUS_REPORT": ARDUPILOT,
+}
 
 
 def sends(family: Family, name: str) -> bool:

@@ -3,10 +3,9 @@
 from typing import Any
 
 from hypothesis import strategies as st
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from tests.fuzz.family import ARDUPILOT, PX4
-from tests.fuzz.messages import EVERY
+from tests.fuzz.messages import EVERY, KINDS
 
 _PHASES = ("connect", "checks", "stream", "arm", "takeoff", "offboard", "programme", "hand back")
 _PHASES += ("land", "disarm")
@@ -26,7 +25,7 @@ _OTHERS = (
 """Messages that the small vehicle does not send by itself."""
 _FIELDS = {
     kind.msgname: tuple(kind.fieldnames)
-    for kind in dialect.mavlink_map.values()
+    for kind in KINDS.values()
     if kind.msgname in EVERY or kind.msgname in _OTHERS
 }
 _seconds = st.one_of(st.floats(0.02, 3.0), st.sampled_from((0.03, 0.1, 0.3, 0.6, 1.2, 6.0)))

@@ -9,7 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from tests.fuzz.family import BRAKE, HOME_ALTITUDE, PX4, Family
-from tests.fuzz.messages import BUILDERS
+from tests.fuzz.messages import BUILDERS, KINDS
 
 G = 9.80665
 HOVER = 0.5
@@ -189,7 +189,7 @@ class Vehicle:
 
     def tell(self, number: int) -> Any:
         """The newest of a message that it is asked for."""
-        known = dialect.mavlink_map.get(number)
+        known = KINDS.get(number)
         if number == dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
             return dialect.MAVLink_autopilot_version_message(
                 0xFFFF, 0x01100000, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 7

@@ -2,17 +2,19 @@
 
 import asyncio
 from contextlib import asynccontextmanager, suppress
+from math import inf
 from socket import AF_INET6, SOCK_DGRAM, socket
 
 import pytest
 
 from companion.attitude import BodyRates
 from companion.mavlink import EndpointError, Link, LinkSettings, LinkTimeout
-from companion.mavlink import peer as peer_module
 from companion.mavlink import tcp as tcp_module
 from companion.mavlink import udp as udp_module
 from companion.mavlink.endpoint import PeerAddress
 from companion.mavlink.named_peers import resolve
+from companion.mavlink.peer import PeerRule
+from companion.mavlink.stats import LinkStats
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)
@@ -65,6 +67,23 @@ def test_a_peer_elsewhere_is_counted_and_one_that_comes_back_is_not(run, quick):
     run(scene())
 
 
+def test_a_peer_that_was_silent_goes_on_without_a_new_claim(run, quick):
+    async def scene():
+        async with linked() as (link, vehicle):
+            samples = []
+            link.on_attitude = lambda sample: samples.append(sample.time_boot_ms)
+            await until(lambda: not link._outbox.transport._connected)  # silent for too long
+            stranger = await FakeVehicle(link.local_address).open_udp()
+            stranger.send(attitude(1))
+            vehicle.send(attitude(4))
+            await until(lambda: samples)
+            assert samples == [4]
+            assert (link.stats.peers, link.stats.unclaimed) == (0, 1)
+            stranger.close()
+
+    run(scene())
+
+
 def test_only_a_heartbeat_of_the_autopilot_makes_a_peer(run):
     async def scene():
         async with Link(UDP) as link:
@@ -88,26 +107,48 @@ def test_only_a_heartbeat_of_the_autopilot_makes_a_peer(run):
     run(scene())
 
 
-def test_a_peer_without_heartbeats_loses_its_place_on_the_ground_and_not_in_control(
-    run, quick, monkeypatch
-):
-    monkeypatch.setattr(peer_module, "CLAIM_LASTS_S", 0.1)
+def test_a_claim_lapses_on_the_ground_and_not_in_control():
+    at = {"now": 100.0, "setpoint": -inf}
+    rule = PeerRule(
+        LinkStats(),
+        list,
+        lambda: at["now"],
+        lambda: at["setpoint"],
+        every_frame_claims=False,
+    )
+    rule.fix("vehicle")
+    for now, setpoint, lapsed in (
+        (104.9, -inf, False),
+        (105.1, -inf, True),
+        (105.1, 105.0, False),  # setpoints are sent
+        (106.9, 105.0, False),
+        (107.1, 105.0, True),
+    ):
+        at.update(now=now, setpoint=setpoint)
+        assert rule.lapsed() is lapsed
+    rule.renew()
+    assert not rule.lapsed()
 
-    async def scene(controlling):
+
+def test_a_peer_whose_claim_lapsed_gives_way_although_it_still_sends(run):
+    async def scene():
         async with linked() as (link, first):
             second = await FakeVehicle(link.local_address).open_udp()
-            end = asyncio.get_running_loop().time() + 0.5
-            while asyncio.get_running_loop().time() < end:
+            transport = link._outbox.transport
+            for lapsed in (False, True):
+                link._inbox.claim_lapsed = lambda lapsed=lapsed: lapsed
+                frames = link.stats.frames
                 first.send(attitude(4))
-                second.send(heartbeat(0x00060000))
-                if controlling:
-                    link.send_setpoint(4, LEVEL, 0.5)
-                await asyncio.sleep(0.005)
+                await until(lambda frames=frames: link.stats.frames > frames)
+                transport._check_peer()  # what the timer calls
+                assert transport._connected is not lapsed
+            first.send(attitude(8))
+            second.send(heartbeat(0x00060000))
+            await until(lambda: link.state.mode == "OFFBOARD")
+            assert (link.stats.peers, link.stats.unclaimed) == (1, 1)
             second.close()
-            return link.state.mode, link.stats.peers
 
-    assert run(scene(controlling=True)) == ("AUTO.LOITER", 0)
-    assert run(scene(controlling=False)) == ("OFFBOARD", 1)
+    run(scene())
 
 
 def test_damaged_frames_do_not_hold_the_place(run, quick):

@@ -110,6 +110,12 @@ def test_a_vehicle_that_answers_is_the_better_clock():
     assert ours.judge(frame(NOW - 10 * DAY, old_answer)) is Verdict.AHEAD
     not_an_answer = dialect.MAVLink_timesync_message(0, asked.ts1)
     assert ours.judge(frame(NOW, not_an_answer)) is Verdict.AHEAD
+    our_answer = build_frame(
+        TIMESYNC, bytes([9] * 16), b"\x22", sequence=0, system=1, component=191
+    )
+    ours.sign(our_answer)
+    repeats_it = dialect.MAVLink_timesync_message(1, int.from_bytes(bytes([9] * 8), "little"))
+    assert ours.judge(frame(NOW, repeats_it)) is Verdict.AHEAD
     assert ours.judge(frame(NOW + 1, asked)) is Verdict.GOOD
     assert ours.judge(frame(NOW + 2)) is Verdict.GOOD
     assert "90 days behind the vehicle, which has our key and answers us" in ours.remarks[-1]
@@ -259,6 +265,8 @@ def test_a_disk_that_cannot_be_written_is_one_notice_and_no_failure(state, run):
         assert sum("cannot be kept in" in notice for notice in notices) == 1
 
     run(scene())
+    _, ours = run_once(NOW, frame(NOW))  # written twice at least, told once
+    assert sum("cannot be kept in" in remark for remark in ours.remarks) == 1
 
 
 def test_the_directory_may_be_named_only_absolutely(monkeypatch, tmp_path):

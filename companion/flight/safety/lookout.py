@@ -7,6 +7,7 @@ from typing import NamedTuple
 from companion.attitude.representation import wrap_angle
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
+from companion.flight.held_rates import HeldRates
 from companion.flight.safety.snapshot import (
     Autopilot,
     Control,
@@ -28,6 +29,8 @@ _LATE = 0.03
 """Between two looks, s; the timer's period is 0.02 s."""
 _PLACE_LASTS = 1.0
 """The vehicle hovers where control begins: where it was so long ago, s, is the same place."""
+_GAPS_WITHIN = 5.0
+"""Within this time, s, gaps in the answers are counted together."""
 _WHILE = 30.0
 """Within so long, s, resets of the estimator are counted together."""
 
@@ -41,6 +44,8 @@ class _Counted(NamedTuple):
     setpoints: int
     missed: int
     late: float
+    held: HeldRates
+    positions: int
 
 
 class Lookout:
@@ -88,7 +93,16 @@ class Lookout:
         counted = self._counted
         late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0
         counted.append(
-            _Counted(now, stats.frames, stats.lost, loop.setpoints, loop.missed_deadlines, late)
+            _Counted(
+                now,
+                stats.frames,
+                stats.lost,
+                loop.setpoints,
+                loop.missed_deadlines,
+                late,
+                loop.held.copy(),
+                self._link.state.positions,
+            )
         )
         while len(counted) > 2 and now - counted[1].now >= _WINDOW:
             counted.popleft()
@@ -119,7 +133,7 @@ class Lookout:
                 None if clock.timeline == self._timeline else clock.last_change,
                 self.stood_still(since=loop.last_answer),
             ),
-            self._health(),
+            self._health(now),
             self._resets(now),
             state.gps_was_good,
             self._good_flags,
@@ -148,11 +162,13 @@ class Lookout:
             self._origin,
         )
 
-    def _health(self) -> Health:
+    def _health(self, now: float) -> Health:
+        since = max(self._began_at, now - _GAPS_WITHIN)
+        gaps = sum(at > since for at in self._loop.gaps)
         first, last = self._counted[0], self._counted[-1]
         span = last.now - first.now
         if span < _EARLY * _WINDOW:
-            return Health(round_trip=self._link.timesync.round_trip_s)
+            return Health(round_trip=self._link.timesync.round_trip_s, gaps=gaps)
         late = sum(counted.late for counted in self._counted) - first.late
         lost = last.lost - first.lost
         return Health(
@@ -162,6 +178,9 @@ class Lookout:
             if self._real_time
             else None,
             late / span,
+            last.held.rate_since(first.held),
+            gaps,
+            (last.positions - first.positions) / span,
         )
 
     def _resets(self, now: float) -> Resets:

@@ -1,6 +1,6 @@
 """What the flight lives on: the battery, the link, and this computer's time."""
 
-from companion.flight.safety.monitor import Judge, released
+from companion.flight.safety.monitor import RELEASE, Judge, released
 from companion.flight.safety.snapshot import Snapshot
 from companion.mavlink.records import outdated
 
@@ -68,5 +68,44 @@ def starvation(most: float) -> Judge:
         if starved is None or starved <= released(most, raised):
             return None
         return f"this computer has no time for us: {100 * starved:.0f} % of it are lost"
+
+    return judge
+
+
+def gaps(most: int) -> Judge:
+    """Answers paused more often than `most` times within a few seconds, each for too long."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        found = snapshot.health.gaps
+        if found <= most:
+            return None
+        return (
+            f"samples could not be answered {found} times within 5 s for longer than "
+            "deadman.telemetry_stale_ms"
+        )
+
+    return judge
+
+
+def answer_rate(least: float) -> Judge:
+    """Fewer than `least` samples a second are answered, or as unevenly, Hz."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        rate = snapshot.health.answer_rate
+        if rate is None or rate >= least * (1.0 / RELEASE if raised else 1.0):
+            return None
+        return f"attitude is answered at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
+
+    return judge
+
+
+def position_rate(least: float) -> Judge:
+    """Fewer than `least` positions a second come, Hz."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        rate = snapshot.health.position_rate
+        if rate is None or rate >= least * (1.0 / RELEASE if raised else 1.0):
+            return None
+        return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {least:g}"
 
     return judge

@@ -80,12 +80,18 @@ class Health(NamedTuple):
         round_trip: of TIMESYNC, s.
         missed: share of answers that came after their deadline.
         starved: share of the time by which our own timer was late.
+        answer_rate: setpoints a second, Hz, bursts counted as what they are (`HeldRates`).
+        gaps: how many gaps in the answers there were within the last few seconds.
+        position_rate: positions a second, Hz.
     """
 
     lost: float | None = None
     round_trip: float | None = None
     missed: float | None = None
     starved: float | None = None
+    answer_rate: float | None = None
+    gaps: int = 0
+    position_rate: float | None = None
 
 
 class Resets(NamedTuple):

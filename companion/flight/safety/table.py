@@ -12,6 +12,8 @@ from companion.guidance.fence import Fence
 _MS = 1e-3
 _READ = 0.2
 """After a pause of ours what came meanwhile is read within so long, s; until then it looks old."""
+_GAPS = 2
+"""In the answers, within 5 s: a link may stumble, but not all the time."""
 _LET_GO, _HAND_BACK, _HOLD, _LAND = Action.LET_GO, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
@@ -79,7 +81,15 @@ def _means(config: Config) -> tuple[Monitor, ...]:
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
     trip = resources.round_trip(safety.max_round_trip_ms * _MS)
+    answers = resources.answer_rate(config.link.min_attitude_rate_hz)
+    positions = resources.position_rate(config.link.min_position_rate_hz)
     return (
+        # A rate that is held turns the vehicle on: at limits.max_tilt_rate_deg_s by a few degrees
+        # between answers that are too rare, which the next one corrects; but in a gap of 0.4 s by
+        # as much as it may tilt. So rare answers may last for a second, and gaps not at all.
+        Monitor("answer gaps", resources.gaps(_GAPS), _HAND_BACK),
+        Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
+        Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
         Monitor("link loss", resources.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # Longer than the second that is looked at: one stall of the computer is no breach.

@@ -1,0 +1,75 @@
+"""Telemetry that becomes rare in flight is asked for again, once; if it stays rare: hand back."""
+
+from math import acos, degrees
+
+import pytest
+from pymavlink import mavutil
+
+from companion.flight.observer import Silent
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import station
+
+ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 31, 32
+SET_MESSAGE_INTERVAL = 511
+CIRCLE = {
+    "flight": {"programme": ["hover", "circle"]},
+    "hover": {"duration_s": 1.0},
+    "circle": {"radius_m": 6.0, "speed_m_s": 4.0, "laps": 1},
+    "limits": {"fence_radius_m": 30.0},
+}
+HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
+
+
+class Lowers(Silent):
+    """A ground station that sets a message's rate once a second, the first time on the circle."""
+
+    def __init__(self, mock, message, hz, times):
+        self.mock, self.message, self.hz, self.left, self.tilt = mock, message, hz, times, 0.0
+
+    def waiting(self, name, detail, elapsed, timeout):
+        if name == "programme" and elapsed > 2.5 and self.left:
+            self.left -= 1
+            station(self.mock, SET_MESSAGE_INTERVAL, self.message, 1e6 / self.hz)
+
+
+def asked_again(summary):
+    return [text for _, text in summary.events if "comes too rarely" in text]
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("hz", [5.0, 12.0])
+def test_attitude_lowered_once_is_asked_for_again_and_flown_on(tmp_path, autopilot, hz):
+    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
+        summary = fly(mock, tmp_path / "log", Lowers(mock, ATTITUDE_QUATERNION, hz, 1), **CIRCLE)
+    assert summary.result == "ok", summary.events
+    (told,) = asked_again(summary)
+    assert told == "ATTITUDE_QUATERNION comes too rarely: asking for 250 Hz again"
+    assert summary.tracking()["position_max_m"] < 1.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("message", "hz", "words"),
+    [
+        (ATTITUDE_QUATERNION, 5.0, "could not be answered 3 times"),
+        (ATTITUDE_QUATERNION, 12.0, "below link.min_attitude_rate_hz"),
+        (LOCAL_POSITION_NED, 2.0, "below link.min_position_rate_hz"),
+    ],
+)
+def test_what_stays_rare_is_handed_back(tmp_path, autopilot, message, hz, words):
+    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
+        summary = fly(mock, tmp_path / "log", Lowers(mock, message, hz, 20), **CIRCLE)
+        state = mock.until(lambda state: state["mode"] == HELD[autopilot])
+        assert not state["crashed"]
+    assert words in summary.result, summary.events
+    assert len(asked_again(summary)) == 1
+    assert steepest(summary) < 45.0  # 35° are allowed; 53° it was where nobody watched
+
+
+def steepest(summary):
+    """Largest tilt that was flown, degrees; from the recording."""
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"), dialect="ardupilotmega")
+    cosines = []
+    while (m := log.recv_match(type="ATTITUDE_QUATERNION")) is not None:
+        cosines.append(1.0 - 2.0 * (m.q2**2 + m.q3**2))
+    return degrees(acos(min(cosines)))
