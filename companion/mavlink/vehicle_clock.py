@@ -170,7 +170,8 @@ class VehicleClock:
         if attitude_fits:  # then it is TIMESYNC's clock that has changed
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
-            back = time < self._newest
+            # Its answer may be a little older than the sample that came before it.
+            back = time < self._newest - _REBOOTED
             self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
     def look(self, now: float) -> None:
