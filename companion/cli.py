@@ -3,14 +3,19 @@
 It imports next to nothing before Ctrl-C is seen to: the rest takes the better part of a second.
 """
 
+from __future__ import annotations
+
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
-from types import FrameType
-from typing import NoReturn
 
 from companion.commands.exit_codes import EXIT_FLIGHT
+
+TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms here
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from types import FrameType
+    from typing import NoReturn
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

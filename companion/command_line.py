@@ -3,9 +3,9 @@
 import argparse
 import asyncio
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from math import inf
+from math import nan
 from pathlib import Path
 from typing import TypeAlias, get_args
 
@@ -139,7 +139,7 @@ def _add_doctor(commands: Commands) -> None:
     command.add_argument("--endpoint", help="instead of link.endpoint")
     command.add_argument(
         "--wait",
-        type=_seconds,
+        type=_number(0.01, 3600.0),
         default=10.0,
         metavar="SECONDS",
         help="for the vehicle to be ready, at most (10)",
@@ -205,11 +205,17 @@ def _add_benches(commands: Commands) -> None:
     link = benches.add_parser(
         "link", help="sample in → setpoint out: ours, echo, pymavlink, MAVSDK"
     )
-    link.add_argument("--seconds", type=float, default=20.0, help="for each program (20)")
-    link.add_argument("--rate", type=float, default=250.0, help="samples a second (250)")
+    link.add_argument(
+        "--seconds", type=_number(0.1, 3600.0), default=20.0, help="for each program (20)"
+    )
+    link.add_argument(
+        "--rate", type=_number(1.0, 2000.0), default=250.0, help="samples a second (250)"
+    )
     link.set_defaults(run=tools.bench_link)
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
-    step.add_argument("--seconds", type=_seconds, default=5.0, help="of measuring (5)")
+    step.add_argument(
+        "--seconds", type=_number(0.001, 3600.0), default=5.0, help="of measuring (5)"
+    )
     step.set_defaults(run=tools.bench_planner)
     for each in (link, step):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
@@ -261,8 +267,16 @@ def _programmes(text: str) -> tuple[str, ...]:
     return names
 
 
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 < seconds < inf:
-        raise argparse.ArgumentTypeError("must be above 0 and finite")
-    return seconds
+def _number(least: float, most: float) -> Callable[[str], float]:
+    """A number of the command line within bounds, NaN not among them."""
+
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = nan
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
+        return value
+
+    return number

@@ -123,27 +123,44 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     """Run the mock vehicle on a wire while the block runs; its own words go to `log`.
 
     It has a session of its own, so that Ctrl-C reaches us alone and the vehicle can still be
-    handed back to its autopilot.
+    handed back to its autopilot. Its standard input is a pipe that ends with us, however we end
+    (kill -9 too), and it ends with that.
 
     Raises:
         VehicleStoppedError: it stopped by itself, at once or meanwhile; with its last words.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
+    command += ["--end-with-stdin"]
     # No ground station's link: its port is a fixed one, and may be somebody else's.
     command += [*wire.vehicle, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
     with log.open("wb") as words:
-        process = subprocess.Popen(command, stdout=words, stderr=words, start_new_session=True)
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=words, stderr=words, start_new_session=True
+        )
         try:
             _await_ready(process, log)
             yield
         finally:
-            _check_running(process, log)
-            process.terminate()
-            try:
-                process.wait(timeout=5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            _end(process, log)
+
+
+def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
+    """End the vehicle.
+
+    Raises:
+        VehicleStoppedError: it had ended before.
+    """
+    try:
+        _check_running(process, log)
+        process.terminate()
+        try:
+            process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    finally:
+        if process.stdin is not None:
+            process.stdin.close()
 
 
 def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:

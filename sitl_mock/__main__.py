@@ -2,8 +2,10 @@
 
 import argparse
 import multiprocessing
+import os
 import signal
 import sys
+import threading
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
@@ -32,6 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
         return EXIT_USAGE
     for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have us begin with SIGINT ignored
         signal.signal(number, _interrupt)
+    if options.end_with_stdin:
+        threading.Thread(target=_end_with_stdin, name="stdin", daemon=True).start()
     for server in servers:
         sys.stdout.write(f"ready on {server.where}\n")
     sys.stdout.flush()
@@ -62,6 +66,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--lockstep", action="store_true", help="wait for an answer to each step")
     parser.add_argument("--count", type=int, default=1, help="how many vehicles (1..100)")
     parser.add_argument("--headless", action="store_true", help="no live line on the terminal")
+    parser.add_argument(
+        "--end-with-stdin", action="store_true", help="end when standard input does"
+    )
     parser.add_argument("--check", action="store_true", help="check the configuration and exit")
     return parser
 
@@ -108,6 +115,13 @@ def _run_one(server: Server) -> None:
         server.run()
     except KeyboardInterrupt:
         sys.exit(EXIT_OK)
+
+
+def _end_with_stdin() -> None:
+    """Wait for the end of standard input, which is a pipe from whoever started us, and end."""
+    while os.read(0, 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:

@@ -71,8 +71,8 @@ class MockSettings(Section):
     """0 = no ground station link."""
     control_port: Port = 0
     """JSON control channel on 127.0.0.1; 0 = none."""
-    seed: int = 1
-    speed: Positive = 1.0
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Vehicle seconds per wall second, when not in lockstep."""
     inner_loop_hz: Literal[250, 800] = 250
     """Sets which telemetry rates PX4 achieves; ArduPilot has SCHED_LOOP_RATE for it."""

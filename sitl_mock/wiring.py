@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-_TCP = re.compile(r"tcpin://([^:/]*):(\d+)/?")
+_TCP = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
 _HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 
@@ -44,9 +44,18 @@ def parse_wiring(text: str) -> Wiring:
         if not path or path.startswith("/"):
             return SerialLine(Path(path) if path else None)
     found = _TCP.fullmatch(text)
-    if found is not None and 1 <= int(found[2]) <= 65535:
+    if found is not None and _is_host(found[1]) and 1 <= int(found[2]) <= 65535:
         return TcpIn(found[1] or "127.0.0.1", int(found[2]))
     raise ValueError(f"this is no endpoint: {_HELP}")
+
+
+def _is_host(text: str) -> bool:
+    """Whether the resolver takes this name: no label empty or longer than 63 characters."""
+    try:
+        text.encode("idna")
+    except UnicodeError:
+        return False
+    return text.isprintable() and len(text) <= 253
 
 
 def for_vehicle(text: str, index: int) -> str:

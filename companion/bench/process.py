@@ -1,5 +1,7 @@
 """A program under measurement, as a process of its own."""
 
+import ctypes
+import signal
 import socket
 import subprocess
 import sys
@@ -7,6 +9,9 @@ import tempfile
 from pathlib import Path
 
 from companion.mavlink.errors import LinkError
+
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None)
 
 
 class ContestantError(LinkError):
@@ -18,6 +23,14 @@ def free_port() -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", 0))
         return int(opened.getsockname()[1])
+
+
+def _end_with_parent() -> None:
+    """Have the kernel kill this process when its parent dies (Linux, like the rest of the bench).
+
+    The programs answer until they are killed, and a benchmark that is killed cannot do it.
+    """
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 class Contestant:
@@ -37,6 +50,7 @@ class Contestant:
             [sys.executable, "-m", module, str(self.port)],
             stdout=subprocess.DEVNULL,
             stderr=self._words,
+            preexec_fn=_end_with_parent,  # noqa: PLW1509  the benchmark has one thread
         )
 
     def check_running(self) -> None:

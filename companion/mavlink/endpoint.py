@@ -9,9 +9,9 @@ _HELP = (
     "write udpin://0.0.0.0:14540, udpout://HOST:PORT, tcp://HOST:PORT, tcpin://0.0.0.0:PORT "
     "or serial:///dev/ttyACM0:921600"
 )
-_PEER = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d+))?")
-_NETWORK = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d+)")
-_SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d+)")
+_PEER = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
+_NETWORK = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
+_SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,8 @@ def parse_endpoint(text: str) -> Endpoint:
     host, port = found[1].strip("[]") or ("0.0.0.0" if listens else ""), int(found[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
+    if not is_host(host):
+        raise EndpointError(f"endpoint {text!r}: {host!r} is no host name or address")
     if not (0 if listens else 1) <= port <= 65535:
         raise EndpointError(f"endpoint {text!r}: port {port} is outside 1..65535")
     if not question:
@@ -121,13 +123,27 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
     for name in names.split(","):
         found = _PEER.fullmatch(name.strip())
         port = int(found[2]) if found and found[2] else None
-        if key != "peer" or found is None or not (port is None or 1 <= port <= 65535):
+        if (
+            key != "peer"
+            or found is None
+            or not is_host(found[1].strip("[]"))
+            or not (port is None or 1 <= port <= 65535)
+        ):
             raise EndpointError(
                 f"endpoint {text!r}: {query!r} is not understood; write ?peer=ADDRESS or "
                 "?peer=ADDRESS:PORT, several with commas between"
             )
         peers.append(PeerAddress(found[1].strip("[]"), port))
     return tuple(peers)
+
+
+def is_host(text: str) -> bool:
+    """Whether a host may have this name: labels of 1 to 63 characters, 253 in all, no blanks."""
+    try:
+        text.encode("idna")  # as the resolver does, which raises where nobody expects it
+    except UnicodeError:
+        return False
+    return 1 <= len(text) <= 253 and text.isprintable() and not any(map(str.isspace, text))
 
 
 def _serial(text: str, rest: str) -> SerialPort:

@@ -87,7 +87,8 @@ class Outbox:
     def _send(self, frame: bytes, *, record: bool = True) -> bool:
         if self._signing is not None:
             frame = self._signing.sign(frame)
-        self._sequence = (self._sequence + 1) & 0xFF
+        if record:  # how often a step is closed again hangs on the wall clock: it counts nothing
+            self._sequence = (self._sequence + 1) & 0xFF
         if self.transport is None or not self.transport.send(frame):
             self._stats.not_sent += 1
             return False

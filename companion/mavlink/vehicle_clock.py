@@ -170,7 +170,8 @@ class VehicleClock:
         if attitude_fits:  # then it is TIMESYNC's clock that has changed
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
-            back = time < self._newest
+            # Its answer may be a little older than the sample that came before it.
+            back = time < self._newest - _REBOOTED
             self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
     def look(self, now: float) -> None:
@@ -253,7 +254,7 @@ class VehicleClock:
         before = self._received + self._quickest - self._shift
         self._shift -= by
         self.delay.retract(self._received - self.delay.seconds - _TOGETHER)
-        if self._received - self._began < _SETTLES_FOR:
+        if self._received - self._began < _SETTLES_FOR and by > -_REBOOTED:
             return
         self.timeline += 1
         wrapped = by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP

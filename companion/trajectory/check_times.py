@@ -6,6 +6,7 @@ looked at whole. Two looks are so near in phase and in way that an extreme betwe
 less than 0.3 % of it; `tests/trajectory/test_check_times.py` holds them against a finer grid.
 """
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 
 import numpy as np
@@ -65,7 +66,7 @@ def _told_apart(piece: Piece, looks: Looks, law: TimeLaw) -> Iterator[Piece]:
 
 def _count(looks: Looks, begin: float, end: float) -> float:
     if looks.step is None:
-        return len(looks.phases)
+        return bisect_right(looks.phases, end) - bisect_left(looks.phases, begin)
     return (end - begin) / looks.step + _LOOKS_A_PIECE
 
 

@@ -26,7 +26,7 @@ _AT_REST = 0.1
 _LOOKS = 16
 """At each piece of the spline: it is smooth over two of them, a period of the cutoff."""
 
-_MOST_PIECES = 6000
+_MOST_PIECES = 4500
 """Pieces of the spline, two for each period of the cutoff; it is fitted within a second."""
 
 _LARGEST_RAMP = 0.5

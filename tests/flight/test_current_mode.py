@@ -64,7 +64,7 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
     )
 
     async def run():
-        watch = Watch(rig, None, lambda: now)
+        watch = Watch(rig, None, None, lambda: now)
 
         async def comes(at):
             nonlocal now
@@ -115,7 +115,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     )
 
     async def run():
-        watch = Watch(rig, None, lambda: 0.0)
+        watch = Watch(rig, None, None, lambda: 0.0)
         watch.ask_mode()
         await asyncio.sleep(0)
         watch.on_heartbeat(PHASE)  # the one that waited to be read

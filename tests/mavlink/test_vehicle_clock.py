@@ -134,6 +134,15 @@ def test_timesync_tells_that_the_clock_stopped_while_no_samples_came():
     assert link.ages[-1] < 0.05
 
 
+def test_an_answer_a_little_older_than_the_newest_sample_is_no_restart():
+    """Recorded from ArduPilot: 1 ms. A simulator that stalled for 0.16 s passed for a new boot."""
+    link = Link().run(30.0)
+    link.now, link.other = link.now + 0.16, -0.006
+    link.run(4.0)
+    assert stood_still(link) == pytest.approx(0.16, abs=0.02)
+    assert link.clock.restarts == 0
+
+
 @pytest.mark.parametrize("by", [0.2, 3600.0, 4e6])
 def test_one_sample_stamped_far_ahead_is_dropped_counted_and_named(by):
     link = Link().run(10.0)

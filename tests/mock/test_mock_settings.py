@@ -13,7 +13,7 @@ MISTAKES = {
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
     "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
     "speed: fast": ("mock.speed", "number"),
-    "speed: -1": ("mock.speed", "greater than 0"),
+    "speed: -1": ("mock.speed", "greater than"),
     "faults: [{kind: drop, probabilty: 1}]": ("did you mean probability?",),
     "faults: [{kind: dropp}]": ("mock.faults.0", "'drop'"),
     "lockstep: 5": ("mock.lockstep",),

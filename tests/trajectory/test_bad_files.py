@@ -1,5 +1,6 @@
 """Files of trajectories that were attacked: one sentence, bounded work, no warning of NumPy."""
 
+import importlib
 import os
 import re
 import warnings
@@ -10,11 +11,16 @@ import pytest
 
 from companion import bounded_file
 from companion.bounded_file import FileRefusedError, read_text
-from companion.trajectory import Envelope, csv_file, slow_down, violations
+from companion.trajectory import Envelope, csv_file, curves, slow_down, violations
 from companion.trajectory.csv_file import table
+from companion.trajectory.curves import MOST_LOOKS
+from companion.trajectory.from_samples import SampleOptions, from_samples
 from companion.trajectory.sample import TrajectoryError
 from companion.trajectory_file import load
 from companion.yaml_file import ConfigError
+
+fitted = importlib.import_module("companion.trajectory.from_samples")
+"""The module; the package has a function of this name."""
 
 ENVELOPE = Envelope(1.0, 2.0, 1.0, 1.0, 20.0, 2.0, 1.0, 15.0, drag=0.5)
 
@@ -64,7 +70,7 @@ def yaml_of(tmp_path, text):
         (rows(step=1e-12), "line 3: 1e-12 s after the sample before; from 0.0001 to 10 s"),
         (rows(step=3600.0), "line 3: 3.6e+03 s after the sample before"),
         (rows(step=5.0, count=1000), "lasts 4995 s, and 3600 s is the longest"),
-        (rows(step=1.0, count=1000, scale=100.0), "600 s is the longest with cutoff_hz 5"),
+        (rows(step=1.0, count=1000, scale=100.0), "450 s is the longest with cutoff_hz 5"),
         (rows(count=5, step=2e-4), "lasts less than 0.1 s"),
         (rows(scale=1e300), "x is 8e+294, more than 10000 m"),
         (rows(scale=-1e5), "more than 10000 m from where it begins"),
@@ -215,3 +221,13 @@ def test_shapes_that_no_vehicle_flies_are_refused(tmp_path, text, words):
 )
 def test_the_edges_of_what_is_permitted_are_judged_without_a_warning(tmp_path, text):
     judged(yaml_of(tmp_path, text))
+
+
+def test_the_longest_table_that_may_be_fitted_can_be_judged(monkeypatch):
+    """What `cutoff_hz` allows takes no more looks than there may be, in motion at its ends, too."""
+    assert fitted._MOST_PIECES * fitted._LOOKS < 0.95 * MOST_LOOKS
+    monkeypatch.setattr(fitted, "_MOST_PIECES", 100)
+    monkeypatch.setattr(curves, "MOST_LOOKS", 100 * fitted._LOOKS + 3 * 256)
+    moving = [f"{0.01 * k},{0.02 * k},0,0" for k in range(1000)]
+    trajectory = from_samples(table(["t,x,y,z", *moving], "given"), SampleOptions())
+    assert len(trajectory.check_times()) >= 100 * fitted._LOOKS

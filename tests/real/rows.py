@@ -1,0 +1,250 @@
+"""What is flown on a real autopilot: the rows of docs/exits.md, and what only a real one shows.
+
+Each function flies once and returns its figures; times in s after the event, distances in m.
+"""
+
+import random
+import signal
+import time
+
+from pymavlink.dialects.v20 import common
+
+from tests.real.vehicle import Vehicle
+
+FROZEN_GUIDANCE = """
+from companion.flight.guide import Guide
+flown = Guide.step
+def freezing(guide):
+    if guide.begun_at is None or guide._clock() < guide.begun_at + 5.0:
+        flown(guide)
+Guide.step = freezing
+"""
+NEW_MODES = {"px4": ("LOITER", "LAND", "RTL"), "ardupilot": ("LOITER", "LAND", "ALT_HOLD")}
+WATCHED = 12.0
+"""After an event the vehicle is watched for this long, s."""
+
+
+def figures(vehicle: Vehicle, flight, event: float, seconds: float = WATCHED, **more):
+    """What came of an event."""
+    time.sleep(max(0.0, event + seconds - time.monotonic()))
+    station = vehicle.station
+    out = {
+        "result": flight.result.get("result"),
+        "exit": flight.process.poll(),
+        "last_setpoint": flight.last_setpoint(event),
+        "modes": station.modes_since(event),
+        **station.motion_since(event, event + seconds),
+        **more,
+        "load": vehicle.load(),
+    }
+    vehicle.bring_down()
+    out["left_in"] = station.mode
+    return out
+
+
+def good_end(vehicle):
+    flight = vehicle.fly(hover={"duration_s": 8.0})
+    flight.until_obeyed()
+    event = time.monotonic() + 8.0
+    flight.finish()
+    return figures(vehicle, flight, event, 30.0)
+
+
+def interrupted(vehicle, number):
+    flight = vehicle.hovering()
+    event = flight.send(number)
+    flight.finish()
+    return figures(vehicle, flight, event)
+
+
+def second_ctrl_c(vehicle):
+    """The uplink is cut, else it holds before the second one comes."""
+    flight = vehicle.hovering()
+    vehicle.relay.plug(up=False, down=True)
+    event = flight.send(signal.SIGINT)
+    time.sleep(1.3)
+    flight.send(signal.SIGINT)
+    flight.finish()
+    vehicle.relay.plug(up=True, down=True)
+    return figures(vehicle, flight, event)
+
+
+def killed(vehicle):
+    flight = vehicle.hovering()
+    event = flight.send(signal.SIGKILL)
+    flight.process.wait()
+    return figures(vehicle, flight, event)
+
+
+def stopped(vehicle, seconds=3.0):
+    flight = vehicle.hovering()
+    event = flight.send(signal.SIGSTOP)
+    time.sleep(seconds)
+    flight.send(signal.SIGCONT)
+    flight.finish()
+    return figures(vehicle, flight, event)
+
+
+def frozen_guidance(vehicle):
+    flight = vehicle.fly(prelude=FROZEN_GUIDANCE)
+    flight.until_obeyed()
+    flight.finish()
+    last = vehicle.relay.setpoints[-1]
+    return figures(vehicle, flight, last - 0.5)
+
+
+def unplugged(vehicle):
+    flight = vehicle.hovering()
+    vehicle.relay.plug(up=False, down=False)
+    event = time.monotonic()
+    flight.finish()
+    return figures(vehicle, flight, event)
+
+
+def battery(vehicle):
+    """PX4's simulated battery drains to half in a minute, ArduPilot's by 5 % in a short flight."""
+    if vehicle.autopilot == "px4":
+        vehicle.parameter("SIM_BAT_DRAIN", 60.0)
+    else:
+        vehicle.station.command(42651, 1, 100)
+    least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
+    flight = vehicle.fly(limits={"min_battery_percent": least})
+    flight.until_obeyed()
+    station = vehicle.station
+    event = station.until(lambda: not station.obeys, 150.0, "end of our control")
+    flight.finish()
+    return figures(vehicle, flight, event, 25.0)
+
+
+def pilot(vehicle, after=None):
+    """A mode change by a second link, at a random moment."""
+    mode = random.choice(NEW_MODES[vehicle.autopilot])
+    flight = vehicle.hovering(random.uniform(2.0, 4.0) if after is None else after)
+    event = vehicle.station.set_mode(mode)
+    flight.finish()
+    return figures(vehicle, flight, event, 3.0, chosen=mode)
+
+
+def no_gps(vehicle):
+    if vehicle.autopilot == "px4":
+        off = lambda: vehicle.parameter("SIM_GPS_USED", 0)  # noqa: E731
+        on = lambda: vehicle.parameter("SIM_GPS_USED", 10)  # noqa: E731
+    else:
+        off = lambda: vehicle.parameter("SIM_GPS1_ENABLE", 0)  # noqa: E731
+        on = lambda: vehicle.parameter("SIM_GPS1_ENABLE", 1)  # noqa: E731
+    flight = vehicle.hovering()
+    event = time.monotonic()
+    off()
+    flight.finish()
+    try:
+        return figures(vehicle, flight, event, 25.0)
+    finally:
+        on()
+        time.sleep(5.0)
+
+
+def out_of_the_fence(vehicle):
+    """Blown out by a gust; a planned leaving is refused before take-off."""
+    names = {"px4": "SIH_WIND_N", "ardupilot": "SIM_WIND_SPD"}
+    flight = vehicle.hovering(limits={"fence_radius_m": 2.0})
+    vehicle.parameter(names[vehicle.autopilot], 18.0)
+    station = vehicle.station
+    event = station.until(lambda: not station.obeys, 60.0, "end of our control")
+    vehicle.parameter(names[vehicle.autopilot], 0.0)
+    flight.finish()
+    return figures(vehicle, flight, event, 25.0)
+
+
+def attitude_lowered(vehicle, rate_hz=5.0):
+    """Another program on our link asks for less attitude than we fly by."""
+    circle = {"radius_m": 5.0, "speed_m_s": 3.0, "laps": 4.0}
+    flight = vehicle.hovering(6.0, flight={"programme": ["circle"]}, circle=circle)
+    sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
+    lower = common.MAVLink_command_long_message(1, 1, 511, 0, 31, 1e6 / rate_hz, 0, 0, 0, 0, 0)
+    event = time.monotonic()
+    vehicle.relay.inject(lower.pack(sender))
+    flight.finish()
+    sent = sum(at > event for at in vehicle.relay.setpoints)
+    return figures(vehicle, flight, event, setpoints_after=sent)
+
+
+def left_by_failsafe(vehicle):
+    """Killed in flight; after the failsafe's landing the next flight begins by itself."""
+    flight = vehicle.hovering()
+    event = flight.send(signal.SIGKILL)
+    flight.process.wait()
+    station = vehicle.station
+    station.until(lambda: not station.armed, 90.0, "disarming by the failsafe")
+    time.sleep(2.0)
+    left = station.mode
+    return _next_flight(vehicle, station.modes_since(event), left)
+
+
+def left_by_ladder(vehicle):
+    """Landed by us straight from offboard: the battery's limit."""
+    if vehicle.autopilot == "ardupilot":
+        vehicle.station.command(42651, 1, 100)
+    least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
+    flight = vehicle.fly(limits={"min_battery_percent": least})
+    event = flight.until_obeyed()
+    flight.finish(240.0)
+    station = vehicle.station
+    station.until(lambda: not station.armed, 5.0, "disarming")
+    time.sleep(1.5)
+    left = station.mode
+    modes = station.modes_since(event)
+    if vehicle.autopilot == "ardupilot":
+        vehicle.station.command(42651, 1, 100)
+    return {"result": flight.result.get("result"), **_next_flight(vehicle, modes, left)}
+
+
+def _next_flight(vehicle, modes, left):
+    second = vehicle.fly(hover={"duration_s": 3.0}, limits={"min_battery_percent": 5.0})
+    began = second.until_obeyed()
+    took = round(began - second.began, 1)
+    second.finish()
+    said = [event["text"] for event in second.result["events"]]
+    return {
+        "modes": modes,
+        "left_in": left,
+        "second": second.result["result"],
+        "second_obeyed_after": took,
+        "asked_to_hold": [text for text in said if "cannot be armed again" in text],
+        "load": vehicle.load(),
+    }
+
+
+def hover_minutes(vehicle, minutes=10.0):
+    flight = vehicle.fly(hover={"duration_s": 60.0 * minutes})
+    event = flight.until_obeyed()
+    flight.finish(60.0 * minutes + 180.0)
+    result = flight.result
+    return {
+        "result": result.get("result"),
+        "events": [event["text"] for event in result.get("events", [])],
+        "counts": result.get("counts"),
+        "flown_s": round(time.monotonic() - event),
+        **vehicle.station.motion_since(event, event + 60.0 * minutes),
+        "load": vehicle.load(),
+    }
+
+
+ROWS = {
+    "good_end": good_end,
+    "ctrl_c": lambda vehicle: interrupted(vehicle, signal.SIGINT),
+    "sigterm": lambda vehicle: interrupted(vehicle, signal.SIGTERM),
+    "sighup": lambda vehicle: interrupted(vehicle, signal.SIGHUP),
+    "second_ctrl_c": second_ctrl_c,
+    "killed": killed,
+    "stopped": stopped,
+    "frozen_guidance": frozen_guidance,
+    "unplugged": unplugged,
+    "battery": battery,
+    "pilot": pilot,
+    "no_gps": no_gps,
+    "fence": out_of_the_fence,
+    "attitude_lowered": attitude_lowered,
+    "left_by_failsafe": left_by_failsafe,
+    "left_by_ladder": left_by_ladder,
+    "hover": hover_minutes,
+}

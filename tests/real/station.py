@@ -1,0 +1,226 @@
+"""A ground station on a second link, with a pilot's commands, and what it sees."""
+
+import threading
+import time
+from math import acos, cos, degrees, hypot, inf, radians
+from typing import NamedTuple
+
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import development as dialect
+
+_EARTH_M = 6371000.0
+
+
+class Seen(NamedTuple):
+    """Where the vehicle truly was: s of `time.monotonic`, m, degrees."""
+
+    time: float
+    north: float
+    east: float
+    up: float
+    tilt: float
+
+
+class Told(NamedTuple):
+    """What the autopilot told of itself."""
+
+    time: float
+    custom_mode: int
+    base_mode: int
+    status: int
+
+    @property
+    def armed(self) -> bool:
+        return bool(self.base_mode & 128)
+
+
+class Station:
+    """Listens in a thread of its own.
+
+    PX4: the ground station's UDP link, truth by HIL_STATE_QUATERNION. ArduPilot: a second TCP link,
+    place and tilt by SIMSTATE, height by GLOBAL_POSITION_INT.
+
+    Attributes:
+        told: each change of mode, arming or status.
+        seen: the true motion.
+        texts: what it said, with the time.
+    """
+
+    def __init__(self, autopilot: str) -> None:
+        self.autopilot = autopilot
+        self.told: list[Told] = []
+        self.seen: list[Seen] = []
+        self.texts: list[tuple[float, str]] = []
+        self.acks: list[tuple[float, int, int]] = []
+        self.landed = 0
+        self._up = 0.0
+        self._origin: tuple[float, float] | None = None
+        self._base = 0
+        self._status = 0
+        address = "udpin:127.0.0.1:14550" if autopilot == "px4" else "tcp:127.0.0.1:5762"
+        self._links = [mavutil.mavlink_connection(address, dialect="development")]
+        if autopilot == "px4":
+            truth = "udpin:127.0.0.1:19410"
+            self._links.append(mavutil.mavlink_connection(truth, dialect="development"))
+        self._running = True
+        self._threads = [
+            threading.Thread(target=self._listen, args=(link,), daemon=True) for link in self._links
+        ]
+        self._threads.append(threading.Thread(target=self._beat, daemon=True))
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        self._running = False
+        for thread in self._threads:
+            thread.join()
+        for link in self._links:
+            link.close()
+
+    def ask_for_rates(self) -> None:
+        wanted = {"px4": (436, 245), "ardupilot": (0, 245, 33, 164)}[self.autopilot]
+        for number in wanted:
+            self.command(511, number, 40_000)
+            time.sleep(0.05)
+
+    def command(self, command: int, *parameters: float) -> float:
+        """Send a command; returns when, s of `time.monotonic`."""
+        padded = [*parameters, *[0.0] * (7 - len(parameters))]
+        now = time.monotonic()
+        self._links[0].mav.command_long_send(1, 1, command, 0, *padded)
+        return now
+
+    def set_mode(self, name: str) -> float:
+        if self.autopilot == "px4":
+            return self.command(176, 1, *PX4_MODES[name])
+        return self.command(176, 1, ARDUPILOT_MODES[name])
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """ArduPilot's floats; PX4 has `px4-param`."""
+        self._links[0].mav.param_set_send(1, 1, name.encode(), value, 9)
+
+    @property
+    def mode(self) -> str:
+        return self.name(self.told[-1]) if self.told else "unknown"
+
+    @property
+    def armed(self) -> bool:
+        return bool(self.told) and self.told[-1].armed
+
+    def name(self, told: Told) -> str:
+        if self.autopilot == "px4":
+            key = (told.custom_mode >> 16 & 255, told.custom_mode >> 24 & 255)
+            return next((name for name, each in PX4_MODES.items() if each == key), str(key))
+        number = told.custom_mode
+        name = next((n for n, each in ARDUPILOT_MODES.items() if each == number), str(number))
+        by_rates = name == "GUIDED" and told.armed and not told.base_mode & 8
+        return "GUIDED by rates" if by_rates else name
+
+    @property
+    def obeys(self) -> bool:
+        return self.armed and self.mode in ("OFFBOARD", "GUIDED by rates")
+
+    def until(self, condition, seconds: float, what: str) -> float:
+        """Wait until `condition()`; returns when it was so."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < deadline, f"no {what} in {seconds} s; mode {self.mode}"
+            time.sleep(0.01)
+        return time.monotonic()
+
+    def modes_since(self, since: float) -> list[tuple[float, str]]:
+        """(s since then, mode or arming or status) of each change."""
+        first = [told for told in self.told if told.time <= since][-1:]
+        out, before = [], first[0] if first else None
+        for told in (each for each in self.told if each.time > since):
+            at = round(told.time - since, 3)
+            if before is None or self.name(told) != self.name(before):
+                out.append((at, self.name(told)))
+            if before is None or told.armed != before.armed:
+                out.append((at, "armed" if told.armed else "disarmed"))
+            if before is not None and told.status == 5 != before.status:
+                out.append((at, "failsafe"))
+            before = told
+        return out
+
+    def motion_since(self, since: float, until: float = inf) -> dict[str, float]:
+        """How far, how high and how tilted it was, from where it was at `since`."""
+        before = [seen for seen in self.seen if seen.time <= since]
+        rows = [seen for seen in self.seen if since <= seen.time <= until]
+        if not before or not rows:
+            return {}
+        start = before[-1]
+        away = [hypot(row.north - start.north, row.east - start.east) for row in rows]
+        return {
+            "farthest_m": round(max(away), 2),
+            "end_m": round(away[-1], 2),
+            "highest_above_m": round(max(row.up for row in rows) - start.up, 2),
+            "lowest_below_m": round(start.up - min(row.up for row in rows), 2),
+            "tilt_deg": round(max(row.tilt for row in rows), 1),
+        }
+
+    def _beat(self) -> None:
+        while self._running:
+            self._links[0].mav.heartbeat_send(6, 8, 0, 0, 4)
+            time.sleep(0.5)
+
+    def _listen(self, link) -> None:
+        while self._running:
+            message = link.recv_match(blocking=True, timeout=0.1)
+            if message is not None and message.get_srcSystem() == 1:
+                self._take(message, time.monotonic())
+
+    def _take(self, message, now: float) -> None:
+        kind = message.get_type()
+        if kind == "HEARTBEAT" and message.autopilot != 8:
+            self._base, self._status = message.base_mode, message.system_status
+            self._tell(Told(now, message.custom_mode, self._base, self._status))
+        elif kind == "CURRENT_MODE" and self.told and self.autopilot == "px4":
+            self._tell(Told(now, message.custom_mode, self._base, self._status))
+        elif kind == "STATUSTEXT":
+            self.texts.append((now, message.text.strip()))
+        elif kind == "COMMAND_ACK":
+            self.acks.append((now, message.command, message.result))
+        elif kind == "EXTENDED_SYS_STATE":
+            self.landed = message.landed_state
+        elif kind == "HIL_STATE_QUATERNION":
+            _, x, y, _ = message.attitude_quaternion
+            self._see(
+                now, message.lat, message.lon, message.alt / 1e3, _tilt(1 - 2 * (x * x + y * y))
+            )
+        elif kind == "GLOBAL_POSITION_INT":
+            self._up = message.relative_alt / 1e3
+        elif kind == "SIMSTATE":
+            level = cos(message.roll) * cos(message.pitch)
+            self._see(now, message.lat, message.lng, self._up, _tilt(level))
+
+    def _tell(self, told: Told) -> None:
+        if not self.told or self.told[-1][1:] != told[1:]:
+            self.told.append(told)
+
+    def _see(self, now: float, latitude: int, longitude: int, up: float, tilt: float) -> None:
+        place = latitude / 1e7, longitude / 1e7
+        if self._origin is None:
+            self._origin = place
+        north = radians(place[0] - self._origin[0]) * _EARTH_M
+        east = radians(place[1] - self._origin[1]) * _EARTH_M * cos(radians(place[0]))
+        self.seen.append(Seen(now, north, east, up, tilt))
+
+
+def _tilt(cosine: float) -> float:
+    return degrees(acos(max(-1.0, min(1.0, cosine))))
+
+
+PX4_MODES = {
+    "ALTCTL": (2, 0),
+    "POSCTL": (3, 0),
+    "TAKEOFF": (4, 2),
+    "LOITER": (4, 3),
+    "RTL": (4, 5),
+    "LAND": (4, 6),
+    "OFFBOARD": (6, 0),
+}
+ARDUPILOT_MODES = {
+    entry.name.removeprefix("COPTER_MODE_"): number
+    for number, entry in dialect.enums.get("COPTER_MODE", {}).items()
+} or {"STABILIZE": 0, "ALT_HOLD": 2, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
