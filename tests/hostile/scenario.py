@@ -8,7 +8,6 @@ import pytest
 from tests.hostile.flying import fly
 from tests.hostile.judge import judge
 from tests.hostile.personality import BOTH, Personality
-from tests.hostile.waiting import WAITING
 
 
 class Scenario(NamedTuple):
@@ -55,13 +54,11 @@ def in_turn(rows_of):
 
 
 def flights(rows):
-    """Parametrize a test by (scenario, kind); those that wait for a mend must fail till then."""
+    """Parametrize a test by (scenario, kind)."""
     params = []
     for row in rows:
         for kind in row.kinds:
             name = f"{kind.name}: {row.name}"
             marks = [pytest.mark.slow] if kind is row.slow_on else []
-            if name in WAITING:
-                marks.append(pytest.mark.xfail(strict=True, reason=WAITING[name]))
             params.append(pytest.param(row, kind, id=name, marks=marks))
     return pytest.mark.parametrize(("scenario", "kind"), params)
