@@ -20,9 +20,10 @@ DISTURBED = (
     "deadman.deadline_ms",
     "our own timer",
     "arrives later than deadman",
-    "samples a second",
+    "comes too rarely",
     "clock went back",
     "jumped ahead",
+    "could not be answered",
 )
 """What a flight says that was ended by a busy computer, which stalls the simulator, too."""
 
