@@ -160,12 +160,13 @@ class DeadmanConfig(Section):
     """When silence ends control. A setpoint leaves only in answer to fresh data."""
 
     telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
-    """Attitude older than this is not answered, and counts as silence."""
+    """Attitude older than this is not answered, and counts as silence. Where TIMESYNC is not
+    answered, older than the quickest sample by this."""
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
     """Guidance older than this is not answered."""
     position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
-    """Position older than this, by its arrival or by how far its time stamp lags the attitude's,
-    stops guidance, and so the setpoints."""
+    """Position older than this, by its arrival or by its time stamp on the vehicle's clock, stops
+    guidance, and so the setpoints."""
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
     """Control that stood still this long is not taken up again: hand back. Keep it below the
     autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""

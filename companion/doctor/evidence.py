@@ -84,6 +84,7 @@ class SampleTimes(NamedTuple):
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
         age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
         clock_change: How the vehicle's clock jumped or restarted meanwhile, in words, or empty.
+        unusable: No unit quaternion, or with a number that is not finite.
     """
 
     heard: int = 0
@@ -92,6 +93,7 @@ class SampleTimes(NamedTuple):
     clock_rate: float | None = None
     age: float | None = None
     clock_change: str = ""
+    unusable: int = 0
 
 
 class Company(NamedTuple):

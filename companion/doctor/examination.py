@@ -20,6 +20,7 @@ CHECKS: tuple[Check, ...] = (
     vehicle_checks.readiness,
     vehicle_checks.gps,
     vehicle_checks.ground,
+    vehicle_checks.attitude,
     vehicle_checks.estimator,
     vehicle_checks.fence,
     link_checks.company,

@@ -39,6 +39,7 @@ class Key(StrEnum):
     SIGNING = "link.signing"
     ENDPOINT = "link.endpoint"
     CLOCK = "link.clock"
+    ATTITUDE = "vehicle.attitude"
     OUR_IDS = "link.our_ids"
     SECOND_COMPANION = "link.second_companion"
     OTHER_SETPOINTS = "link.other_setpoints"

@@ -1,11 +1,13 @@
 """An ear on the link for a while: when samples come, who else speaks, how the estimate jumps."""
 
 from collections.abc import Callable
+from math import isfinite
 from statistics import median
 from types import TracebackType
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from companion.attitude.representation import is_unit
 from companion.doctor.evidence import Company, SampleTimes
 from companion.mavlink.codec import Message
 from companion.mavlink.framing import Frame
@@ -41,6 +43,7 @@ class Ear:
         self._stamps: list[tuple[float, float]] = []
         self._ages: list[float] = []
         self._timeline = link.clock.timeline
+        self._unusable = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
         self._steering: set[tuple[int, int]] = set()
@@ -72,13 +75,14 @@ class Ear:
         """The attitude samples so far."""
         pairs = list(zip(self._stamps, self._stamps[1:], strict=False))
         if not pairs:
-            return SampleTimes(len(self._stamps))
+            return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         known = len(self._stamps) >= _ENOUGH and last > first
         return SampleTimes(
             heard=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
             not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
+            unusable=self._unusable,
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
             age=median(self._ages) if self._ages and self._link.clock.age_known else None,
             clock_change=self._clock_change,
@@ -116,6 +120,9 @@ class Ear:
         age = clock.age(clock.vehicle_time(message.time_boot_ms), now)
         if age is not None:
             self._ages.append(age)
+        rates = message.rollspeed, message.pitchspeed, message.yawspeed
+        usable = is_unit((message.q1, message.q2, message.q3, message.q4))
+        self._unusable += not (usable and all(map(isfinite, rates)))
 
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate

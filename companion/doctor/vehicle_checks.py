@@ -14,6 +14,9 @@ from companion.mavlink.state import VehicleState
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
 NOT_READY = Verdict.NOT_READY
 
+_FEW_UNUSABLE = 0.01
+"""A larger share than this of the attitude samples is more than one damaged message."""
+
 GROUND_HEIGHT = 1.5
 """Height above home that may be read on the ground, m: the estimate drifts."""
 
@@ -159,6 +162,21 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "flight.takeoff_height_m and limits.fence_floor_m would be wrong",
             "have the autopilot set home here",
             source,
+        )
+
+
+def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the attitude that arrives can be answered."""
+    samples = evidence.samples
+    if samples.unusable:
+        yield Finding(
+            Key.ATTITUDE,
+            UNSAFE if samples.unusable > _FEW_UNUSABLE * samples.heard else INEFFECTIVE,
+            f"{samples.unusable} of {samples.heard} attitude samples are no unit quaternion of "
+            "finite numbers",
+            "they are not answered, and the flight is given up when that lasts",
+            "wait until the estimator has settled; if it goes on, do not fly",
+            "ATTITUDE_QUATERNION",
         )
 
 

@@ -15,6 +15,9 @@ _SETTLING = 1.0
 _REACHED = 0.5
 """Height below the wanted one at which a climb that has ended counts as done, m."""
 
+_PAST = 3.0
+"""Height above the wanted one at which a climb has gone wrong, m; PX4 overshoots by some tenths."""
+
 _ARRIVES = 2.0
 """So long a climb that has become a hold may still take to arrive, s; else somebody stopped it."""
 
@@ -33,7 +36,8 @@ async def takeoff(rig: Rig) -> None:
     rig.ground.command_takeoff()
     rig.loop.command = None  # an idle one, which nothing may send from here on
     rig.guide.step()
-    await order(rig, command, in_roles(rig.link, {Role.READY}), lambda: not state.landed)
+    # Asked again right before it is sent: PX4 that is told so disarmed takes off once a pilot arms.
+    await order(rig, command, lambda: _require_ground(rig), lambda: not state.landed)
     climb = _Climb(rig, height)
     await rig.until(climb.over)
 
@@ -67,6 +71,11 @@ class _Climb:
         if height is None or position is None:
             return False
         rig.detail = f"{self._height:g} m, now {height:.1f} m"
+        if height > self._height + _PAST:
+            raise FlightEnded(
+                f"the vehicle climbed to {height:.1f} m, and flight.takeoff_height_m is "
+                f"{self._height:g}"
+            )
         near = height > self._height - _REACHED
         if not near and self._stopped():
             raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.LET_GO)

@@ -10,7 +10,7 @@ FAMILIES: tuple[AutopilotFamily, ...] = (Px4(), ArduPilot())
 FAMILY_NAMES = " or ".join(f"{family.name} ({family.autopilot})" for family in FAMILIES)
 """For people, with their MAV_AUTOPILOT numbers."""
 
-_MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
+MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 """MAV_TYPE of four, two coaxial, six, eight, three, twelve and ten rotors."""
 
 
@@ -21,7 +21,7 @@ def family_for(autopilot: int, vehicle_type: int) -> AutopilotFamily:
         UnsupportedAutopilot: None of ours, or no multirotor: the same mode numbers mean something
             else to a plane.
     """
-    if vehicle_type not in _MULTIROTORS:
+    if vehicle_type not in MULTIROTORS:
         raise UnsupportedAutopilot(
             f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor, and only those are flown"
         )

@@ -6,7 +6,7 @@ from math import inf, isfinite
 
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.families import family_for
+from companion.mavlink.families import MULTIROTORS, family_for
 from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
@@ -212,7 +212,8 @@ class VehicleState(_Values):
     def _on_heartbeat(self, message: Message) -> None:
         if message.autopilot == _AUTOPILOT_INVALID:
             return  # some other part of the vehicle, under the autopilot's own id
-        if self.family is not None and self.family.autopilot != message.autopilot:
+        kind = message.autopilot, message.type in MULTIROTORS
+        if self.family is not None and kind != (self.family.autopilot, True):
             return  # an autopilot does not change its kind; this is some other part of the vehicle
         if self.family is None:
             try:

@@ -254,7 +254,7 @@ class VehicleClock:
         before = self._received + self._quickest - self._shift
         self._shift -= by
         self.delay.retract(self._received - self.delay.seconds - _TOGETHER)
-        if self._received - self._began < _SETTLES_FOR:
+        if self._received - self._began < _SETTLES_FOR and by > -_REBOOTED:
             return
         self.timeline += 1
         wrapped = by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP

@@ -121,7 +121,7 @@ def vehicle_of(process):
     for _ in range(6000):
         for child in psutil.Process(process.pid).children(recursive=True):
             with contextlib.suppress(psutil.Error):
-                if "--end-with-stdin" in child.cmdline():
+                if "--headless" in child.cmdline():
                     return child
         assert process.poll() is None
         time.sleep(0.01)

@@ -112,6 +112,13 @@ def test_what_comes_late(quality, pause, expected):
     assert found(link_checks.delays, evidence) == expected
 
 
+@pytest.mark.parametrize(("unusable", "expected"), [(0, {}), (2, INEFFECTIVE), (3, UNSAFE)])
+def test_attitude_that_cannot_be_answered(unusable, expected):
+    evidence = replace(GOOD, samples=GOOD.samples._replace(unusable=unusable))
+    found_here = found(vehicle_checks.attitude, evidence)
+    assert found_here == ({Key.ATTITUDE: expected} if expected else {})
+
+
 @pytest.mark.parametrize(
     ("age", "other_clock", "expected"),
     [

@@ -1,8 +1,10 @@
 """What the ear hears of others, of clocks and of jumps, over a real socket."""
 
 import asyncio
+from math import inf, nan
 from types import SimpleNamespace
 
+import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.doctor.listening import Ear
@@ -73,6 +75,29 @@ def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
     asyncio.run(scene())
 
 
+@pytest.mark.parametrize(
+    "values",
+    [
+        (nan, 0, 0, 0, 0, 0, 0),
+        (0, 0, 0, 0, 0, 0, 0),
+        (1, 0, 0, 0, inf, 0, 0),
+        (2, 0, 0, 0, 0, 0, 0),
+    ],
+)
+def test_samples_that_cannot_be_answered(values):
+    callbacks = {}
+
+    def subscribe(name, callback):
+        callbacks[name] = callback
+        return lambda: None
+
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with Ear(link, lambda: 0.0) as ear:
+        callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
+        callbacks["ATTITUDE_QUATERNION"](attitude(4))
+    assert (ear.samples.heard, ear.samples.unusable) == (2, 1)
+
+
 def test_pauses_and_stamps_of_the_samples():
     times = iter([0.0, 0.1, 0.2, 0.5, *(0.5 + 0.1 * n for n in range(1, 8))])
     callbacks = {}
@@ -86,8 +111,8 @@ def test_pauses_and_stamps_of_the_samples():
         assert ear.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
-    heard, pause, not_newer, rate, age, change = ear.samples
+    heard, pause, not_newer, rate, age, change, unusable = ear.samples
     assert (age, change) == (None, "")
-    assert (heard, not_newer) == (11, 2)
+    assert (heard, not_newer, unusable) == (11, 2, 0)
     assert abs(pause - 0.3) < 1e-9
     assert abs(rate - 1.8 / 1.2) < 1e-9

@@ -67,7 +67,7 @@ PARAMETERS = {
 OUR_OWN = {
     "px4": [
         ("deadman", {"silence_limit_ms": 1000.0}, "COM_OF_LOSS_T", UNSAFE),
-        ("thrust", {"hover_thrust": 0.8}, "MPC_THR_HOVER", INEFFECTIVE),
+        ("thrust", {"hover_thrust": 0.3}, "MPC_THR_HOVER", INEFFECTIVE),
         ("link", {"source_system": 245}, "MAV_SYS_ID", INEFFECTIVE),
         ("planner", {"name": "auto"}, "planner.name", INEFFECTIVE),
         ("flight", {"accept": ("COM_OF_LOST",)}, "flight.accept", INEFFECTIVE),

@@ -27,6 +27,14 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 
 MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 
+NO_NOISE = {
+    "attitude_noise_deg": 0.0,
+    "rate_noise_rad_s": 0.0,
+    "position_noise_m": 0.0,
+    "velocity_noise_m_s": 0.0,
+}
+"""With noise the motion in which a hover ends bends a step by 0.002 to 0.006, by its seed."""
+
 
 @pytest.fixture(
     scope="module",
@@ -38,7 +46,7 @@ MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 def flown(request, tmp_path_factory):
     """Its name, and the summary of steps north, east and along a diagonal."""
     folder = tmp_path_factory.mktemp("flight")
-    with mock_vehicle(folder, seed=3) as mock:
+    with mock_vehicle(folder, sensors=NO_NOISE) as mock:
         changes = {
             "planner": {"name": request.param},
             "flight": {"programme": ["steps"]},

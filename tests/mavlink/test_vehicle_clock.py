@@ -1,14 +1,17 @@
 """The vehicle's clock: drift is followed, jumps, stops and restarts are told, strays dropped."""
 
+import csv
 import itertools
 import math
 import random
 import re
+from pathlib import Path
 
 import pytest
 
 from companion.mavlink.vehicle_clock import Misfit, VehicleClock
 
+RECORDINGS = Path(__file__).parent / "recordings"
 STALE = 0.1
 """deadman.telemetry_stale_ms."""
 
@@ -236,6 +239,25 @@ def test_timesyncs_clock_may_become_another_one_in_flight():
         link.run(10.0)
         assert (link.clock.age_known, link.clock.timeline) == (False, 0)
     assert max(link.ages) < STALE
+
+
+@pytest.mark.parametrize("timesync", [True, False])
+def test_a_real_px4_with_a_slow_clock_is_not_late(timesync):
+    """Recorded: each fourth sample of a flight that was given up after 16 s, and all exchanges."""
+    clock, ages, told = VehicleClock(), [], []
+    clock.on_event = told.append
+    with (RECORDINGS / "px4-slow-clock.csv").open() as file:
+        for row in csv.DictReader(file):
+            received, vehicle_ms = float(row["received_s"]), float(row["vehicle_ms"])
+            if not row["timesync_sent_s"]:
+                ages.append(clock.take(int(vehicle_ms), received).age)
+                clock.look(received)
+            elif timesync:
+                clock.exchange(float(row["timesync_sent_s"]), received, round(1e6 * vehicle_ms))
+    assert len(ages) > 900
+    assert max(ages) < 0.01
+    assert clock.rate.rate == pytest.approx(-0.006, abs=0.001)
+    assert (clock.age_known, clock.timeline, len(told)) == (timesync, 0, not timesync)
 
 
 def test_simulators_that_send_in_bursts_and_slip_are_not_late():

@@ -1,0 +1,118 @@
+"""COMMAND_ACK lies, or does not come; what a vehicle does with a take-off."""
+
+from tests.hostile import actions
+from tests.hostile import personality as kinds
+from tests.hostile.actions import acks, sets, tells
+from tests.hostile.endings import failed, never_took_off, never_took_over, ok, on_the_ground
+from tests.hostile.personality import PX4
+from tests.hostile.scenario import Scenario, flights, in_turn
+
+DONE = ("does it and never answers", "answers twice", "does it and answers somebody else")
+NOT_DONE = (
+    "accepts it and does nothing",
+    "refuses it",
+    "never hears it",
+    "is in progress for ever",
+)
+COMMANDS = {
+    # command: (from when, its number, what holds where it is not done)
+    "arming": ("start", kinds.ARM, (never_took_off, on_the_ground)),
+    "a take-off": ("start", kinds.TAKEOFF, (never_took_over, on_the_ground)),
+    "the landing": ("holding", None, (failed,)),
+}
+
+
+def answered(kind):
+    """Each command of a flight, with each way of answering it."""
+    for what, (mark, number, demands) in COMMANDS.items():
+        landing = kinds.SET_MODE if kind.enters_by_setpoint else kinds.LAND
+        command = number or landing
+        for how in NOT_DONE:
+            yield row(f"the vehicle, asked for {what}, {how}", mark, command, how, demands, kind)
+        for how in DONE:
+            yield row(f"the vehicle, asked for {what}, {how}", mark, command, how, (ok,), kind)
+        how = "refuses it and does it"
+        yield row(f"the vehicle, asked for {what}, {how}", mark, command, how, (), kind)
+
+
+def row(name, mark, command, how, demands, kind):
+    return Scenario(name, ((mark, 0.0, acks(command, how)),), demands, (kind,))
+
+
+OFFBOARD = tuple(
+    row(f"PX4, asked for OFFBOARD, {how}", "armed", kinds.SET_MODE, how, demands, PX4)
+    for how, demands in (
+        *((how, (never_took_over,)) for how in NOT_DONE),
+        *((how, (ok,)) for how in DONE),
+        ("refuses it and does it", (on_the_ground,)),
+    )
+)
+
+
+def asked_to_hold(kind):
+    for how in (*NOT_DONE, *DONE, "refuses it and does it"):
+        name = f"the vehicle, asked to hold, {how}"
+        yield row(name, "in control", kinds.SET_MODE, how, (), kind)
+
+
+def mode_told_late(autopilot):
+    """HEARTBEAT tells the mode of a second ago."""
+    before = {
+        name: value
+        for name, value in autopilot.telemetry.heartbeat().items()
+        if name in ("base_mode", "custom_mode")
+    }
+    tells("HEARTBEAT", before, seconds=1.5)(autopilot)
+
+
+TAKE_OFFS = (
+    Scenario(
+        "the vehicle climbs past the height by 6 m",
+        (("start", 0.0, sets(climbs_to=8.0)),),
+        (never_took_over, on_the_ground),
+    ),
+    Scenario(
+        "the vehicle climbs on and on",
+        (("start", 0.0, sets(climbs_to=100.0)),),
+        (never_took_over,),
+    ),
+    Scenario(
+        "the vehicle takes off by itself before we arm",
+        (("reading", 0.8, actions.takes_off_by_itself),),
+        (failed,),
+    ),
+    Scenario("the vehicle is armed already", (("start", 0.0, actions.arms),), (never_took_off,)),
+    Scenario(
+        "the vehicle disarms as soon as it is armed",
+        (("armed", 0.04, actions.disarms),),
+        (never_took_off,),
+    ),
+    Scenario(
+        "the vehicle disarms in the climb",
+        (("in air", 0.3, actions.disarms),),
+        (never_took_over,),
+        rules={"may_fall": True},
+    ),
+    Scenario(
+        "OFFBOARD is told 1.5 s late",
+        (("SET_MODE RATES", 0.0, mode_told_late),),
+        (),
+        (PX4,),
+    ),
+    Scenario("PX4 was left in OFFBOARD", (), (ok,), (PX4,), mode="RATES"),
+)
+
+
+@flights(in_turn(answered))
+def test_a_command_is_not_answered_as_it_is_done(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)
+
+
+@flights((*OFFBOARD, *in_turn(asked_to_hold)))
+def test_a_mode_is_not_answered_as_it_is_entered(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)
+
+
+@flights(TAKE_OFFS)
+def test_the_vehicle_does_something_else(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)

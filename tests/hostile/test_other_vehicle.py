@@ -1,0 +1,105 @@
+"""The vehicle that was checked goes, and one with the same ids comes; strangers speak."""
+
+import time
+
+from pymavlink.dialects.v20 import common
+
+from tests.hostile import personality as kinds
+from tests.hostile.actions import arms, boots_again, switches
+from tests.hostile.endings import never_took_over, ok, says, stops_within
+from tests.hostile.flying import fly
+from tests.hostile.judge import commands, judge
+from tests.hostile.personality import ARDUPILOT, PX4
+from tests.hostile.scenario import Scenario, flights
+
+PILOT_ARMS = {"flight": {"arm": False, "arming_timeout_s": 10.0}}
+LATER = (("checked", 7.0, arms), ("checked", 7.6, switches("READY")))
+MODES = {PX4.name: "PILOT", ARDUPILOT.name: "STABILIZE"}
+ANEW = r"restart|anew|another|booted|rebooted|different"
+RESTARTED = {"clock_restarts": True, "ages_hidden": True}
+
+
+def checked_again(flown):
+    """No take-off without parameters and rates read anew from the vehicle that takes off."""
+    came = flown.autopilot.acted[0]
+    took_off = [sent.t for sent in commands(flown, kinds.TAKEOFF)]
+    if not took_off:
+        return
+    asked = [sent.name for sent in flown.autopilot.sent if came < sent.t < took_off[0]]
+    assert asked.count("PARAM_REQUEST_READ") >= 10, "B was flown by the checks of A"
+
+
+def on_the_ground(kind):
+    arrivals = {
+        "A falls silent for 4.5 s, B comes up with a boot time near 0": boots_again(),
+        "A falls silent for 2.5 s, B comes up with a boot time near 0": boots_again(2.5),
+        "A falls silent for 4.5 s, B comes from another port": boots_again(port=True),
+        "A falls silent for 4.5 s, B has another uid": boots_again(uid=8),
+        "boot time starts anew without a silence": boots_again(0.0),
+    }
+    for name, action in arrivals.items():
+        script = (("checked", 0.3, action), *LATER)
+        demands = (checked_again, says(ANEW))
+        yield Scenario(
+            name,
+            script,
+            demands,
+            (kind,),
+            mode=MODES[kind.name],
+            rules=RESTARTED,
+            changes=PILOT_ARMS,
+        )
+
+
+IN_FLIGHT = (
+    Scenario(
+        "the autopilot restarts in the climb",
+        (("in air", 0.4, boots_again(1.5)),),
+        (never_took_over,),
+        rules=RESTARTED,
+    ),
+    Scenario(
+        "the autopilot restarts in control, silent for 1.5 s",
+        (("in control", 0.5, boots_again(1.5)),),
+        (stops_within(1.6),),
+        rules=RESTARTED,
+    ),
+    Scenario(
+        "the autopilot restarts in control in no time",
+        (("in control", 0.5, boots_again(0.0)),),
+        (stops_within(1.6),),
+        rules=RESTARTED,
+    ),
+)
+
+
+@flights([scenario for kind in kinds.BOTH for scenario in on_the_ground(kind)])
+def test_a_vehicle_that_was_not_checked_is_not_flown(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)
+
+
+@flights(IN_FLIGHT)
+def test_a_restart_in_flight_ends_it(scenario, kind, tmp_path):
+    scenario.fly(kind, tmp_path)
+
+
+def test_datagrams_of_a_stranger_before_the_vehicle_speaks(tmp_path):
+    """They are queued at the port before the vehicle; in real time, for half a second."""
+    sender = common.MAVLink(None, srcSystem=9, srcComponent=1)
+    theirs = common.MAVLink_heartbeat_message(2, 12, 29, 0x03040000, 3, 3).pack(sender)
+
+    def interfere(autopilot):
+        run = autopilot.run
+
+        def late():
+            for _ in range(50):
+                autopilot.wire.send_from_stranger(theirs)
+                autopilot.wire.send_from_stranger(b"\xfd\x00 no frame at all")
+                time.sleep(0.01)
+            run()
+
+        autopilot.run = late
+
+    flown = fly(PX4, (), tmp_path, prepare=interfere)
+    judge(flown)
+    ok(flown)
