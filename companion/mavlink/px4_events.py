@@ -82,6 +82,9 @@ _EVENTS = {
     "commander_failsafe_enter_generic": _Words(
         "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
     ),
+    "commander_failsafe_enter_autopilot_disengaged": _Words(
+        "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
+    ),
     "commander_failsafe_enter_hold": _Words(
         "Failsafe activated due to {2}, triggering {0} in {1} seconds",
         "<4xBHB",

@@ -40,6 +40,8 @@ def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
         (PX4, "programme", 129, 0x00060000, True),
         (PX4, "programme", 157, 0x00030000, False),
         (PX4, "takeoff", 157, 0x02040000, True),
+        (PX4, "land", 157, 0x14040000, True),  # DESCEND: our landing goes on without a position
+        (PX4, "programme", 157, 0x14040000, False),
         (ARDUPILOT, "takeoff", 217, 4, True),
         (ARDUPILOT, "takeoff", 209, 4, False),  # somebody else's rates are obeyed
         (ARDUPILOT, "takeoff", 217, 17, False),  # BRAKE is no end of a climb

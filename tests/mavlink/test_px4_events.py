@@ -18,6 +18,7 @@ RECORDED = [
     (26622124, 0x66, "", "Landing detected"),
     (20099806, 0x66, "", "Landing at current position"),  # px4-circle-5ms, px4-corners
     (27494155, 0x66, "", "Onboard controller regained"),
+    (29547634, 0x42, "0000040608", "Failsafe activated, triggering descend"),  # GPS off in LAND
     (30054617, 0x44, "000006", "Failsafe warning triggered"),
     (17980399, 0x66, "ea070b15042a1c", "Logging to 2026-11-21/04_42_28.ulg"),
 ]

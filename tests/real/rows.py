@@ -6,6 +6,7 @@ Each function flies once and returns its figures; times in s after the event, di
 import random
 import signal
 import time
+from math import hypot
 
 from pymavlink.dialects.v20 import common
 
@@ -156,16 +157,26 @@ def out_of_the_fence(vehicle):
 
 
 def attitude_lowered(vehicle, rate_hz=5.0):
-    """Another program on our link asks for less attitude than we fly by."""
-    circle = {"radius_m": 5.0, "speed_m_s": 3.0, "laps": 4.0}
+    """Another program on our link asks for less attitude than we fly by, on a circle."""
+    radius = 5.0
+    circle = {"radius_m": radius, "speed_m_s": 3.0, "laps": 4.0}
     flight = vehicle.hovering(6.0, flight={"programme": ["circle"]}, circle=circle)
+    began = vehicle.relay.setpoints[-1] - 6.0
     sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
     lower = common.MAVLink_command_long_message(1, 1, 511, 0, 31, 1e6 / rate_hz, 0, 0, 0, 0, 0)
     event = time.monotonic()
     vehicle.relay.inject(lower.pack(sender))
     flight.finish()
     sent = sum(at > event for at in vehicle.relay.setpoints)
-    return figures(vehicle, flight, event, setpoints_after=sent)
+    # It lies north of where control began.
+    seen = vehicle.station.seen
+    start = next(row for row in seen if row.time > began)
+    off = [
+        abs(hypot(row.north - start.north - radius, row.east - start.east) - radius)
+        for row in seen
+        if event < row.time < event + 3.0
+    ]
+    return figures(vehicle, flight, event, setpoints_after=sent, off_circle_m=round(max(off), 2))
 
 
 def left_by_failsafe(vehicle):
