@@ -59,15 +59,21 @@ def interrupted(vehicle, number):
 
 
 def second_ctrl_c(vehicle):
-    """The uplink is cut, else it holds before the second one comes."""
-    flight = vehicle.hovering()
+    """The uplink is cut, else it holds before the second one comes; PX4 is to wait for that."""
+    if vehicle.autopilot == "px4":
+        vehicle.parameter("COM_OF_LOSS_T", 3.0)
+    flight = vehicle.hovering(flight={"accept": ["COM_OF_LOSS_T", "safety.offboard_loss"]})
     vehicle.relay.plug(up=False, down=True)
     event = flight.send(signal.SIGINT)
     time.sleep(1.3)
     flight.send(signal.SIGINT)
     flight.finish()
     vehicle.relay.plug(up=True, down=True)
-    return figures(vehicle, flight, event)
+    try:
+        return figures(vehicle, flight, event)
+    finally:
+        if vehicle.autopilot == "px4":
+            vehicle.parameter("COM_OF_LOSS_T", 1.0)
 
 
 def killed(vehicle):
