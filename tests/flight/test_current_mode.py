@@ -42,7 +42,7 @@ def test_a_takeover_is_heard_within_150_ms(tmp_path, after):
 
 
 def test_a_vehicle_that_disarms_in_flight_is_heard_at_once(tmp_path):
-    """Only a heartbeat tells of that, and the next one is not due yet; CURRENT_MODE makes us ask."""
+    """Only a heartbeat tells of that, and none is due yet; CURRENT_MODE makes us ask for one."""
     at = None
 
     def kill():
