@@ -16,6 +16,8 @@ from companion.mavlink.roles import Role
 
 _STATUS_PERIOD = 0.45
 """PX4 sends CURRENT_MODE every 0.5 s while nothing changes; one that comes sooner is news."""
+_QUESTION_PERIOD = 0.15
+"""An autopilot that sends CURRENT_MODE as often as asked is not asked back as often, s."""
 
 
 class Watch:
@@ -39,7 +41,7 @@ class Watch:
         self._ladder = ladder
         self._clock = clock
         self._asking_again = asking_again
-        self._status_at = -inf
+        self._status_at = self._status_asked_at = -inf
         self._status_question: asyncio.Task[None] | None = None
         self._question: asyncio.Task[None] | None = None
 
@@ -73,7 +75,7 @@ class Watch:
         """CURRENT_MODE came: twice a second, and at once when the vehicle's status changes.
 
         One that comes early may mean that it disarmed, or is in a failsafe. Only a heartbeat tells
-        of those, so one is asked for.
+        of those, so one is asked for; not more often, where an autopilot sends all that is asked.
 
         Raises:
             FlightEnded: as `judge`.
@@ -81,7 +83,8 @@ class Watch:
         now = self._clock()
         early, self._status_at = now - self._status_at < _STATUS_PERIOD, now
         asking = self._status_question is not None and not self._status_question.done()
-        if early and not asking:
+        if early and not asking and now - self._status_asked_at >= _QUESTION_PERIOD:
+            self._status_asked_at = now
             self._status_question = asyncio.create_task(self._rig.fresh_heartbeat())
         self.judge(phase)
 

@@ -21,8 +21,9 @@ _TOGETHER = 0.1
 """Samples whose delays differ by less than this, s, may be of one clock."""
 _SETTLES_FOR = 2.0
 """What was queued before we listened may come late and make the first offset wrong, for this, s."""
-_REBOOTED = 1.0
-"""A clock that goes back by more than this, s, belongs to an autopilot that restarted."""
+_REBOOTED = 2.0
+"""A clock that goes back by more than this, s, belongs to an autopilot that restarted; by less, it
+has only jumped."""
 _WRAP = 2**32 / 1000.0
 """time_boot_ms is a uint32: it wraps after 49.7 days, s."""
 _NEAR_WRAP = 600.0
@@ -67,7 +68,8 @@ class VehicleClock:
         rate: How fast the clock runs.
         delay: How late even the quickest sample is, by TIMESYNC.
         timeline: Rises whenever the clock jumped, wrapped, stood still or restarted.
-        restarts: Rises whenever the time since boot went back and went on from there.
+        restarts: Rises whenever the autopilot restarted: the time since boot went back, by seconds,
+            and went on from there.
         last_change: The newest of these changes in words.
         outliers: Samples dropped because they alone were stamped far ahead.
         on_event: Takes what the user should know, in words.
@@ -258,7 +260,7 @@ class VehicleClock:
             return
         self.timeline += 1
         wrapped = by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP
-        self.restarts += restarted and not wrapped
+        self.restarts += restarted and not wrapped and by < -_REBOOTED
         now = time_boot_ms / 1000.0
         if wrapped:
             self.last_change = "the vehicle's time since boot wrapped around after 49.7 days"

@@ -239,7 +239,7 @@ def test_a_booting_vehicle_is_not_ready_and_nothing_of_it_is_unsafe(capsys, tmp_
         (("--fix",), "standard input is no terminal; add --yes"),
         (("--fix", "--undo", "x.yaml"), "not allowed with"),
         (("--undo", "/not/there.yaml"), "/not/there.yaml"),
-        (("--wait", "-1"), "above 0"),
+        (("--wait", "-1"), "must be a number from 0.01 to 3600"),
     ],
 )
 def test_wrong_usage_is_told(capsys, tmp_path, monkeypatch, arguments, words):

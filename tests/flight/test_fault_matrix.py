@@ -43,8 +43,8 @@ MATRIX = {
         "ground+ held held* held held ok",
     ),
     "delay": ({"kind": "delay", "delay_ms": 400.0}, "ground landed held+ held ok ok"),
-    "duplicate": ({"kind": "duplicate"}, "ok ok ok ok ok ok"),
-    "reorder": ({"kind": "reorder", "probability": 0.5}, "ok ok ok ok ok ok"),
+    "duplicate": ({"kind": "duplicate"}, "landed landed ok ok ok ok"),
+    "reorder": ({"kind": "reorder", "probability": 0.5}, "landed landed ok ok ok ok"),
     "corrupt": ({"kind": "corrupt"}, "ground held held held held held*"),
     "stop telemetry": ({"kind": "stop_telemetry"}, "ground held held held held+ held"),
     "freeze clock": ({"kind": "freeze_clock"}, "ground landed held* held ok ok"),
@@ -61,14 +61,18 @@ MATRIX = {
         {"kind": "low_battery", "remaining": 0.15},
         "ground+ landed landed landed ok ok",
     ),
-    "GPS loss": ({"kind": "gps_loss"}, "landed landed+ landed landed ok ok"),
+    "GPS loss": ({"kind": "gps_loss"}, "ground landed+ landed landed ok ok"),
 }
 ELSE = {
-    # ArduPilot gets no setpoints before it is in the air, and is past our checks when it is arming.
-    ("ardupilot", "stream", "delay"): LANDED,
+    # ArduPilot gets no setpoints before it is in the air. What begins as it is arming is counted
+    # when the judgement before it is a second old, so before the take-over.
     ("ardupilot", "stream", "freeze clock"): LANDED,
     ("ardupilot", "stream", "NaN attitude"): LANDED,
-    ("ardupilot", "stream", "low battery"): LANDED,
+    # PX4's heartbeat comes once a second, so these vehicles have landed when it is missed.
+    ("px4", "land", "drop"): LANDED,
+    ("px4", "land", "drop downlink"): LANDED,
+    ("px4", "land", "corrupt"): LANDED,
+    ("px4", "land", "stop telemetry"): LANDED,
 }
 """Where a family differs."""
 SHORT = {

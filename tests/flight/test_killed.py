@@ -43,7 +43,8 @@ def flight(autopilot, speed):
         },
         "circle": {"radius_m": RADIUS[speed], "speed_m_s": speed, "laps": 3.0},
         "limits": {
-            "max_tilt_deg": 60.0,
+            "max_tilt_deg": 58.0,
+            "max_thrust": 1.0,
             "max_tilt_rate_deg_s": 180.0,
             "fence_radius_m": 200.0,
             "fence_ceiling_m": 100.0,

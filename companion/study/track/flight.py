@@ -17,7 +17,7 @@ from companion.study.track.task import Task
 from companion.study.track.truth import TruthWatch
 
 POSITION_RATE_HZ = 30.0
-MAX_TILT_DEG, MAX_TILT_RATE_DEG_S = 58.0, 250.0
+MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
 """The circle at 7 m/s takes 51° against its own drag, and wind comes on top."""
 GUSTS = 1.0 / 3.0
 """Standard deviation of the gusts north and east, as a share of the mean wind."""
@@ -112,7 +112,11 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
             "position_rate_hz": POSITION_RATE_HZ,
         },
         "planner": {"name": task.planner},
-        "limits": {"max_tilt_deg": MAX_TILT_DEG, "max_tilt_rate_deg_s": MAX_TILT_RATE_DEG_S},
+        "limits": {
+            "max_tilt_deg": MAX_TILT_DEG,
+            "max_tilt_rate_deg_s": MAX_TILT_RATE_DEG_S,
+            "max_thrust": MAX_THRUST,
+        },
         "guidance": {"kind": task.guidance, "lead": task.lead},
         "flight": {
             "programme": ("hover", "trajectory"),
