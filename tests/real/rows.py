@@ -112,8 +112,6 @@ def battery(vehicle):
     """PX4's simulated battery drains to half in a minute, ArduPilot's by 5 % in a short flight."""
     if vehicle.autopilot == "px4":
         vehicle.parameter("SIM_BAT_DRAIN", 60.0)
-    else:
-        vehicle.station.command(42651, 1, 100)
     least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
     flight = vehicle.fly(limits={"min_battery_percent": least})
     flight.until_obeyed()
@@ -199,8 +197,6 @@ def left_by_failsafe(vehicle):
 
 def left_by_ladder(vehicle):
     """Landed by us straight from offboard: the battery's limit."""
-    if vehicle.autopilot == "ardupilot":
-        vehicle.station.command(42651, 1, 100)
     least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
     flight = vehicle.fly(limits={"min_battery_percent": least})
     event = flight.until_obeyed()
@@ -210,8 +206,6 @@ def left_by_ladder(vehicle):
     time.sleep(1.5)
     left = station.mode
     modes = station.modes_since(event)
-    if vehicle.autopilot == "ardupilot":
-        vehicle.station.command(42651, 1, 100)
     return {"result": flight.result.get("result"), **_next_flight(vehicle, modes, left)}
 
 

@@ -70,6 +70,8 @@ class Vehicle:
 
     def fly(self, *, prelude: str = "", **changes) -> "Flight":
         """Begin `companion fly`; `prelude` is Python that its process runs before."""
+        if self.autopilot == "ardupilot":
+            self.station.command(42651, 1, 100)  # its battery empties from flight to flight
         folder = self.folder / f"flight{len(self.flown) + 1}"
         folder.mkdir()
         config = merged(merged(HOVER, TUNED[self.autopilot]), changes)
