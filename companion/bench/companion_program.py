@@ -32,6 +32,7 @@ async def answer(link: Link) -> NoReturn:
         Deadlines(telemetry_stale=1.0, target_stale=1.0, deadline=1.0),
         FlightTrace(),
         rate_limits(config),
+        now,
     )
     loop.on = True
     link.on_attitude = loop.on_sample

@@ -228,6 +228,7 @@ def assemble(
         ),
         trace,
         rate_limits(config),
+        clock,
     )
     ground = GroundContact(link.state, clock)
     guide = Guide(

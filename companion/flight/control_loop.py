@@ -103,6 +103,7 @@ class ControlLoop:
         deadlines: Deadlines,
         trace: FlightTrace,
         limits: Limits,
+        clock: Callable[[], float],
     ) -> None:
         self.command: Command | None = None
         self.on = False
@@ -122,6 +123,7 @@ class ControlLoop:
         self._planner = planner
         self._hover_thrust = hover_thrust
         self._send = send
+        self._clock = clock
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
@@ -183,6 +185,9 @@ class ControlLoop:
         """Send the answer to a sample; returns why it did not leave, or None."""
         try:
             rates, thrust = self._answer(sample, command, dt)
+            # This process may have been stopped since the sample came.
+            if sample.age + self._clock() - sample.received > self._deadlines.telemetry_stale:
+                return Unanswered.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):
                 return Unanswered.NOT_SENT
         except AttitudeError:

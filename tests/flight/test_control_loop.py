@@ -2,6 +2,7 @@
 
 import math
 from time import perf_counter_ns
+from types import SimpleNamespace
 
 import pytest
 
@@ -34,6 +35,7 @@ class Bench:
             Deadlines(telemetry_stale=0.1, target_stale=0.15, deadline=0.004),
             FlightTrace(),
             LIMITS,
+            lambda: self.time,
         )
         self.loop.ask_mode = self.ask
         self.loop.on = True
@@ -84,6 +86,21 @@ def test_every_fresh_sample_gets_one_answer_with_its_own_stamp():
     _, rates, thrust = bench.sent[0]
     assert rates.pitch == pytest.approx(-0.5)  # towards north: nose down
     assert thrust == pytest.approx(0.5)
+
+
+def test_a_process_that_is_stopped_while_it_answers_does_not_send():
+    """Measured on ArduPilot: stopped for 3 s, thawed, and one setpoint left 1 ms later."""
+    planner, away = make_planner("first-order", limits=LIMITS), 0.0
+
+    def rates(*arguments):
+        bench.time += away
+        return planner.rates(*arguments)
+
+    bench = Bench(SimpleNamespace(rates=rates, reset=planner.reset))
+    bench.run(10)
+    away = 3.0
+    bench.run(1)
+    assert (len(bench.sent), bench.loop.reason) == (10, Unanswered.LATE)
 
 
 def test_nothing_is_sent_while_off_or_before_the_first_target():

@@ -1,7 +1,7 @@
 """A change that the autopilot tells of between two heartbeats is heard at once."""
 
 import asyncio
-from math import ceil
+from math import ceil, floor
 from types import SimpleNamespace
 
 import pytest
@@ -10,7 +10,7 @@ from companion.flight.phases import Phase
 from companion.flight.watch import Watch
 from companion.mavlink.roles import Role
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import When
+from tests.flight.others import When, station
 
 PHASE = Phase("connect", "", lambda _: None, 1.0)
 AFTER_A_HEARTBEAT = [0.1, pytest.param(0.35, marks=pytest.mark.slow), 0.7]
@@ -39,6 +39,23 @@ def takeover(tmp_path, after, **settings):
 def test_a_takeover_is_heard_within_150_ms(tmp_path, after):
     _, late = takeover(tmp_path, after)
     assert late < 0.15
+
+
+def test_a_vehicle_that_disarms_in_flight_is_heard_at_once(tmp_path):
+    """Only a heartbeat tells of that, and none is due yet; CURRENT_MODE makes us ask for one."""
+    at = None
+
+    def kill():
+        nonlocal at
+        at = mock.state()["time"]
+        station(mock, 400, 0, 21196)
+
+    with mock_vehicle(tmp_path) as mock:
+        summary = fly(mock, tmp_path / "log", When("programme", kill, after=1.0))
+        state = mock.state()
+    assert summary.result == "the vehicle disarmed in flight"
+    assert floor(at) + 1.0 - at > 0.3
+    assert state["last_setpoint"] - at < 0.15
 
 
 def test_without_current_mode_the_heartbeat_tells(tmp_path):

@@ -1,12 +1,14 @@
 """A vehicle is not left disarmed in offboard, where PX4 never is ready to be armed again."""
 
 import asyncio
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import pytest
 
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.left_in_offboard import leave_offboard
+from companion.flight.procedures import _require_landing
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.roles import Role
 from tests.flight.fly import fly, mock_vehicle
@@ -91,3 +93,12 @@ def test_a_refusal_says_what_to_do():
     with pytest.raises(FlightEnded, match="command another mode") as ended:
         asyncio.run(leave_offboard(Vehicle(Role.OFFBOARD, refuses=True)))
     assert ended.value.exit is Exit.LEAVE
+
+
+@pytest.mark.parametrize(("by_heartbeat", "ends"), [(False, False), (True, True)])
+def test_a_landing_that_ended_in_offboard_is_not_taken_for_a_takeover(by_heartbeat, ends):
+    """PX4 tells of OFFBOARD by CURRENT_MODE before a heartbeat tells that it disarmed."""
+    vehicle = Vehicle(Role.OFFBOARD, armed=True)
+    vehicle.heartbeat_is_newest = by_heartbeat
+    with pytest.raises(FlightEnded) if ends else nullcontext():
+        _require_landing(vehicle)

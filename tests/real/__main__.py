@@ -58,8 +58,8 @@ def flown(vehicle, name: str) -> bool:
             vehicle.bring_down()
         words = json.dumps(out)
         disturbed = next((word for word in DISTURBED if word in words), None)
-        if name == "attitude_lowered" and "error" not in out:
-            disturbed = None  # it is to end so
+        if name in ("attitude_lowered", "stopped") and "error" not in out:
+            disturbed = None  # they are to end so
         more = {} if disturbed is None else {"disturbed": disturbed}
         print(json.dumps({"row": name, **out, **more}), flush=True)
         if "error" not in out and disturbed is None:

@@ -59,15 +59,21 @@ def interrupted(vehicle, number):
 
 
 def second_ctrl_c(vehicle):
-    """The uplink is cut, else it holds before the second one comes."""
-    flight = vehicle.hovering()
+    """The uplink is cut, else it holds before the second one comes; PX4 is to wait for that."""
+    if vehicle.autopilot == "px4":
+        vehicle.parameter("COM_OF_LOSS_T", 3.0)
+    flight = vehicle.hovering(flight={"accept": ["COM_OF_LOSS_T", "safety.offboard_loss"]})
     vehicle.relay.plug(up=False, down=True)
     event = flight.send(signal.SIGINT)
     time.sleep(1.3)
     flight.send(signal.SIGINT)
     flight.finish()
     vehicle.relay.plug(up=True, down=True)
-    return figures(vehicle, flight, event)
+    try:
+        return figures(vehicle, flight, event)
+    finally:
+        if vehicle.autopilot == "px4":
+            vehicle.parameter("COM_OF_LOSS_T", 1.0)
 
 
 def killed(vehicle):
@@ -106,8 +112,6 @@ def battery(vehicle):
     """PX4's simulated battery drains to half in a minute, ArduPilot's by 5 % in a short flight."""
     if vehicle.autopilot == "px4":
         vehicle.parameter("SIM_BAT_DRAIN", 60.0)
-    else:
-        vehicle.station.command(42651, 1, 100)
     least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
     flight = vehicle.fly(limits={"min_battery_percent": least})
     flight.until_obeyed()
@@ -193,8 +197,6 @@ def left_by_failsafe(vehicle):
 
 def left_by_ladder(vehicle):
     """Landed by us straight from offboard: the battery's limit."""
-    if vehicle.autopilot == "ardupilot":
-        vehicle.station.command(42651, 1, 100)
     least = {"px4": 75.0, "ardupilot": 96.0}[vehicle.autopilot]
     flight = vehicle.fly(limits={"min_battery_percent": least})
     event = flight.until_obeyed()
@@ -204,8 +206,6 @@ def left_by_ladder(vehicle):
     time.sleep(1.5)
     left = station.mode
     modes = station.modes_since(event)
-    if vehicle.autopilot == "ardupilot":
-        vehicle.station.command(42651, 1, 100)
     return {"result": flight.result.get("result"), **_next_flight(vehicle, modes, left)}
 
 

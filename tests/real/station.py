@@ -6,7 +6,6 @@ from math import acos, cos, degrees, hypot, inf, radians
 from typing import NamedTuple
 
 from pymavlink import mavutil
-from pymavlink.dialects.v20 import development as dialect
 
 _EARTH_M = 6371000.0
 
@@ -58,10 +57,11 @@ class Station:
         self._base = 0
         self._status = 0
         address = "udpin:127.0.0.1:14550" if autopilot == "px4" else "tcp:127.0.0.1:5762"
-        self._links = [mavutil.mavlink_connection(address, dialect="development")]
+        dialect = "development" if autopilot == "px4" else "ardupilotmega"
+        self._links = [mavutil.mavlink_connection(address, dialect=dialect)]
         if autopilot == "px4":
             truth = "udpin:127.0.0.1:19410"
-            self._links.append(mavutil.mavlink_connection(truth, dialect="development"))
+            self._links.append(mavutil.mavlink_connection(truth, dialect=dialect))
         self._running = True
         self._threads = [
             threading.Thread(target=self._listen, args=(link,), daemon=True) for link in self._links
@@ -218,9 +218,15 @@ PX4_MODES = {
     "LOITER": (4, 3),
     "RTL": (4, 5),
     "LAND": (4, 6),
+    "DESCEND": (4, 20),
     "OFFBOARD": (6, 0),
 }
 ARDUPILOT_MODES = {
-    entry.name.removeprefix("COPTER_MODE_"): number
-    for number, entry in dialect.enums.get("COPTER_MODE", {}).items()
-} or {"STABILIZE": 0, "ALT_HOLD": 2, "GUIDED": 4, "LOITER": 5, "RTL": 6, "LAND": 9, "BRAKE": 17}
+    "STABILIZE": 0,
+    "ALT_HOLD": 2,
+    "GUIDED": 4,
+    "LOITER": 5,
+    "RTL": 6,
+    "LAND": 9,
+    "BRAKE": 17,
+}

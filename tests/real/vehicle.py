@@ -51,9 +51,12 @@ class Vehicle:
         self.station = Station(autopilot)
         self.station.until(lambda: self.station.told, 60.0, "heartbeat")
         self.station.ask_for_rates()
-        self.flights = 0
+        self.flown: list[Flight] = []
 
     def close(self) -> None:
+        for flight in self.flown:
+            flight.process.kill()
+            flight.process.wait()
         self.station.close()
         self.relay.close()
 
@@ -67,8 +70,9 @@ class Vehicle:
 
     def fly(self, *, prelude: str = "", **changes) -> "Flight":
         """Begin `companion fly`; `prelude` is Python that its process runs before."""
-        self.flights += 1
-        folder = self.folder / f"flight{self.flights}"
+        if self.autopilot == "ardupilot":
+            self.station.command(42651, 1, 100)  # its battery empties from flight to flight
+        folder = self.folder / f"flight{len(self.flown) + 1}"
         folder.mkdir()
         config = merged(merged(HOVER, TUNED[self.autopilot]), changes)
         config["link"] = {"endpoint": self.relay.endpoint} | config.get("link", {})
@@ -82,7 +86,8 @@ class Vehicle:
             command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=(folder / "err.txt").open("w"), text=True,
         )  # fmt: skip
-        return Flight(self, process)
+        self.flown.append(Flight(self, process))
+        return self.flown[-1]
 
     def hovering(self, seconds: float = 4.0, **changes) -> "Flight":
         """A flight that has been flown by our rates for so long."""
@@ -127,7 +132,7 @@ class Flight:
         """The summary, with the exit code."""
         out, _ = self.process.communicate(timeout=seconds)
         lines = out.splitlines()
-        self.result = json.loads(lines[-1]) if lines and self.process.returncode >= 0 else {}
+        self.result = json.loads(lines[-1]) if lines else {}
         return self.result
 
     def said(self) -> list[str]:
