@@ -232,12 +232,13 @@ def hover_minutes(vehicle, minutes=10.0):
     flight = vehicle.fly(hover={"duration_s": 60.0 * minutes})
     event = flight.until_obeyed()
     flight.finish(60.0 * minutes + 180.0)
-    result = flight.result
+    result, flown = flight.result, round(time.monotonic() - event)
+    vehicle.bring_down()
     return {
         "result": result.get("result"),
         "events": [event["text"] for event in result.get("events", [])],
         "counts": result.get("counts"),
-        "flown_s": round(time.monotonic() - event),
+        "flown_s": flown,
         **vehicle.station.motion_since(event, event + 60.0 * minutes),
         "load": vehicle.load(),
     }
