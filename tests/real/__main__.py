@@ -58,7 +58,7 @@ def flown(vehicle, name: str) -> bool:
             vehicle.bring_down()
         words = json.dumps(out)
         disturbed = next((word for word in DISTURBED if word in words), None)
-        if name in ("attitude_lowered", "stopped") and "error" not in out:
+        if name in ("attitude_lowered", "attitude_kept_low", "stopped") and "error" not in out:
             disturbed = None  # they are to end so
         more = {} if disturbed is None else {"disturbed": disturbed}
         print(json.dumps({"row": name, **out, **more}), flush=True)

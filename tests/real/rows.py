@@ -151,8 +151,9 @@ def no_gps(vehicle):
 def out_of_the_fence(vehicle):
     """Blown out by a gust; a planned leaving is refused before take-off."""
     names = {"px4": "SIH_WIND_N", "ardupilot": "SIM_WIND_SPD"}
+    speed = {"px4": 18.0, "ardupilot": 60.0}[vehicle.autopilot]
     flight = vehicle.hovering(limits={"fence_radius_m": 2.0})
-    vehicle.parameter(names[vehicle.autopilot], 18.0)
+    vehicle.parameter(names[vehicle.autopilot], speed)
     station = vehicle.station
     event = station.until(lambda: not station.obeys, 60.0, "end of our control")
     vehicle.parameter(names[vehicle.autopilot], 0.0)
@@ -160,7 +161,7 @@ def out_of_the_fence(vehicle):
     return figures(vehicle, flight, event, 25.0)
 
 
-def attitude_lowered(vehicle, rate_hz=5.0):
+def attitude_lowered(vehicle, rate_hz=5.0, times=1):
     """Another program on our link asks for less attitude than we fly by, on a circle."""
     radius = 5.0
     circle = {"radius_m": radius, "speed_m_s": 3.0, "laps": 4.0}
@@ -169,7 +170,9 @@ def attitude_lowered(vehicle, rate_hz=5.0):
     sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
     lower = common.MAVLink_command_long_message(1, 1, 511, 0, 31, 1e6 / rate_hz, 0, 0, 0, 0, 0)
     event = time.monotonic()
-    vehicle.relay.inject(lower.pack(sender))
+    for _ in range(times):
+        vehicle.relay.inject(lower.pack(sender))
+        time.sleep(0.3)
     flight.finish()
     sent = sum(at > event for at in vehicle.relay.setpoints)
     # It lies north of where control began.
@@ -229,12 +232,13 @@ def hover_minutes(vehicle, minutes=10.0):
     flight = vehicle.fly(hover={"duration_s": 60.0 * minutes})
     event = flight.until_obeyed()
     flight.finish(60.0 * minutes + 180.0)
-    result = flight.result
+    result, flown = flight.result, round(time.monotonic() - event)
+    vehicle.bring_down()
     return {
         "result": result.get("result"),
         "events": [event["text"] for event in result.get("events", [])],
         "counts": result.get("counts"),
-        "flown_s": round(time.monotonic() - event),
+        "flown_s": flown,
         **vehicle.station.motion_since(event, event + 60.0 * minutes),
         "load": vehicle.load(),
     }
@@ -255,6 +259,7 @@ ROWS = {
     "no_gps": no_gps,
     "fence": out_of_the_fence,
     "attitude_lowered": attitude_lowered,
+    "attitude_kept_low": lambda vehicle: attitude_lowered(vehicle, times=10),
     "left_by_failsafe": left_by_failsafe,
     "left_by_ladder": left_by_ladder,
     "hover": hover_minutes,
