@@ -85,6 +85,7 @@ class SampleTimes(NamedTuple):
         age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
         clock_change: How the vehicle's clock jumped or restarted meanwhile, in words, or empty.
         unusable: No unit quaternion, or with a number that is not finite.
+        rate: Hz, bursts counted as what they are (`HeldRates`); `None` for too few samples.
     """
 
     heard: int = 0
@@ -94,6 +95,7 @@ class SampleTimes(NamedTuple):
     age: float | None = None
     clock_change: str = ""
     unusable: int = 0
+    rate: float | None = None
 
 
 class Company(NamedTuple):

@@ -37,9 +37,23 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def examine(config: Config, evidence: Evidence) -> list[Finding]:
-    """All that is found, safe things included."""
-    return [finding for check in CHECKS for finding in check(config, evidence)]
+ONCE: tuple[Check, ...] = (
+    offboard_loss,
+    configuration_checks.planner,
+    configuration_checks.dead_time,
+    configuration_checks.accepted,
+)
+"""What a flight need not ask twice: only the configuration decides it."""
+
+
+def examine(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
+    """All that is found, safe things included; `again`: without what is asked `ONCE`."""
+    return [
+        finding
+        for check in CHECKS
+        if not (again and check in ONCE)
+        for finding in check(config, evidence)
+    ]
 
 
 def forbidding(config: Config, findings: Iterable[Finding]) -> list[Finding]:

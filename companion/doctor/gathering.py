@@ -13,7 +13,7 @@ from companion.doctor.listening import Ear
 from companion.mavlink.codec import message_id
 from companion.mavlink.errors import CommandRefused, LinkTimeout
 from companion.mavlink.link import Link
-from companion.mavlink.parameter_survey import survey
+from companion.mavlink.parameter_survey import Survey, survey
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.streams import StreamRate
 from companion.mavlink.telemetry_delay import DelayUnknown
@@ -41,6 +41,7 @@ async def gather(
     stage: Stage = Stage.GROUND,
     thorough: bool = False,
     notices: Sequence[str] = (),
+    known: Survey | None = None,
 ) -> Evidence:
     """What a flight looks at before it arms; the parameters are read while the rates are counted.
 
@@ -51,6 +52,7 @@ async def gather(
         stage: What the vehicle is to be judged for.
         thorough: Ask what forbids arming, too.
         notices: What the link said of itself; read at the end.
+        known: The same vehicle's parameters, where they were read before.
 
     Raises:
         LinkLost: The connection dropped meanwhile.
@@ -59,7 +61,7 @@ async def gather(
     before, began = replace(link.stats), loop.time()
     with Ear(link, loop.time) as ear:
         read, achieved, identity = await asyncio.gather(
-            survey(link, link.family.parameters),
+            survey(link, link.family.parameters, before=known),
             link.measure_rates(granted, seconds),
             _identity_and_words(link) if thorough else identify(link),
         )

@@ -11,6 +11,7 @@ from companion.attitude.representation import is_unit
 from companion.doctor.evidence import Company, SampleTimes
 from companion.mavlink.codec import Message
 from companion.mavlink.framing import Frame
+from companion.mavlink.held_rates import HeldRates
 from companion.mavlink.link import Link
 
 _HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
@@ -78,6 +79,9 @@ class Ear:
             return SampleTimes(len(self._stamps), unusable=self._unusable)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         known = len(self._stamps) >= _ENOUGH and last > first
+        held = HeldRates()
+        for earlier, later in pairs:
+            held.add(later[0] - earlier[0])
         return SampleTimes(
             heard=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
@@ -86,6 +90,7 @@ class Ear:
             clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
             age=median(self._ages) if self._ages and self._link.clock.age_known else None,
             clock_change=self._clock_change,
+            rate=held.rate_since(HeldRates()) if known else None,
         )
 
     @property

@@ -19,7 +19,6 @@ from companion.flight.guide import Guide
 from companion.flight.observer import Observer
 from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.preflight import Preflight
-from companion.flight.preparation import SLOWEST_HEARTBEAT
 from companion.flight.programmes import unbegun
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
@@ -246,7 +245,7 @@ def assemble(
         vehicle_clock=link.clock,
     )
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
-    same_vehicle = SameVehicle(link, SLOWEST_HEARTBEAT)
+    same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)

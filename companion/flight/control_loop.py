@@ -18,10 +18,10 @@ from companion.attitude import (
 )
 from companion.attitude.rotation import within_limits
 from companion.flight.estimator_resets import EstimatorResets
-from companion.flight.held_rates import HeldRates
 from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
+from companion.mavlink.held_rates import HeldRates
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.vehicle_clock import Misfit
 from companion.recording.trace import FlightTrace

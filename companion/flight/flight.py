@@ -137,6 +137,7 @@ class Flight:
                 self.note(f"{void.reason}; the checks are made anew")
                 self._rig.release()
                 self._rig.link.state.forget()
+                self._rig.same_vehicle.begin()
                 self._end = self._new_end()
             else:
                 return
@@ -153,7 +154,8 @@ class Flight:
         self.phase, self._entered = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
         if not self._end.done():
-            self._watch.judge(phase)  # before the phase commands anything
+            self._judge_once(phase)  # before the phase commands anything
+        if not self._end.done():
             await self._race(phase.work(self._rig), phase.timeout)
         if self._end.done():
             raise self._end.result()
@@ -226,13 +228,16 @@ class Flight:
 
     async def _judge(self) -> None:
         while True:
-            try:
-                self._watch.judge(self.phase)
-            except FlightEnded as ended:
-                self.end(ended)
-            except Exception as error:  # the watch goes on: an ending needs it, too
-                self.fail(error)
+            self._judge_once(self.phase)
             await asyncio.sleep(_WATCH_PERIOD)
+
+    def _judge_once(self, phase: Phase) -> None:
+        try:
+            self._watch.judge(phase)
+        except FlightEnded as ended:
+            self.end(ended)
+        except Exception as error:  # the watch goes on: an ending needs it, too
+            self.fail(error)
 
     async def _tell(self) -> None:
         while True:

@@ -60,7 +60,8 @@ class GroundContact:
     @property
     def standing(self) -> bool:
         """Whether it says that it stands on the ground, and never left it in this flight."""
-        return self._state.landed and not self._left
+        rises = self.takeoff_commanded and self._vertical_speed() < -_STILL
+        return self._state.landed and not self._left and not rises
 
     @property
     def touched_down(self) -> bool:

@@ -129,15 +129,8 @@ def _land(config: FlightConfig) -> Phase:
 
 
 def _undo_arming() -> Phase:
-    """Where it is refused, the vehicle flies after all."""
-    return Phase(
-        "disarm",
-        "the motors to stop",
-        preparation.undo_arming,
-        _SHORT,
-        Exit.LAND,
-        on_failure_landed=Exit.LEAVE,
-    )
+    """Where it is refused, the vehicle flies after all; on the ground a landing does no harm."""
+    return Phase("disarm", "the motors to stop", preparation.undo_arming, _SHORT, Exit.LAND)
 
 
 def _disarm() -> Phase:

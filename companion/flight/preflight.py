@@ -46,7 +46,7 @@ class Preflight:
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
-        self._programme, self._weighed = programme, False
+        self._programme = programme
         self._clock = asyncio.get_running_loop().time
         self._granted: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
@@ -60,7 +60,7 @@ class Preflight:
             CommandTimeout: the autopilot did not answer.
             LinkLost: the connection dropped meanwhile.
         """
-        self._gathered_at, self._weighed = -inf, False
+        self._evidence = None  # it may be another vehicle's
         wanted = wanted_rates(self._config, self._link)
         self._granted = await self._link.set_rates(wanted, window_s=0.1)
         for message, rate in self._granted.items():
@@ -75,20 +75,21 @@ class Preflight:
             FlightEnded: with what forbids the flight.
             LinkLost: the connection dropped meanwhile.
         """
-        evidence = self._evidence
+        before = evidence = self._evidence
         if evidence is None or self._clock() - self._gathered_at > _LASTS:
-            evidence = await gather(self._link, self._granted, _COUNTED_FOR, stage=stage)
+            evidence = await gather(
+                self._link,
+                self._granted,
+                _COUNTED_FOR,
+                stage=stage,
+                known=None if before is None else before.survey,
+            )
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
-        self._heed(examine(self._config, self._for(stage, evidence)))
+        evidence = replace(evidence, stage=stage, programme=self._programme)
+        self._heed(examine(self._config, evidence, again=before is not None))
         return evidence
-
-    def _for(self, stage: Stage, evidence: Evidence) -> Evidence:
-        """The evidence for a stage; what is flown is weighed once a vehicle: it takes a while."""
-        programme = None if self._weighed else self._programme
-        self._weighed = True
-        return replace(evidence, stage=stage, programme=programme)
 
     def _heed(self, findings: list[Finding]) -> None:
         """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""

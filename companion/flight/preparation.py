@@ -7,15 +7,13 @@ from companion.flight.ending import Exit, FlightEnded
 from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.orders import order
 from companion.flight.programmes import require_inside
-from companion.flight.rig import Rig
+from companion.flight.rig import SLOWEST_HEARTBEAT, Rig
 from companion.flight.roles import in_role, in_roles, require_role
 from companion.guidance.fence import Place
 from companion.mavlink.parameter_rules import Values, Verdict
 from companion.mavlink.roles import Role
 from companion.yaml_file import ConfigError
 
-SLOWEST_HEARTBEAT = 3.0
-"""Longest pause between two heartbeats until it is known how often they come, s."""
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
 
@@ -29,6 +27,7 @@ async def connect(rig: Rig) -> None:
 async def checks(rig: Rig) -> None:
     """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
     rig.same_vehicle.begin()
+    rig.heartbeat_limit = SLOWEST_HEARTBEAT
     rig.detail = "asking for telemetry"
     await rig.preflight.ask_for_telemetry()
     await leave_offboard(rig)
@@ -39,7 +38,7 @@ async def checks(rig: Rig) -> None:
     heartbeats = evidence.streams.get("HEARTBEAT")  # PX4's is not asked for: its rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
-        rig.same_vehicle.heartbeat_limit = limit
+        rig.heartbeat_limit = limit
     _require_inside_map(rig)
     _tell_dead_man(rig, evidence.survey.values)
     rig.mode_at_checks = rig.link.state.mode

@@ -18,6 +18,9 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.link import Link
 from companion.mavlink.records import LocalPosition
 
+SLOWEST_HEARTBEAT = 3.0
+"""A mode older than this, s, is not known any more, until it is known how often heartbeats come."""
+
 _POLL = 0.02
 """How often a condition is looked at, s; telemetry that changes it is slower."""
 
@@ -35,6 +38,8 @@ class Rig:
     Attributes:
         detail: what the running phase waits for just now, for the user.
         rate_hz: setpoints a second while the programme was flown.
+        heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
+            from the rate at which heartbeats really come.
         mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
         arm_sent: whether we asked the autopilot to arm.
         note: writes down and shows that something happened.
@@ -51,6 +56,7 @@ class Rig:
     same_vehicle: SameVehicle
     detail: str = ""
     rate_hz: float = 0.0
+    heartbeat_limit: float = SLOWEST_HEARTBEAT
     mode_at_checks: str | None = None
     arm_sent: bool = False
     note: Callable[[str], None] = lambda _: None

@@ -54,6 +54,7 @@ class Watch:
         now = self._clock()
         self._rig.lookout.listen(now)
         self._rig.ground.look()
+        self._rig.same_vehicle.look()
         self._rig.same_vehicle.require()
         if phase.modes:
             require_role(self._rig.link, phase.modes)
@@ -68,7 +69,6 @@ class Watch:
         Raises:
             FlightEnded: as `judge`.
         """
-        self._rig.same_vehicle.note_heartbeat()
         self.judge(phase)
 
     def on_current_mode(self, phase: Phase) -> None:
@@ -120,7 +120,7 @@ class Watch:
 
     def _judge_heartbeat(self) -> None:
         state, now = self._rig.link.state, self._clock()
-        if now - state.mode_received > self._rig.same_vehicle.heartbeat_limit:
+        if now - state.mode_received > self._rig.heartbeat_limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
             )

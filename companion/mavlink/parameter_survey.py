@@ -53,6 +53,7 @@ async def survey(
     link: Link,
     rules: Iterable[ParameterRule],
     *,
+    before: Survey | None = None,
     at_first: Patience = _AT_FIRST,
     once_more: Patience = _ONCE_MORE,
 ) -> Survey:
@@ -62,10 +63,25 @@ async def survey(
     once more, after all others and longer, but only where frames were lost: on a good link it is
     what this autopilot has not, and the question costs time alone.
 
+    Args:
+        link: To the vehicle.
+        rules: Of its family.
+        before: What the same vehicle said before: what it did not tell then is not asked again, for
+            that costs seconds each time on a link that loses frames.
+        at_first: For the first question.
+        once_more: For the second.
+
     Raises:
         LinkLost: The connection dropped meanwhile.
     """
     rules, questions = tuple(rules), _Questions(link)
+    untold: frozenset[str] = frozenset()
+    if before is not None:
+        untold = before.untold
+        rules = tuple(rule for rule in rules if rule.name in before.values)
+        questions.leave_out(
+            name for rule in rules for name in rule.names if name != before.names[rule.name]
+        )
     await questions.ask(rules, at_first)
     # Who answered nothing at all will not do so now, and that is a finding of its own.
     if questions.values and questions.lossy:
@@ -73,7 +89,7 @@ async def survey(
     return Survey(
         questions.values,
         questions.names,
-        frozenset(rule.name for rule in questions.untold(rules)),
+        untold.union(rule.name for rule in questions.untold(rules)),
         questions.lossy,
     )
 
@@ -100,6 +116,10 @@ class _Questions:
         stats = self._link.stats
         lost = share_lost(stats.frames - self._frames, stats.lost - self._lost)
         return self._repeated or lost > SOME_LOST
+
+    def leave_out(self, names: Iterable[str]) -> None:
+        """The autopilot is known to have none of these names."""
+        self._none.update(names)
 
     def untold(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
         """Of the rules those without a value, unless the autopilot said that it has none."""

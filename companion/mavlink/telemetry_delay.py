@@ -75,6 +75,22 @@ class TelemetryDelay:
         self.forget(DelayUnknown.OTHER_CLOCK)
         return None
 
+    def most(self, before: float) -> float:
+        """The largest delay that exchanges up to `before` (s on our clock) leave possible, s."""
+        told = [each for each in self._compared if each.at <= before]
+        if not told:
+            return 0.0
+        best = min(told, key=lambda each: each.half + MOST_DRIFT * (before - each.at))
+        return best.delay + best.half + MOST_DRIFT * (before - best.at)
+
+    def shorten(self, by: float, now: float) -> None:
+        """The quickest sample is `by` s quicker than those that were compared with; both in s."""
+        self._compared = deque(
+            (each._replace(delay=each.delay - by) for each in self._compared),
+            maxlen=self._compared.maxlen,
+        )
+        self.expire(now)
+
     def retract(self, since: float) -> None:
         """Forget what was compared after `since`, s on our clock: the clock had changed already."""
         while self._compared and self._compared[-1].at > since:

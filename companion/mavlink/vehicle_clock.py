@@ -24,6 +24,9 @@ _SETTLES_FOR = 2.0
 _REBOOTED = 2.0
 """A clock that goes back by more than this, s, belongs to an autopilot that restarted; by less, it
 has only jumped."""
+_CERTAINLY_BACK = 0.5
+"""TIMESYNC lags the samples' stamps a little; behind the newest by this, s, time has gone back, and
+has not only stood still."""
 _WRAP = 2**32 / 1000.0
 """time_boot_ms is a uint32: it wraps after 49.7 days, s."""
 _NEAR_WRAP = 600.0
@@ -173,7 +176,7 @@ class VehicleClock:
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
             # Its answer may be a little older than the sample that came before it.
-            back = time < self._newest - _REBOOTED
+            back = time < self._newest - _CERTAINLY_BACK
             self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
     def look(self, now: float) -> None:
@@ -205,6 +208,8 @@ class VehicleClock:
             self._quickest = quickest
             self._drop_candidates()
             return None
+        if is_ahead and self._ends_lateness(sample, quickest):
+            return None
         if not self._confirms(sample, quickest):
             return Misfit.AHEAD if is_ahead else Misfit.NOT_NEWER
         by = max(candidate.ahead for candidate in self._candidates) - quickest
@@ -213,6 +218,20 @@ class VehicleClock:
         self._newest = -inf
         self._change(by, time_boot_ms, restarted=by < 0.0)
         return None
+
+    def _ends_lateness(self, sample: _Candidate, quickest: float) -> bool:
+        """Whether the link is quicker again: TIMESYNC told that even the quickest sample was late.
+
+        The link then brings samples that seem ahead by no more than it was late. What TIMESYNC says
+        after the last sample that fitted does not count: the clock may have jumped before it.
+        """
+        by = sample.ahead - quickest
+        if by > self.delay.most(before=self._received - _TOGETHER):
+            return False
+        self._quickest = quickest
+        self.delay.shorten(by, sample.received)
+        self._drop_candidates()
+        return True
 
     def _confirms(self, sample: _Candidate, quickest: float) -> bool:
         """Whether it and the misfits just before it are a clock that goes on elsewhere."""

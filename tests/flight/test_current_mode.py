@@ -76,7 +76,7 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
     rig = SimpleNamespace(
         lookout=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(look=lambda: None),
-        same_vehicle=SimpleNamespace(note_heartbeat=lambda: None, require=lambda: None),
+        same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
         fresh_heartbeat=fresh_heartbeat,
     )
 
@@ -125,7 +125,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     rig = SimpleNamespace(
         lookout=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(look=lambda: None),
-        same_vehicle=SimpleNamespace(note_heartbeat=lambda: None, require=lambda: None),
+        same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
         loop=loop,
         link=SimpleNamespace(state=state, family=family),
         fresh_heartbeat=answer.wait,

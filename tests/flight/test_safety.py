@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
-from companion.flight.held_rates import HeldRates
 from companion.flight.safety import Action, Lookout, SafetyLadder, monitors
 from companion.flight.safety.monitor import Alarm, Monitor
 from companion.flight.safety.snapshot import (
@@ -19,6 +18,7 @@ from companion.flight.safety.snapshot import (
 )
 from companion.flight.unanswered import Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
+from companion.mavlink.held_rates import HeldRates
 from companion.mavlink.records import Battery, Estimator, Gps
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})

@@ -109,6 +109,20 @@ def test_a_jump_is_no_drift(by, rate, timesync):
     assert (link.clock.timeline, link.clock.age_known) == (1, timesync)
 
 
+@pytest.mark.parametrize("late", [0.06, 0.08])
+def test_a_link_that_gets_quicker_is_no_jump_where_timesync_told_that_it_was_late(late):
+    """A queue is flushed or a route changes: the next samples seem ahead by what was late."""
+    link = Link().run(20.0, stall=0.0)
+    link.delay += late
+    link.run(30.0, stall=0.0)
+    assert link.ages[-1] == pytest.approx(late, abs=0.02)
+    link.delay -= late
+    link.now, link.vehicle = link.now + late + 0.05, link.vehicle + late + 0.05  # lost meanwhile
+    link.run(5.0, stall=0.0)
+    assert (link.clock.timeline, link.misfits) == (0, [])
+    assert max(link.ages[-1000:]) < 0.03
+
+
 @pytest.mark.parametrize("timesync", [True, False])
 @pytest.mark.parametrize("stop", [0.1, 0.3, 2.0])
 def test_a_clock_that_stands_still_and_goes_on_is_no_drift(stop, timesync):

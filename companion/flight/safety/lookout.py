@@ -7,7 +7,6 @@ from typing import NamedTuple
 from companion.attitude.representation import wrap_angle
 from companion.flight.control_loop import ControlLoop
 from companion.flight.guide import Guide
-from companion.flight.held_rates import HeldRates
 from companion.flight.safety.snapshot import (
     Autopilot,
     Control,
@@ -18,6 +17,7 @@ from companion.flight.safety.snapshot import (
 )
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
+from companion.mavlink.held_rates import HeldRates
 from companion.mavlink.link import Link
 from companion.mavlink.stats import share_lost
 
