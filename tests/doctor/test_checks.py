@@ -185,6 +185,20 @@ def test_rates_that_are_refused_cut_or_not_reached():
     assert found(link_checks.streams, never) == {"link.streams.HOME_POSITION": INEFFECTIVE}
 
 
+def test_bursts_are_judged_on_the_ground_as_in_flight():
+    """The monitor `answer rate` would hand such a vehicle back two seconds after the take-over."""
+    bursts = replace(GOOD, samples=GOOD.samples._replace(rate=41.0))
+    assert found(link_checks.streams, bursts) == {"link.min_attitude_rate_hz": UNSAFE}
+    (finding, _) = link_checks.streams(CONFIG, bursts)
+    assert "at 41 Hz (in bursts, 197 Hz by count)" in finding.found
+
+
+def test_asked_again_nothing_is_asked_that_only_the_configuration_decides():
+    unused = changed(CONFIG, {"flight": {"accept": ("NO_SUCH_CHECK",)}}, "test")
+    assert Key.ACCEPT in amiss(examine(unused, GOOD))
+    assert amiss(examine(unused, GOOD, again=True)) == {}
+
+
 def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
     notice = "the vehicle signs its frames and we do not; set link.signing_key_file"
     evidence = replace(GOOD, link=QUALITY._replace(notices=(notice,)))

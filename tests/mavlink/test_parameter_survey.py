@@ -5,7 +5,7 @@ import asyncio
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.mavlink.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from companion.mavlink.parameter_survey import Patience, survey
+from companion.mavlink.parameter_survey import Patience, Survey, survey
 from companion.mavlink.px4_parameters import PX4_PARAMETERS
 from tests.mavlink.fakes import linked
 
@@ -35,6 +35,31 @@ def test_an_old_version_answers_to_the_old_names():
     assert names == {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
     # All are asked for before the first has an answer; the old name only after the new had none.
     assert asked == ["MAV_GCS_SYSID", "FS_OPTIONS", "ARMING_SKIPCHK", "SYSID_MYGCS"]
+
+
+def test_asked_again_it_is_asked_for_what_it_told_before_alone():
+    """What it has not costs seconds each time; an old name is known by now."""
+    rules = [rule for rule in ARDUPILOT_PARAMETERS if rule.name in WANTED]
+    asked = []
+
+    def answer(request):
+        asked.append(request.param_id)
+        name = request.param_id.encode()
+        return [dialect.MAVLink_param_value_message(name, 7.0, 9, 2, 0)]
+
+    async def scene():
+        async with linked() as (link, vehicle):
+            vehicle.answers["PARAM_REQUEST_READ"] = answer
+            names = {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
+            told = dict.fromkeys(names, 1.0)
+            before = Survey(told, names, frozenset({"ARMING_SKIPCHK"}))
+            return await survey(link, rules, before=before)
+
+    values, names, untold, _ = asyncio.run(scene())
+    assert asked == ["SYSID_MYGCS", "FS_OPTIONS"]
+    assert values == {"MAV_GCS_SYSID": 7.0, "FS_OPTIONS": 7.0}
+    assert names["MAV_GCS_SYSID"] == "SYSID_MYGCS"
+    assert untold == {"ARMING_SKIPCHK"}
 
 
 class Lossy:

@@ -1,0 +1,87 @@
+"""How a flight goes through its phases: faults of ours, and another vehicle, at bad moments."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from companion.flight.ending import Exit
+from companion.flight.flight import Flight
+from companion.flight.observer import Silent
+from companion.flight.phases import Phase
+from companion.flight.same_vehicle import ChecksVoid
+
+
+class Bench:
+    """A flight of made-up phases; `judge` is the watch's."""
+
+    def __init__(self, monkeypatch, judge):
+        self.done, self.begun = [], 0
+        ground = (self.phase("checks"),)
+        flying = (self.phase("programme", Exit.LAND),)
+        monkeypatch.setattr("companion.flight.flight.ground_phases", lambda _: ground)
+        monkeypatch.setattr("companion.flight.flight.flight_phases", lambda *_: flying)
+        landing = (self.phase("land"),)
+        monkeypatch.setattr(
+            "companion.flight.flight.exit_phases",
+            lambda _, exit_: landing if exit_ is Exit.LAND else (),
+        )
+        self.rig = SimpleNamespace(
+            config=SimpleNamespace(flight=None),
+            programme=SimpleNamespace(duration=1.0),
+            link=SimpleNamespace(family=None, state=SimpleNamespace(forget=lambda: None)),
+            guide=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
+            ground=SimpleNamespace(standing=False),
+            same_vehicle=SimpleNamespace(begin=self.begin),
+            release=lambda: None,
+            detail="",
+        )
+        self.watch = SimpleNamespace(judge=lambda phase: judge(self, phase))
+
+    def phase(self, name, on_failure=Exit.LEAVE):
+        async def work(_):
+            self.done.append(name)
+
+        return Phase(name, "nothing", work, 5.0, on_failure)
+
+    def begin(self):
+        self.begun += 1
+
+    def fly(self):
+        async def run():
+            flight = Flight(self.rig, self.watch, Silent(), None)
+            return await flight.run(), [text for _, text in flight.events]
+
+        return asyncio.run(run())
+
+
+def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch):
+    def judge(bench, phase):
+        if phase.name == "programme" and bench.begun == 0:
+            raise ChecksVoid("another vehicle answers")
+
+    bench = Bench(monkeypatch, judge)
+    result, events = bench.fly()
+    assert (result, bench.done) == ("ok", ["checks", "checks", "programme"])
+    assert events == ["another vehicle answers; the checks are made anew"]
+
+
+def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
+    def judge(_, phase):
+        if phase.name == "programme":
+            raise ChecksVoid("another vehicle answers")
+
+    result, _ = Bench(monkeypatch, judge).fly()
+    assert result == "the vehicle changed 5 times before it was armed"
+
+
+@pytest.mark.parametrize("also_landing", [False, True])
+def test_a_fault_of_ours_as_a_phase_begins_leaves_no_ending_out(monkeypatch, also_landing):
+    def judge(_, phase):
+        if phase.name == "programme" or (also_landing and phase.name == "land"):
+            raise ZeroDivisionError("a fault of ours")
+
+    bench = Bench(monkeypatch, judge)
+    result, _ = bench.fly()
+    assert result == "internal error: ZeroDivisionError('a fault of ours')"
+    assert bench.done == ["checks", "land"]
