@@ -229,7 +229,9 @@ def _next_flight(vehicle, modes, left):
 
 
 def hover_minutes(vehicle, minutes=10.0):
-    flight = vehicle.fly(hover={"duration_s": 60.0 * minutes})
+    """As docs/companion-computer.md advises for a computer that has other work, too."""
+    realtime = {"scheduler": "fifo", "lock_memory": True, "freeze_gc": True}
+    flight = vehicle.fly(hover={"duration_s": 60.0 * minutes}, realtime=realtime)
     event = flight.until_obeyed()
     flight.finish(60.0 * minutes + 180.0)
     result, flown = flight.result, round(time.monotonic() - event)
