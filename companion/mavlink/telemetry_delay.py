@@ -26,6 +26,10 @@ class _Compared(NamedTuple):
     half: float
     delay: float
 
+    def error(self, now: float) -> float:
+        """By how much its delay may be wrong at `now`, s."""
+        return self.half + MOST_DRIFT * (now - self.at)
+
 
 class TelemetryDelay:
     """The delay of the quickest sample, from the best exchange of late.
@@ -80,8 +84,8 @@ class TelemetryDelay:
         told = [each for each in self._compared if each.at <= before]
         if not told:
             return 0.0
-        best = min(told, key=lambda each: each.half + MOST_DRIFT * (before - each.at))
-        return best.delay + best.half + MOST_DRIFT * (before - best.at)
+        best = min(told, key=lambda each: each.error(before))
+        return best.delay + best.error(before)
 
     def shorten(self, by: float, now: float) -> None:
         """The quickest sample is `by` s quicker than those that were compared with; both in s."""
@@ -112,6 +116,6 @@ class TelemetryDelay:
             self.forget(self.unknown)
             return
         self.known = True
-        best = min(compared, key=lambda each: each.half + MOST_DRIFT * (now - each.at))
+        best = min(compared, key=lambda each: each.error(now))
         self.seconds = max(0.0, best.delay)
-        self.error = best.half + MOST_DRIFT * (now - best.at)
+        self.error = best.error(now)
