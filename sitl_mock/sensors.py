@@ -74,6 +74,10 @@ class Estimator:
         self._offset = (n + position_ned[0], e + position_ned[1], d + position_ned[2])
         self.reset_counter += 1
 
+    def as_estimated(self, q: Quaternion) -> Quaternion:
+        """A true attitude in the world as it is believed to lie."""
+        return multiply(self._yaw, q)
+
     def estimate(self) -> Estimate:
         """The estimate now; draws fresh noise."""
         config = self._config
@@ -85,7 +89,7 @@ class Estimator:
         n, e, d = place.position
         off_n, off_e, off_d = self._offset
         turn_x, turn_y, turn_z = self._noise(0.5 * radians(config.attitude_noise_deg))
-        turned = multiply(multiply(self._yaw, (w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
+        turned = multiply(self.as_estimated((w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
         gyro = _add((rates[0], rates[1], rates[2]), self._noise(config.rate_noise_rad_s))
         return Estimate(
             normalise(turned),

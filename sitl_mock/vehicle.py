@@ -15,6 +15,7 @@ from sitl_mock.ground import Ground
 from sitl_mock.multirotor import ZERO, Multirotor
 from sitl_mock.physics import Load
 from sitl_mock.quaternion import Quaternion, Vector, from_yaw
+from sitl_mock.rate_shaping import Shaped
 from sitl_mock.rotors import Four
 from sitl_mock.sensors import Estimate, Estimator, Snapshot
 from sitl_mock.wind import Wind
@@ -153,6 +154,12 @@ class Vehicle:
     def estimate(self) -> Estimate:
         """What the autopilot believes now; every call draws fresh noise."""
         return self._estimator.estimate()
+
+    @property
+    def attitude_target(self) -> Shaped | None:
+        """The shaped attitude target and its rates, in the world as estimated; None: there is none."""
+        shaped = self._multirotor.shaped
+        return shaped and shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
         """An estimator reset: the estimate jumps by this yaw (rad) and position (m)."""
