@@ -105,8 +105,12 @@ class RateShaping:
         ahead = multiply((w, -x, -y, -z), q)  # the body as the attitude target sees it
         turn_x, turn_y, turn_z = rotation_vector(ahead)
         roll, pitch, yaw = to_body(ahead, rates)
-        x, y, z = self._closing
-        return roll - closing(turn_x, *x), pitch - closing(turn_y, *y), yaw - closing(turn_z, *z)
+        for_roll, for_pitch, for_yaw = self._closing
+        return (
+            roll - closing(turn_x, *for_roll),
+            pitch - closing(turn_y, *for_pitch),
+            yaw - closing(turn_z, *for_yaw),
+        )
 
     def idle(self, setpoint: Vector) -> None:
         """A step without control: the attitude target is forgotten, setpoints are delayed."""

@@ -157,7 +157,7 @@ class Vehicle:
 
     @property
     def attitude_target(self) -> Shaped | None:
-        """The shaped attitude target and its rates, in the world as estimated; None: there is none."""
+        """The shaped attitude target in the world as estimated, and its rates; None: none."""
         shaped = self._multirotor.shaped
         return shaped and shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
