@@ -27,13 +27,17 @@ VEHICLES = ("px4", "ardupilot", "mock-px4", "mock-ardupilot")
 def main() -> int:
     """Fly what the command line asks for; 1 if a flight failed."""
     options = _options()
+    changes = _changed(options.set)
+    if options.fifo:
+        changes = merged({"realtime": {"scheduler": "fifo"}}, changes)
     rows = fly(
         options.vehicle,
         options.flights,
         options.out / f"{options.vehicle}-{time.strftime('%Y%m%d-%H%M%S')}",
         airframe=options.airframe,
         start=options.start,
-        changes=_changed(options.set),
+        changes=changes,
+        fifo=options.fifo,
         base=[path.resolve() for path in options.include],
     )
     print(table.markdown(rows))
@@ -49,12 +53,13 @@ def fly(
     start: list[str] | None = None,
     changes: dict | None = None,
     base: list[Path] | None = None,
+    fifo: bool = False,
 ) -> list[dict]:
     """Fly on one vehicle without restarting it; rows are printed and kept in `folder`."""
     folder = folder.resolve()
     folder.mkdir(parents=True)
     rows: list[dict] = []
-    with simulation(name, folder, AIRFRAMES[airframe], start or []) as vehicle:
+    with simulation(name, folder, AIRFRAMES[airframe], start or [], fifo) as vehicle:
         flying = Flying(vehicle, changes or {}, base or [])
         for asked in flights:
             flight, _, times = asked.partition("*")
@@ -69,7 +74,7 @@ def fly(
 
 
 @contextmanager
-def simulation(name: str, folder: Path, airframe: Airframe, start: list[str]):
+def simulation(name: str, folder: Path, airframe: Airframe, start: list[str], fifo: bool):
     """A vehicle that flies: the mock in lockstep, or a real autopilot."""
     autopilot = name.removeprefix("mock-")
     if name != autopilot:
@@ -80,7 +85,9 @@ def simulation(name: str, folder: Path, airframe: Airframe, start: list[str]):
             mock.close()
         return
     arguments = [*airframe.arguments(autopilot, folder), *start]
-    with real_vehicle(autopilot, *arguments, folder=folder / autopilot, relayed=False) as vehicle:
+    with real_vehicle(
+        autopilot, *arguments, folder=folder / autopilot, relayed=False, fifo=fifo
+    ) as vehicle:
         yield vehicle
 
 
@@ -100,6 +107,10 @@ def _options():
         help="a configuration above the one that ships, such as identify's vehicle.yaml",
     )  # fmt: skip
     parser.add_argument("--airframe", choices=list(AIRFRAMES), default="stock")
+    parser.add_argument(
+        "--fifo", action="store_true",
+        help="program and autopilot before all others on this computer (SCHED_FIFO)",
+    )  # fmt: skip
     parser.add_argument("--start", action="append", help="more arguments of `start`, one each")
     parser.add_argument("--out", type=Path, default=Path("flights") / "real")
     return parser.parse_args()

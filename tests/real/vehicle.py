@@ -216,14 +216,29 @@ def started(vehicle, config: dict, folder: Path, command: str = "fly", prelude: 
 
 
 @contextmanager
-def real_vehicle(autopilot: str, *arguments: str, folder: Path | None = None, relayed: bool = True):
-    """Start it, alone on this machine, and stop it afterwards whatever happens."""
+def real_vehicle(
+    autopilot: str,
+    *arguments: str,
+    folder: Path | None = None,
+    relayed: bool = True,
+    fifo: bool = False,
+):
+    """Start it, alone on this machine, and stop it afterwards whatever happens.
+
+    Args:
+        autopilot: px4 or ardupilot.
+        arguments: of its `start`.
+        folder: where it keeps its files; null: a temporary one.
+        relayed: whether a `Relay` stands between it and the program.
+        fifo: before other programs of this computer (SCHED_FIFO), where that is allowed.
+    """
     folder = folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))
+    before = ["chrt", "-f", "40"] if fifo else []
     with Path(f"/tmp/{autopilot}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
         start, stop = REAL / autopilot / "start", REAL / "stop"
         try:
-            subprocess.run([start, folder, *arguments], check=True, capture_output=True)
+            subprocess.run([*before, start, folder, *arguments], check=True, capture_output=True)
             vehicle = Vehicle(autopilot, folder, relayed=relayed)
             try:
                 yield vehicle
