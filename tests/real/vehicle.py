@@ -63,11 +63,15 @@ class Vehicle:
         self.autopilot, self.folder = autopilot, folder
         vehicle_port, port = PORTS[autopilot]
         self.relay = Relay(autopilot, vehicle_port, port) if relayed else None
+        # ArduPilot boots when a client comes to its first port, and must keep it until it runs.
+        first = None
         if autopilot == "ardupilot" and not relayed:
-            boot("127.0.0.1", vehicle_port)
+            first = socket.create_connection(("127.0.0.1", vehicle_port))
         self.endpoint = DIRECT[autopilot] if self.relay is None else self.relay.endpoint
         self.station = Station(autopilot)
         self.station.until(lambda: self.station.told, 60.0, "heartbeat")
+        if first is not None:
+            first.close()
         self.station.ask_for_rates()
         self.flown: list[Flight] = []
         self._logs: dict[Path, DataflashLog] = {}
@@ -139,13 +143,6 @@ class Vehicle:
 
     def load(self) -> str:
         return " ".join(f"{each:.1f}" for each in os.getloadavg())
-
-
-def boot(host: str, port: int) -> None:
-    """ArduPilot boots when the first client comes, and goes on when it leaves."""
-    with socket.create_connection((host, port)) as client:
-        client.settimeout(20.0)
-        client.recv(1)
 
 
 class Flight:
