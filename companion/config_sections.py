@@ -5,7 +5,7 @@ Every field's description is also what an editor shows, through the JSON Schema.
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, StrictBool, model_validator
 
@@ -91,22 +91,40 @@ Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
 AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
+class AxisKeys(NamedTuple):
+    """How one axis of the rate loop answers; None: not known, of the limit: there is none."""
+
+    lag_ms: float | None
+    dead_time_ms: float | None
+    acceleration_limit_deg_s2: float | None
+
+    def but(self, *keys: float | None) -> "AxisKeys":
+        """These, but for the `keys` that are not None."""
+        return AxisKeys(*(a if b is None else b for a, b in zip(self, keys, strict=True)))
+
+
 class VehicleConfig(Section):
     """How the vehicle's own rate loop answers; `model-following` plans with it."""
 
     lag_ms: Milliseconds | None = None
-    """Time constant of the roll and pitch rates after their dead time."""
+    """Time constant of the roll rate after its dead time."""
     dead_time_ms: Milliseconds | None = None
-    """From an attitude sample to the first effect of its answer on roll and pitch."""
+    """From an attitude sample to the first effect of its answer on the roll rate."""
     acceleration_limit_deg_s2: AccelerationLimit | None = None
-    """The autopilot changes the roll and pitch rates it aims at no faster (ArduPilot); null: it
-    does not limit this (PX4)."""
+    """The autopilot changes the roll rate it aims at no faster (ArduPilot); null: it does not limit
+    this (PX4)."""
+    pitch_lag_ms: Milliseconds | None = None
+    """The same time constant for pitch; null: that of roll."""
+    pitch_dead_time_ms: Milliseconds | None = None
+    """The same dead time for pitch; null: that of roll."""
+    pitch_acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """The same limit for pitch; null: that of roll."""
     yaw_lag_ms: Milliseconds | None = None
-    """The same time constant for yaw; null: that of roll and pitch."""
+    """The same time constant for yaw; null: that of roll."""
     yaw_dead_time_ms: Milliseconds | None = None
-    """The same dead time for yaw; null: that of roll and pitch."""
+    """The same dead time for yaw; null: that of roll."""
     yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
-    """The same limit for yaw; null: that of roll and pitch."""
+    """The same limit for yaw; null: that of roll."""
     yaw_frame_lead_ms: Milliseconds = 0.0
     """By how long the axes along which the autopilot takes our rates turn before the body does, in
     yaw more than in tilt: ArduPilot's attitude target. 0: they are the body's own (PX4)."""
@@ -115,6 +133,18 @@ class VehicleConfig(Section):
     def known(self) -> bool:
         """Whether `model-following` can plan with it."""
         return self.lag_ms is not None and self.dead_time_ms is not None
+
+    @property
+    def axes(self) -> "dict[str, AxisKeys]":
+        """What is known of roll, pitch and yaw, by name; what is null of the last two is roll's."""
+        roll = AxisKeys(self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2)
+        pitch = (
+            self.pitch_lag_ms,
+            self.pitch_dead_time_ms,
+            self.pitch_acceleration_limit_deg_s2,
+        )
+        yaw = self.yaw_lag_ms, self.yaw_dead_time_ms, self.yaw_acceleration_limit_deg_s2
+        return {"roll": roll, "pitch": roll.but(*pitch), "yaw": roll.but(*yaw)}
 
 
 class LimitsConfig(Section):

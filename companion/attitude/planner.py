@@ -108,7 +108,7 @@ def make_planner(
             `limits.max_tilt` it is also the largest tilt of a target, with every planner.
             `model-following` takes what `RateResponse` holds: `lag` and `dead_time` of the rate
             loop, s (0 by default: it follows at once), `acceleration`, rad/s² (None: no limit), the
-            same with `yaw_` before them (those of roll and pitch by default), `frame_lead`, s.
+            same with `pitch_` or `yaw_` before them (None: those of roll), `frame_lead`, s.
 
     Raises:
         TypeError: an option that the planner does not take.
@@ -129,18 +129,31 @@ def _model_following(
     lag: float = 0.0,
     dead_time: float = 0.0,
     acceleration: float | None = None,
+    pitch_lag: float | None = None,
+    pitch_dead_time: float | None = None,
+    pitch_acceleration: float | None = None,
     yaw_lag: float | None = None,
     yaw_dead_time: float | None = None,
     yaw_acceleration: float | None = None,
     frame_lead: float = 0.0,
     **options: Any,
 ) -> Planner:
-    tilt = AxisResponse(lag, dead_time, inf if acceleration is None else acceleration)
-    yaw = AxisResponse(
-        lag if yaw_lag is None else yaw_lag,
-        dead_time if yaw_dead_time is None else yaw_dead_time,
-        tilt.acceleration if yaw_acceleration is None else yaw_acceleration,
+    roll = AxisResponse(lag, dead_time, inf if acceleration is None else acceleration)
+    response = RateResponse(
+        roll,
+        _or_as(roll, pitch_lag, pitch_dead_time, pitch_acceleration),
+        _or_as(roll, yaw_lag, yaw_dead_time, yaw_acceleration),
+        frame_lead,
     )
-    return ModelFollowingPlanner(
-        make_constants(gain, yaw_gain, limits, **options), RateResponse(tilt, yaw, frame_lead)
+    return ModelFollowingPlanner(make_constants(gain, yaw_gain, limits, **options), response)
+
+
+def _or_as(
+    roll: AxisResponse, lag: float | None, dead_time: float | None, acceleration: float | None
+) -> AxisResponse:
+    """An axis of which these are known; what is None is as roll's."""
+    return AxisResponse(
+        roll.lag if lag is None else lag,
+        roll.dead_time if dead_time is None else dead_time,
+        roll.acceleration if acceleration is None else acceleration,
     )

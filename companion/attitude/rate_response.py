@@ -26,8 +26,7 @@ class RateResponse:
     """The response of all axes.
 
     Attributes:
-        tilt: of roll and pitch.
-        yaw: of yaw.
+        roll, pitch, yaw: of each axis.
         frame_lead: s by which the axes along which the autopilot takes the rates are ahead of the
             body in yaw: ArduPilot's attitude target turns before the body does. 0 where they are
             the body's own (PX4).
@@ -36,22 +35,31 @@ class RateResponse:
         ValueError: a time is negative, longer than 1 s or not finite, or a limit not positive.
     """
 
-    tilt: AxisResponse = AxisResponse()
+    roll: AxisResponse = AxisResponse()
+    pitch: AxisResponse = AxisResponse()
     yaw: AxisResponse = AxisResponse()
     frame_lead: float = 0.0
 
     def __post_init__(self) -> None:
-        times = {
-            "lag": self.tilt.lag,
-            "dead_time": self.tilt.dead_time,
-            "yaw_lag": self.yaw.lag,
-            "yaw_dead_time": self.yaw.dead_time,
-            "frame_lead": self.frame_lead,
-        }
-        for name, value in times.items():
-            if not 0.0 <= value <= _LONGEST:
-                raise ValueError(f"{name} must be from 0 to {_LONGEST:g} s, not {value}")
-        limits = {"acceleration": self.tilt.acceleration, "yaw_acceleration": self.yaw.acceleration}
-        for name, value in limits.items():
-            if not value > 0.0:
-                raise ValueError(f"{name} must be positive, not {value}")
+        _check_time("frame_lead", self.frame_lead)
+        axes = {"": self.roll, "pitch_": self.pitch, "yaw_": self.yaw}
+        for prefix, axis in axes.items():
+            _check_time(f"{prefix}lag", axis.lag)
+            _check_time(f"{prefix}dead_time", axis.dead_time)
+            if not axis.acceleration > 0.0:
+                raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
+
+    @property
+    def tilt(self) -> AxisResponse:
+        """The mean of roll and pitch, limited as the one with the lower limit."""
+        roll, pitch = self.roll, self.pitch
+        return AxisResponse(
+            0.5 * (roll.lag + pitch.lag),
+            0.5 * (roll.dead_time + pitch.dead_time),
+            min(roll.acceleration, pitch.acceleration),
+        )
+
+
+def _check_time(name: str, value: float) -> None:
+    if not 0.0 <= value <= _LONGEST:
+        raise ValueError(f"{name} must be from 0 to {_LONGEST:g} s, not {value}")

@@ -48,8 +48,7 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
             source="summary.json",
         )
         return
-    tilt, yaw = config.vehicle.dead_time_ms, config.vehicle.yaw_dead_time_ms
-    configured = {"roll": tilt, "pitch": tilt, "yaw": tilt if yaw is None else yaw}
+    configured = {name: axis.dead_time_ms for name, axis in config.vehicle.axes.items()}
     axes = {
         name: AxisDeadTime(measured.get(name), None if value is None else _MS * value)
         for name, value in configured.items()

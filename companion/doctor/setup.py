@@ -8,8 +8,7 @@ from companion.mavlink.parameter_rules import Setup
 
 def autopilot_setup(config: Config) -> Setup:
     """The configuration in SI, as far as the autopilot's parameters have to agree with it."""
-    tilt_limit = config.vehicle.acceleration_limit_deg_s2
-    yaw_limit = config.vehicle.yaw_acceleration_limit_deg_s2 or tilt_limit
+    limits = {name: axis.acceleration_limit_deg_s2 for name, axis in config.vehicle.axes.items()}
     return Setup(
         source_system=config.link.source_system,
         attitude_rate_hz=config.link.attitude_rate_hz,
@@ -18,8 +17,9 @@ def autopilot_setup(config: Config) -> Setup:
         curve_factor=config.thrust.curve_factor,
         battery_exponent=config.thrust.battery_exponent,
         tilt_compensated=config.thrust.autopilot_compensates_tilt,
-        tilt_acceleration_limit=None if tilt_limit is None else radians(tilt_limit),
-        yaw_acceleration_limit=None if yaw_limit is None else radians(yaw_limit),
+        acceleration_limits={
+            name: None if limit is None else radians(limit) for name, limit in limits.items()
+        },
         max_tilt=radians(config.limits.max_tilt_deg),
         signs=config.link.signing_key_file is not None,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
+from companion.config_sections import AxisKeys
 from companion.flight.asking_again import AskingAgain
 from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
@@ -110,12 +111,15 @@ def vehicle_response(config: Config) -> dict[str, float]:
     times = {
         "lag": vehicle.lag_ms,
         "dead_time": vehicle.dead_time_ms,
+        "pitch_lag": vehicle.pitch_lag_ms,
+        "pitch_dead_time": vehicle.pitch_dead_time_ms,
         "yaw_lag": vehicle.yaw_lag_ms,
         "yaw_dead_time": vehicle.yaw_dead_time_ms,
         "frame_lead": vehicle.yaw_frame_lead_ms,
     }
     limits = {
         "acceleration": vehicle.acceleration_limit_deg_s2,
+        "pitch_acceleration": vehicle.pitch_acceleration_limit_deg_s2,
         "yaw_acceleration": vehicle.yaw_acceleration_limit_deg_s2,
     }
     response = {key: _MS * value for key, value in times.items() if value is not None}
@@ -123,15 +127,18 @@ def vehicle_response(config: Config) -> dict[str, float]:
 
 
 def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
-    """What `vehicle` says of roll, pitch and yaw; what it does not say of yaw is as for the two."""
-    known = vehicle_response(config)
-    tilt = RateLoop(known.get("lag"), known.get("dead_time"), known.get("acceleration"))
-    yaw = RateLoop(
-        known.get("yaw_lag", tilt.lag),
-        known.get("yaw_dead_time", tilt.dead_time),
-        known.get("yaw_acceleration", tilt.acceleration_limit),
+    """What `vehicle` says of roll, pitch and yaw."""
+    roll, pitch, yaw = (_rate_loop(axis) for axis in config.vehicle.axes.values())
+    return roll, pitch, yaw
+
+
+def _rate_loop(axis: AxisKeys) -> RateLoop:
+    lag, dead_time, limit = axis
+    return RateLoop(
+        None if lag is None else _MS * lag,
+        None if dead_time is None else _MS * dead_time,
+        None if limit is None else radians(limit),
     )
-    return tilt, tilt, yaw
 
 
 def rate_limits(config: Config) -> Limits:

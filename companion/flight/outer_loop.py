@@ -38,31 +38,40 @@ _POSITION_TIME = 0.1
 
 def tilt_response(config: Config) -> InnerResponse:
     """How the coefficients answer their targets: the planner behind the vehicle's rate loop."""
-    gain, vehicle = config.planner.gain_per_s, config.vehicle
-    lag, follows = _MS * (vehicle.lag_ms or 0.0), config.planner_name == MODEL_FOLLOWING
+    gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
+    follows = config.planner_name == MODEL_FOLLOWING
     if follows:
         lag = model_lag(gain, lag)
-    return InnerResponse(gain, lag, _acts_after(config, vehicle.dead_time_ms), follows)
+    return InnerResponse(gain, lag, _acts_after(config, dead_time), follows)
+
+
+def slower_tilt(config: Config) -> tuple[float, float]:
+    """Lag and dead time of roll or pitch, whichever is longer, s; 0 where it is not known.
+
+    The quicker axis waits for the slower one, so that the coefficients answer like this.
+    """
+    axes = config.vehicle.axes
+    tilt = axes["roll"], axes["pitch"]
+    return (
+        _MS * max(axis.lag_ms or 0.0 for axis in tilt),
+        _MS * max(axis.dead_time_ms or 0.0 for axis in tilt),
+    )
 
 
 def heading_response(config: Config) -> InnerResponse:
     """How the heading answers its target."""
-    vehicle = config.vehicle
-    lag = vehicle.lag_ms if vehicle.yaw_lag_ms is None else vehicle.yaw_lag_ms
-    dead_time = (
-        vehicle.dead_time_ms if vehicle.yaw_dead_time_ms is None else vehicle.yaw_dead_time_ms
-    )
+    yaw = config.vehicle.axes["yaw"]
     return InnerResponse(
         config.planner.yaw_gain_per_s,
-        _MS * (lag or 0.0),
-        _acts_after(config, dead_time),
+        _MS * (yaw.lag_ms or 0.0),
+        _acts_after(config, _MS * (yaw.dead_time_ms or 0.0)),
         config.planner_name == MODEL_FOLLOWING,
     )
 
 
-def _acts_after(config: Config, dead_time_ms: float | None) -> float:
+def _acts_after(config: Config, dead_time: float) -> float:
     """A command is held for a period of guidance: on average it is half of one late, s."""
-    return _MS * (dead_time_ms or 0.0) + 0.5 / config.guidance.rate_hz
+    return dead_time + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
@@ -142,7 +151,7 @@ def predictive_settings(config: Config) -> Settings:
             gain=config.planner.gain_per_s,
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
-            dead_time=_MS * (config.vehicle.dead_time_ms or 0.0),
+            dead_time=slower_tilt(config)[1],
             drag=drag_prior(config).drag.linear,
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),

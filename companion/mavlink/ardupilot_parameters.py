@@ -100,16 +100,14 @@ def _battery_failsafe(value: float, values: Values, _: Setup) -> Complaint | Non
     )
 
 
-def _acceleration(axis: str, name: str, *, yaw: bool) -> tuple[ParameterRule, ParameterRule]:
+def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
     meaning = f"how quickly the {name} rate may change"
     return (
-        ParameterRule(
-            (f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, yaw=yaw), _MEASURED
-        ),
+        ParameterRule((f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, name), _MEASURED),
         ParameterRule(
             (f"ATC_ACCEL_{axis}_MAX",),
             f"{meaning}, in hundredths of a degree (before 4.7)",
-            acceleration_limit(_CENTI, yaw=yaw),
+            acceleration_limit(_CENTI, name),
             _REFERENCE,
         ),
     )
@@ -153,9 +151,9 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         at_most(INEFFECTIVE, 0.3, "levelling takes long when our setpoints stop", 0.15),
         _REFERENCE,
     ),
-    *_acceleration("R", "roll", yaw=False),
-    *_acceleration("P", "pitch", yaw=False),
-    *_acceleration("Y", "yaw", yaw=True),
+    *_acceleration("R", "roll"),
+    *_acceleration("P", "pitch"),
+    *_acceleration("Y", "yaw"),
     ParameterRule(
         ("FS_GCS_ENABLE",),
         "what ArduPilot does when the ground station's heartbeat stops",

@@ -145,12 +145,18 @@ def our_system(value: float, _: Values, setup: Setup) -> Complaint | None:
     )
 
 
-def acceleration_limit(unit: float, *, yaw: bool) -> Check:
-    """The limit that the planner reckons with is the autopilot's; `unit` is its unit in degrees."""
-    key = "vehicle.yaw_acceleration_limit_deg_s2" if yaw else "vehicle.acceleration_limit_deg_s2"
+def acceleration_limit(unit: float, axis: str) -> Check:
+    """The limit that the planner reckons with is the autopilot's.
+
+    Args:
+        unit: the parameter's unit in °/s².
+        axis: `roll`, `pitch` or `yaw`.
+    """
+    prefix = "" if axis == "roll" else f"{axis}_"
+    key = f"vehicle.{prefix}acceleration_limit_deg_s2"
 
     def check(value: float, _: Values, setup: Setup) -> Complaint | None:
-        limit = setup.yaw_acceleration_limit if yaw else setup.tilt_acceleration_limit
+        limit = setup.acceleration_limits[axis]
         theirs = unit * value
         if limit is None:
             agrees = theirs == 0.0

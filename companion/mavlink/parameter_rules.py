@@ -25,8 +25,8 @@ class Setup(NamedTuple):
         curve_factor: Of the thrust curve that we make up for; 0: none.
         battery_exponent: Of the battery's voltage that we make up for; 0: none.
         tilt_compensated: Whether it is to divide thrust by cos(tilt) itself.
-        tilt_acceleration_limit: Of roll and pitch, as the planner has it, rad/s²; `None`: no limit.
-        yaw_acceleration_limit: Of yaw.
+        acceleration_limits: Of `roll`, `pitch` and `yaw`, as the planner has them, rad/s²; `None`:
+            no limit.
         max_tilt: Largest tilt of a target, rad.
         signs: Whether we sign what we send, and refuse what is not signed.
     """
@@ -38,8 +38,7 @@ class Setup(NamedTuple):
     curve_factor: float
     battery_exponent: float
     tilt_compensated: bool
-    tilt_acceleration_limit: float | None
-    yaw_acceleration_limit: float | None
+    acceleration_limits: Mapping[str, float | None]
     max_tilt: float
     signs: bool
 

@@ -96,10 +96,12 @@ def test_the_body_turns_as_limit_and_lag_make_it(most):
 @pytest.mark.parametrize(
     ("axes", "named"),
     [
-        ({"tilt": AxisResponse(lag=-0.001)}, "lag must be from 0 to 1 s, not -0.001"),
+        ({"roll": AxisResponse(lag=-0.001)}, "lag must be from 0 to 1 s, not -0.001"),
         ({"yaw": AxisResponse(lag=np.nan)}, "yaw_lag must"),
+        ({"pitch": AxisResponse(lag=2.0)}, "pitch_lag must"),
+        ({"pitch": AxisResponse(acceleration=-1.0)}, "pitch_acceleration must be positive"),
         ({"yaw": AxisResponse(dead_time=1.5)}, "yaw_dead_time must"),
-        ({"tilt": AxisResponse(acceleration=0.0)}, "acceleration must be positive, not 0.0"),
+        ({"roll": AxisResponse(acceleration=0.0)}, "acceleration must be positive, not 0.0"),
         ({"yaw": AxisResponse(acceleration=np.nan)}, "yaw_acceleration must be positive"),
         ({"frame_lead": -0.1}, "frame_lead must"),
     ],

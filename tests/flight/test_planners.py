@@ -157,6 +157,7 @@ def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
     path = tmp_path / "vehicle.yaml"
     path.write_text(
         "vehicle: {lag_ms: 30, dead_time_ms: 45, acceleration_limit_deg_s2: 900, yaw_lag_ms: 90,\n"
+        "  pitch_lag_ms: 40, pitch_dead_time_ms: 25, pitch_acceleration_limit_deg_s2: 800,\n"
         "  yaw_acceleration_limit_deg_s2: 200, yaw_frame_lead_ms: 50}\n"
     )
     q, rates = attitude(Coefficients(0.1, 0.2), 0.3), BodyRates(0.0, 0.2, -0.4)
@@ -168,6 +169,9 @@ def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
         lag=0.03,
         dead_time=0.045,
         acceleration=math.radians(900),
+        pitch_lag=0.04,
+        pitch_dead_time=0.025,
+        pitch_acceleration=math.radians(800),
         yaw_lag=0.09,
         yaw_acceleration=math.radians(200),
         frame_lead=0.05,

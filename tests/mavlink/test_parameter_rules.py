@@ -18,15 +18,17 @@ PX4_SETUP = Setup(
     curve_factor=0.0,
     battery_exponent=2.0,
     tilt_compensated=False,
-    tilt_acceleration_limit=None,
-    yaw_acceleration_limit=None,
+    acceleration_limits={"roll": None, "pitch": None, "yaw": None},
     max_tilt=radians(35.0),
     signs=False,
 )
 ARDUPILOT_SETUP = PX4_SETUP._replace(
     hover_thrust=0.364,
-    tilt_acceleration_limit=radians(1100.0),
-    yaw_acceleration_limit=radians(270.0),
+    acceleration_limits={
+        "roll": radians(1100.0),
+        "pitch": radians(1100.0),
+        "yaw": radians(270.0),
+    },
 )
 # As recorded on the ground, but for the battery's action and what that vehicle did not tell.
 GOOD_PX4 = {
