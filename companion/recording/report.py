@@ -85,7 +85,11 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
 
 
 def _measured(axis: AxisDeadTime) -> str:
-    return "too little turned to tell" if axis.measured is None else _milliseconds(axis.measured)
+    return (
+        "not enough undisturbed rotation to measure"
+        if axis.measured is None
+        else _milliseconds(axis.measured)
+    )
 
 
 def _milliseconds(value: float | None) -> str:
