@@ -13,8 +13,9 @@ import numpy as np
 import yaml
 
 from companion.demo import free_port
+from tests.real.build import ROOT
 from tests.real.truth import Truth, truth_from
-from tests.real.vehicle import ROOT, Flight, merged, started
+from tests.real.vehicle import Flight, merged, started
 
 _POLLED_S = 0.0005
 """Between two questions for the truth; in lockstep vehicle time runs several times as fast."""
