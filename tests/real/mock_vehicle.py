@@ -1,5 +1,6 @@
 """The mock vehicle in the place of a real autopilot: the same flights, the same measures."""
 
+import itertools
 import json
 import os
 import socket
@@ -89,7 +90,7 @@ def _filled(rows: Floats) -> Floats:
         rows: (n, 7), rising: time s, position m, velocity m/s.
     """
     parts = [rows[:, :4]]
-    for (t0, *a), (t1, *b) in zip(rows[:-1], rows[1:], strict=True):
+    for (t0, *a), (t1, *b) in itertools.pairwise(rows):
         h = t1 - t0
         if not _FILLED_S < h < _LONGEST_S:
             continue
