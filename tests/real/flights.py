@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import yaml
 
-from tests.real.vehicle import ROOT, merged
+from tests.real.build import ROOT
+from tests.real.vehicle import merged
 
 SIMULATION = {
     # The program arms: nobody holds a transmitter.
