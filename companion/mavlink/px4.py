@@ -86,6 +86,7 @@ class Px4:
         }
     )
     interval_step_us = 1
+    rates_along_target = False
     dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True)
     parameters = PX4_PARAMETERS
 
