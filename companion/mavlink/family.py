@@ -60,6 +60,7 @@ class AutopilotFamily(Protocol):
         rates_along_target: Whether it takes body rates along the axes of ATTITUDE_TARGET, an
             attitude that they turn before the body follows. Else along the body's own.
         dead_man: What it does when setpoints stop.
+        unready_in: What the modes are to a flight in which it stands disarmed and never is ready.
         parameters: Those that matter to a flight by body rates.
     """
 
@@ -72,6 +73,7 @@ class AutopilotFamily(Protocol):
     interval_step_us: int
     rates_along_target: bool
     dead_man: DeadMan
+    unready_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
