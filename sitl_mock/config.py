@@ -3,6 +3,7 @@
 The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; see README.
 """
 
+from collections.abc import Mapping
 from math import radians
 from pathlib import Path
 from typing import Annotated, Self
@@ -21,8 +22,34 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+AIRFRAMES: dict[str, dict[str, object]] = {
+    "sih": {},
+    # PX4's SIH with SIH_MASS 1.2, SIH_IXX 0.04, SIH_IYY 0.03, SIH_KDV 0.5: the same rotors.
+    "unlike-axes": {
+        "mass_kg": 1.2,
+        "inertia_kg_m2": (0.04, 0.03, 0.03),
+        "drag_n_s_per_m": 0.5,
+        "thrust_slope_m_s2": 19.55 / 1.2,
+        "thrust_offset_m_s2": 0.22 / 1.2,
+    },
+}
+"""What the words that may stand for a whole airframe mean: what differs from the defaults."""
+
+
+def _meaning(words: Mapping[str, object], value: object, what: str) -> object:
+    """Return what a word stands for, and anything else as it is."""
+    if not isinstance(value, str):
+        return value
+    if value not in words:
+        raise ValueError(f"known {what} are {', '.join(words)}")
+    return words[value]
+
+
 class AirframeConfig(Section):
-    """Body and rotors of a symmetric X quadrotor, and how it meets the ground."""
+    """Body and rotors of an X quadrotor, and how it meets the ground.
+
+    The word `sih` or `unlike-axes` in its place stands for all of it.
+    """
 
     physics_rate_hz: Annotated[int, Field(ge=1000, le=10000)] = 1000
     """Physics steps per second of vehicle time."""
@@ -52,6 +79,11 @@ class AirframeConfig(Section):
     """Touching the ground faster than this (down) breaks the vehicle."""
     ground_levelling_ms: Positive = 50.0
     """Time constant with which the landing gear levels the standing vehicle."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        return _meaning(AIRFRAMES, value, "airframes")
 
 
 class AxisShaping(Section):
@@ -156,11 +188,7 @@ class RateLoopConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        if not isinstance(value, str):
-            return value
-        if value not in RATE_LOOPS:
-            raise ValueError(f"known rate loops are {', '.join(RATE_LOOPS)}")
-        return RATE_LOOPS[value]
+        return _meaning(RATE_LOOPS, value, "rate loops")
 
     @model_validator(mode="after")
     def _shaped_whole(self) -> Self:

@@ -17,6 +17,7 @@ MISTAKES = {
     "faults: [{kind: drop, probabilty: 1}]": ("did you mean probability?",),
     "faults: [{kind: dropp}]": ("mock.faults.0", "'drop'"),
     "lockstep: 5": ("mock.lockstep",),
+    "airframe: heavy": ("mock.airframe", "sih, unlike-axes"),
     "rate_loop: {roll: {proportional: 1}}": ("mock.rate_loop.roll",),
 }
 

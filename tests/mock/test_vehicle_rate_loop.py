@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from sitl_mock.config import AxisGains, RateLoopConfig, SensorConfig
+from sitl_mock.config import AirframeConfig, AxisGains, RateLoopConfig, SensorConfig
 from sitl_mock.rate_loop import AT_REST, RateLoop, axis_law, axis_step
 from sitl_mock.vehicle import ActuatorCommand, Vehicle
 
@@ -31,10 +31,10 @@ def command(axis, rate, thrust=HOVER):
     return ActuatorCommand(True, *rates, thrust)
 
 
-def airborne():
-    vehicle = Vehicle(sensors=NOISELESS, seed=0)
+def airborne(airframe=None, thrust=0.6):
+    vehicle = Vehicle(airframe, sensors=NOISELESS, seed=0)
     for _ in range(2000):
-        vehicle.step(command(YAW, 0.0, thrust=0.6))
+        vehicle.step(command(YAW, 0.0, thrust=thrust))
     assert not vehicle.on_ground
     return vehicle
 
@@ -91,6 +91,33 @@ def test_yaw_answers_as_measured(rate):
     assert dead_time == pytest.approx(0.045, abs=0.008)
     assert gain == pytest.approx(0.92, abs=0.01)
     assert rms_from(t, y, MEASURED_YAW) < 0.01
+
+
+def first_order(t, lag, dead_time):
+    return 1.0 - np.exp(-np.maximum(t - dead_time, 0.0) / lag)
+
+
+@pytest.mark.parametrize(("axis", "lag", "dead_time"), [(ROLL, 73, 54), (PITCH, 57, 46)])
+def test_unlike_axes_answer_as_identified_on_px4(axis, lag, dead_time):
+    """By a doublet, as `identify` flies it (SIH_MASS 1.2, SIH_IXX 0.04, SIH_IYY 0.03)."""
+    airframe = AirframeConfig.model_validate("unlike-axes")
+    hover = (airframe.gravity_m_s2 - airframe.thrust_offset_m_s2) / airframe.thrust_slope_m_s2
+    assert hover == pytest.approx(0.59, abs=0.003)
+    vehicle = airborne(airframe, thrust=0.7)
+    times, parts = np.arange(1.6, step=PERIOD / 1e3), ((0.0, 1.05), (0.25, -2.1), (0.75, 2.1))
+    rates = []
+    for step in range(1600):
+        if step % PERIOD == 0:
+            rates.append(vehicle.estimate().body_rates[axis])
+        now = step / 1000
+        vehicle.step(command(axis, sum(size for at, size in parts if at <= now <= 1.0), hover))
+
+    def doublet(t, lag, dead_time):
+        late = (*parts, (1.0, -1.05))
+        return sum(size * first_order(t - at, lag, dead_time) for at, size in late)
+
+    fit = curve_fit(doublet, times, rates, p0=(0.06, 0.05))[0]
+    assert fit == pytest.approx((lag / 1e3, dead_time / 1e3), abs=0.005)
 
 
 def test_setpoints_are_not_clipped():
