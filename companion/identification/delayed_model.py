@@ -70,11 +70,11 @@ class DelayedModel:
         )
 
     def dead_time(self, unknown: Floats) -> float:
-        """s."""
+        """Of these unknowns, s."""
         return float(unknown[self._delay])
 
     def slew(self, unknown: Floats) -> float | None:
-        """Per second; None where the unknowns have none."""
+        """The limit of these unknowns, per second; None where they have none."""
         return exp(unknown[-1]) if unknown.size > self._delay + 1 else None
 
     def search(self, start: Floats) -> Solution:

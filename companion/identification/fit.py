@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.fitting import Solution
-from companion.identification.delayed_model import DEAD_TIMES, DelayedModel
+from companion.identification.delayed_model import DelayedModel
 from companion.identification.models import FirstOrder, Model, SecondOrder, frequency_damping
 from companion.identification.record import Stretch, most_excited
 from companion.identification.residual_analysis import Residuals, analyse
@@ -62,6 +62,15 @@ class SecondOrderFit:
     gain: float
     slew: float | None
     explained: float
+
+    @property
+    def described(self) -> str:
+        """In one line."""
+        return (
+            f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
+            f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
+            f"{self.explained:.1%}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +174,7 @@ def _second_order(
     )
     data = DelayedModel(record, model, None, first.thinning)
     best = data.search(start)
-    if best.squares >= _CLEARLY * found.squares:
+    if best.squares > _CLEARLY * found.squares:
         return None
     frequency, damping = frequency_damping(best.unknown)
     return SecondOrderFit(

@@ -1,4 +1,4 @@
-"""Exact response of a second-order loop to commands in straight pieces: two lags, or two complex ones.
+"""Exact response of a second-order loop to commands in straight pieces.
 
 ẍ = ω²·(v − x) − 2ζω·ẋ has the lags τ = 1/(ω·(ζ ± √(ζ² − 1))), and by partial fractions
 x = (τ₁·x₁ − τ₂·x₂)/(τ₁ − τ₂) with xᵢ the response of the lag τᵢ alone.
@@ -36,7 +36,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
 
 def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
-    """(m, 2): the two ways in which what is left of the start dies away, `since` (m,) seconds on."""
+    """(m, 2), how the state at the start dies away, `since` (m,) seconds later."""
     first, second = _lags(frequency, damping)
     if first.imag:
         turning = np.exp(-since / first)
