@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config import Finite, Fraction, NonNegative, Positive, Section
 from sitl_mock.config_errors import suggestion
+from sitl_mock.section import Finite, Fraction, NonNegative, Positive, Section
 
 _MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
 
