@@ -240,7 +240,8 @@ class SigningConfig(Section):
 
     passphrase_file: Path
     """Its first line is the passphrase; the key is its SHA-256, as ground stations make it."""
-    accept_unsigned: bool = False
-    """Obey frames without a signature, too; wrongly signed ones never."""
+    accept_unsigned: bool | None = None
+    """Obey frames without a signature, too; wrongly signed ones never. Null: as the autopilot does,
+    ArduPilot on the companion's link (its SERIAL0), PX4 on none."""
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
     """Of the companion's link in our signatures; the ground station's has the next."""

@@ -65,6 +65,14 @@ class FreezeClock(Timed):
     kind: Literal["freeze_clock"]
 
 
+class SlipClock(Timed):
+    """The vehicle stands still for a moment, and its clock does not catch up (paced time only)."""
+
+    kind: Literal["slip_clock"]
+    slip_ms: Annotated[float, Field(gt=0.0, le=60_000.0)] = 12.0
+    """How far the clock falls behind; ArduPilot's simulator on a busy computer: 10 to 16."""
+
+
 class NanField(Timed):
     """One float field of one message is NaN."""
 
@@ -121,6 +129,7 @@ class GpsLoss(Timed):
 VehicleFault = (
     StopTelemetry
     | FreezeClock
+    | SlipClock
     | NanField
     | PilotTakeover
     | EstimatorReset
