@@ -1,6 +1,6 @@
 """Rows of flights as one page: `python -m tests.real.table FOLDER...` reads their rows.jsonl.
 
-`--into docs/real-autopilots.md` puts the page between the marks in that file, instead of printing it.
+`--into docs/real-autopilots.md` puts the page between the marks in that file.
 
 Figures are medians over the flights of one kind. `mock` is the truth of the same flight on the mock
 with that autopilot's personality, where it was flown, and `ratio` that of the real one to it.
