@@ -77,7 +77,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
     return places
 
 
-def decays(places: np.ndarray, off=0.5) -> bool:
-    """Whether the hold has come to rest, more or less: no limit cycle, nothing that grows."""
-    third = len(places) // 3
-    return bool(np.isfinite(places).all() and np.abs(places[-third:]).max() < 0.2 * off)
+def settled(places: np.ndarray, off: float) -> bool:
+    """Whether it has come to rest, but for a tenth: nothing swings on, nothing grows."""
+    last = len(places) // 4
+    return bool(np.isfinite(places).all() and np.abs(places[-last:]).max() < 0.1 * off)

@@ -13,10 +13,11 @@ from companion.recording.learned_file import LearnedFile
 from companion.yaml_file import ConfigError, parse
 from tests.flight.fly import fly, mock_vehicle
 
-UNKNOWN = {"guidance": {"drag_per_s": None}}
+BUNDLED = f"{5283920058631409231:016x}"
+"""Hardware id of the bundled vehicles."""
 CIRCLE = {
     "flight": {"programme": ["circle"]},
-    "circle": {"radius_m": 4.0, "speed_m_s": 3.0, "laps": 1.0},
+    "circle": {"radius_m": 4.0, "speed_m_s": 3.0, "laps": 0.6},
     "limits": {"max_tilt_deg": 40.0},
 }
 
@@ -27,16 +28,15 @@ def remembered(folder, told=False):
     return VehicleMemory(folder, estimate, told, notes.append), estimate, notes
 
 
-def test_the_next_flight_begins_with_what_was_learned(tmp_path):
+def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_path):
     with mock_vehicle(tmp_path, seed=3) as mock:
-        first = fly(mock, tmp_path / "first", **CIRCLE, **UNKNOWN)
-        assert first.result == "ok", first.events
-        assert not any("earlier flight" in text for _, text in first.events)
-        (file,) = tmp_path.glob("learned-*.json")
-        second = fly(mock, tmp_path / "second", **UNKNOWN, hover={"duration_s": 0.5})
-    (told,) = [text for _, text in second.events if "earlier flight" in text]
-    assert file.name in told
-    kept, _ = LearnedFile(tmp_path, file.stem.removeprefix("learned-")).load()
+        LearnedFile(tmp_path, BUNDLED).save(Drag(0.7), 3.0)
+        flown = fly(mock, tmp_path / "log", **CIRCLE, guidance={"drag_per_s": None})
+    assert flown.result == "ok", flown.events
+    (told,) = [text for _, text in flown.events if "earlier flight" in text]
+    assert "0.70 1/s + 0.000 1/m" in told
+    assert f"learned-{BUNDLED}.json" in told
+    kept, _ = LearnedFile(tmp_path, BUNDLED).load()
     assert kept.drag.per_velocity(3.0) == pytest.approx(1.0, abs=0.08)
 
 
