@@ -32,6 +32,8 @@ _LOCKSTEP_DEADLINE = 1.0
 """The vehicle waits for the answer, s of wall time."""
 _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
+_USUAL_RATE_LOOP = 0.12
+"""Lag and dead time of a rate loop that nobody identified, s: a heavy vehicle's."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
 
@@ -80,7 +82,7 @@ def hold_weights(config: Config) -> Weights:
     With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
     own. `tests/flight/test_margins.py` shows what may be wrong with T and with the thrust then.
     """
-    guidance, delay = config.guidance, tilt_response(config).slowness
+    guidance, delay = config.guidance, _delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
         1.0 / delay**4 if position is None else position,
@@ -91,7 +93,13 @@ def hold_weights(config: Config) -> Weights:
 def disturbance_bandwidth(config: Config) -> float:
     """How quickly wind is found, rad/s: as is told, or half as quick again as the hold."""
     told = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / tilt_response(config).slowness if told is None else told
+    return 1.5 / _delay(config) if told is None else told
+
+
+def _delay(config: Config) -> float:
+    """T, s: with a usual rate loop where the vehicle's is not known."""
+    delay = tilt_response(config).slowness
+    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
