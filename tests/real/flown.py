@@ -1,6 +1,7 @@
 """One flight: flown, and measured from what it recorded and from the truth beside it."""
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,12 @@ class Flying:
         self._base = [shipped(vehicle.autopilot), *base]
         self._identified: Path | None = None
 
-    def __call__(self, flight: str, folder: Path) -> list[dict]:
+    def __call__(self, flight: str, folder: Path) -> Iterator[dict]:
         """Fly it; a row for it, or for each of a series."""
         if flight == "ten":
-            return [{"flight": "ten", "planner": "", **row} for row in ten(self._vehicle, folder)]
+            for row in ten(self._vehicle, folder):
+                yield {"flight": "ten", "planner": "", **row}
+            return
         folder.mkdir(parents=True)
         try:
             if flight == "identify":
@@ -47,7 +50,7 @@ class Flying:
         except (AssertionError, NoTruthError, OSError) as error:
             row = {"error": str(error)}
             self._vehicle.bring_down()
-        return [{"flight": flight, "planner": "", "load": self._vehicle.load(), **row}]
+        yield {"flight": flight, "planner": "", "load": self._vehicle.load(), **row}
 
     def _identify(self, folder: Path) -> dict:
         config = merged(configuration("hover", self._base, folder, self._changes), _ALONE)
