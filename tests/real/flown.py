@@ -10,6 +10,7 @@ from companion.mavlink.tlog_file import messages
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
 from tests.real.measures import straightness, tracking_errors
+from tests.real.stamps import stamp_offset
 from tests.real.truth import Floats, NoTruthError
 from tests.real.vehicle import merged
 
@@ -98,10 +99,14 @@ class Flying:
         log = Path(result["log"])
         tracking = _rows(log / "tracking.csv")
         assert len(tracking) > 2, "hardly anything was flown under control"
+        offset = stamp_offset(_rows(log / "rates.csv"), log / "flight.tlog")
+        tracking[:, 0] += offset
         truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
         out: dict = {"reported": result["tracking"]}
         if (log / "response.csv").exists():
-            found = straightness(_rows(log / "response.csv"), truth, result["gain_per_s"])
+            response = _rows(log / "response.csv")
+            response[:, 0] += offset
+            found = straightness(response, truth, result["gain_per_s"])
             if found is not None:
                 told = result["response"]
                 out["cross_axis"] = {"reported": told["cross_axis_max"], **found}
