@@ -74,6 +74,7 @@ class Flying:
         self._vehicle.blow(asked.variant == "wind")
         arrival = time.monotonic()
         flight = self._vehicle.launch(config, folder=folder / "flight")
+        self._vehicle.face_north(flight)
         result = flight.finish(_LONGEST_S)
         self._vehicle.bring_down()
         if "log" not in result or result["log"] is None:
