@@ -6,15 +6,18 @@ from sitl_mock.ardupilot_boot import RECORDED_READY_S
 from sitl_mock.ardupilot_thrust import specific_thrust
 from sitl_mock.config import AirframeConfig, AxisGains, RateLoopConfig
 
-ROTOR_LAG_MS = 28.0
-"""Specific thrust answers with this time constant."""
+BURST_MS = 5.6
+"""Wall time from burst to burst of the simulator's telemetry (measured: 5.4 to 5.8)."""
+ROTOR_LAG_MS = 22.5
+"""Specific thrust answers with this time constant (measured: 5 ms behind a dead time of 15 ms)."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
     "thrust_offset_m_s2": 0.0,
     "rotor_lag_ms": ROTOR_LAG_MS,
-    # Fitted to the recorded flight by rates, at up to 6 m/s.
-    "drag_n_s_per_m": 0.37,
+    # Measured: 0.31 per second at 2 m/s, 0.41 at 5 m/s.
+    "drag_n_s_per_m": 0.25,
+    "quadratic_drag_n_s2_per_m2": 0.033,
 }
 
 BATTERY: dict[str, Any] = {
@@ -70,7 +73,8 @@ RATE_LOOP = _rate_loop()
 
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     """Return the settings given, what they leave open filled in."""
-    filled = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, **section}
+    own = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
+    filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY)):
