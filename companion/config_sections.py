@@ -10,6 +10,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, StrictBool, model_validator
 
 from companion.attitude import PLANNER_NAMES
+from companion.drag import Drag
 from companion.yaml_file import PathKey, Section
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -234,8 +235,18 @@ class GuidanceConfig(Section):
     """Vertical speed per metre of height error."""
     climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 3.5
     """Vertical acceleration per m/s of vertical speed error."""
-    drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.0
-    """Linear drag per mass, fed forward on the reference's velocity."""
+    drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    """Linear drag per mass, which is fed forward. null: not known; flight learns it, as it corrects
+    a number, and the next flight of the vehicle begins with what was learned."""
+    quadratic_drag_per_m: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Quadratic drag per mass, where drag_per_s is a number: the vehicle is slowed down by
+    (drag_per_s + quadratic_drag_per_m·speed)·speed."""
+
+    @property
+    def drag(self) -> Drag | None:
+        """The drag as far as it is told."""
+        told = self.drag_per_s
+        return None if told is None else Drag(told, self.quadratic_drag_per_m)
 
 
 class NmpcConfig(Section):

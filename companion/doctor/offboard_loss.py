@@ -7,6 +7,7 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.doctor.evidence import Evidence
 from companion.doctor.finding import Finding, Key
+from companion.drag import Drag
 from companion.guidance import Pose, Reference, Sequence
 from companion.guidance.fence import Fence
 from companion.guidance.offboard_loss import (
@@ -18,6 +19,7 @@ from companion.guidance.offboard_loss import (
     tilted_thrust,
 )
 from companion.guidance.reference import Vector
+from companion.known_drag import least_drag
 from companion.mavlink.parameter_checks import LONGEST_HELD, shortest_hold
 from companion.mavlink.parameter_rules import Verdict
 
@@ -87,7 +89,8 @@ def worst_reach(config: Config, programme: Sequence, held: float, *, brakes: boo
         safety.braking_m_s2,
         safety.reaction_s,
     )
-    drag, max_tilt_rate = config.guidance.drag_per_s, radians(limits.max_tilt_rate_deg_s)
+    drag = least_drag(config)
+    max_tilt_rate = radians(limits.max_tilt_rate_deg_s)
     loss, worst = Loss(held, brakes, drag, max_tilt_rate, fence), Worst()
     for time, flown in _flown(config, programme, drag):
         there = reach(flown, loss)
@@ -124,7 +127,7 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
     return None
 
 
-def _flown(config: Config, programme: Sequence, drag: float) -> Iterator[tuple[float, Flown]]:
+def _flown(config: Config, programme: Sequence, drag: Drag) -> Iterator[tuple[float, Flown]]:
     """What is flown over the maneuvers; open-loop steps are answered as the attitude law does."""
     gain = config.planner.gain_per_s
     period = max(_PERIOD, programme.duration / _MOST)
@@ -149,15 +152,16 @@ def _flown(config: Config, programme: Sequence, drag: float) -> Iterator[tuple[f
         yield time, Flown(place, velocity, thrust, (turn_north, turn_east, 0.0))
         tilt = tilt_after
         north, east, _ = tilted_thrust(*tilt)
+        slowed = drag.deceleration(velocity)
         velocity = (
-            velocity[0] + (north - drag * velocity[0]) * period,
-            velocity[1] + (east - drag * velocity[1]) * period,
+            velocity[0] + (north - slowed[0]) * period,
+            velocity[1] + (east - slowed[1]) * period,
             0.0,
         )
         place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
 
 
-def _thrust(told: Reference, drag: float) -> Vector:
+def _thrust(told: Reference, drag: Drag) -> Vector:
     return path_thrust(told.acceleration_ned, told.velocity_ned, drag)
 
 

@@ -26,6 +26,7 @@ from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, Sequence, ThrustSettings
+from companion.known_drag import drag_prior
 from companion.mavlink.inbox import Notice
 from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
@@ -165,7 +166,7 @@ def hover_thrust(config: Config) -> HoverThrust:
             battery_exponent=thrust.battery_exponent,
             lag=_MS * (thrust.lag_ms or 0.0),
             tilt_compensated=thrust.autopilot_compensates_tilt,
-            drag=config.guidance.drag_per_s,
+            drag=drag_prior(config).drag.linear,
         )
     )
 

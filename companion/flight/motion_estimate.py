@@ -111,6 +111,7 @@ class MotionEstimate:
             self._q,
             self._body_rates,
             (*situation.disturbance, 0.0),
+            situation.drag,
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
@@ -120,12 +121,14 @@ class MotionEstimate:
 
     def surprise(self) -> str | None:
         """In words, where the drag is another than the configuration says."""
-        configured, learned = self._drag.configured, self._drag.drag
-        if not self._drag.certain or abs(learned - configured) <= _WORTH_TELLING:
+        told, learned, speed = self._drag.first, self._drag.drag, self._drag.top_speed
+        off = learned.per_velocity(speed) - told.per_velocity(speed)
+        if not self._drag.certain or abs(off) <= _WORTH_TELLING:
             return None
         return (
-            f"the vehicle's drag is {learned:.2f} 1/s, and guidance.drag_per_s says "
-            f"{configured:.2f}; set it to {learned:.2f}"
+            f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, and "
+            f"{told.per_velocity(speed):.2f} was assumed; set guidance.drag_per_s to "
+            f"{learned.linear:.2f} and guidance.quadratic_drag_per_m to {learned.quadratic:.3f}"
         )
 
     def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: Horizontal) -> None:
@@ -133,17 +136,16 @@ class MotionEstimate:
         if not 0.0 < dt < _LONGEST:
             return
         old, new = before.velocity_ned, now.velocity_ned
+        north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
+        # Of the thrust that there was, not of the one asked for.
+        vertical = GRAVITY - down
         self._drag.observe(
             dt,
-            (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1])),
-            (
-                (new[0] - old[0]) / dt - self.vertical * slope[0],
-                (new[1] - old[1]) / dt - self.vertical * slope[1],
-            ),
+            (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
+            (north - vertical * slope[0], east - vertical * slope[1]),
         )
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration by thrust and drag, m/s²."""
-        north, east, _ = motion.velocity_ned
-        drag = self._drag.drag
-        return self.vertical * slope[0] - drag * north, self.vertical * slope[1] - drag * east
+        slowed = self._drag.drag.deceleration(motion.velocity_ned)
+        return self.vertical * slope[0] - slowed[0], self.vertical * slope[1] - slowed[1]

@@ -22,6 +22,7 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.known_drag import drag_prior
 from companion.nmpc import Settings, Solver
 from companion.yaml_file import ConfigError
 
@@ -77,6 +78,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
     tilt, heading = tilt_response(config), heading_response(config)
+    drag = drag_prior(config).drag.linear
     weights = Weights(guidance.position_weight_per_s4, guidance.velocity_weight_per_s2)
     if _identifies(config):
         weights = _CALM
@@ -84,7 +86,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, tilt_response(config).slowness, guidance.drag_per_s),
+            gains=chain_gains(weights, tilt_response(config).slowness, drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
@@ -111,7 +113,7 @@ def motion_estimate(
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
     settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), DragEstimate(guidance.drag_per_s), offset)
+    return MotionEstimate(MotionObserver(settings), DragEstimate(drag_prior(config)), offset)
 
 
 def thrust_limits(config: Config) -> tuple[float, float]:
@@ -150,7 +152,6 @@ def predictive_settings(config: Config) -> Settings:
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=slower_tilt(config)[1],
-            drag=config.guidance.drag_per_s,
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
             max_yaw_rate=radians(limits.max_yaw_rate_deg_s),

@@ -9,6 +9,7 @@ import numpy as np
 from companion import trajectory_file
 from companion.config import Config
 from companion.config_programmes import IdentifyConfig
+from companion.drag import Drag
 from companion.flight.fence_check import FenceCheck
 from companion.flight.follow import Follow
 from companion.flight.outer_loop import thrust_limits
@@ -25,6 +26,7 @@ from companion.guidance import (
 )
 from companion.guidance.fence import Place
 from companion.guidance.predicted import predicted
+from companion.known_drag import least_drag, most_drag
 from companion.trajectory import (
     Envelope,
     Motion,
@@ -72,7 +74,7 @@ def require_inside(config: Config, parts: Iterable[Programme], origin: Place | N
     """
     check = _fence_check(config, origin)
     for part in parts:
-        for motion in _motions(part, config.guidance.drag_per_s):
+        for motion in _motions(part, least_drag(config)):
             _refuse(part.name, check(motion))
 
 
@@ -82,7 +84,7 @@ def _part(config: Config, name: str) -> Programme:
     part = _simple(config, name)
     require_inside(config, [part], None)
     if isinstance(part, Circle):
-        (motion,) = _motions(part, config.guidance.drag_per_s)
+        (motion,) = _motions(part, least_drag(config))
         for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
             _refuse(part.name, broken)
     return part
@@ -108,7 +110,7 @@ def _simple(config: Config, name: str) -> Programme:
             return _doublets(config.identify)
 
 
-def _motions(part: Programme, drag: float) -> Iterator[Motion]:
+def _motions(part: Programme, drag: Drag) -> Iterator[Motion]:
     """How the vehicle moves in it; with rates of the body, whatever its heading is."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
@@ -171,7 +173,7 @@ def _envelope(config: Config) -> Envelope:
         max_descent=limits.max_descent_m_s,
         max_speed=config.safety.max_speed_m_s,
         fence=_fence_check(config, None),
-        drag=config.guidance.drag_per_s,
+        drag=most_drag(config),
         gravity=GRAVITY,
     )
 

@@ -1,71 +1,140 @@
 """The drag there is, learned from how the vehicle slows down against what its thrust gives."""
 
-from math import exp
+from dataclasses import dataclass
+from math import hypot, isfinite, sqrt
 
+import numpy as np
+
+from companion.drag import Drag
 from companion.guidance.horizontal import Horizontal
+from companion.guidance.reference import Vector
 
-_MEMORY = 20.0
-"""What is older counts ever less, s."""
-_PRIOR = 20.0
-"""What the configured drag counts as, in (m/s)² of moving about, a sample each."""
-_LARGEST = 2.0
-"""By so much the drag may be larger than the configured one, 1/s."""
-_TOLD = 300.0
-"""So much moving about tells it well enough to speak of it, in the unit of `_PRIOR`."""
+_WINDOW = 0.2
+"""Of one measurement, s: a velocity's noise counts less against a longer change."""
+_NOISE = 0.2
+"""Standard deviation of a measurement, m/s²: the velocity's noise, and the thrust's direction."""
+_WIND = 2.0
+"""Standard deviation of the acceleration by wind at first, m/s²,"""
+_WIND_CHANGE = 0.2
+"""and of its change within a second."""
+_CLIPPED = 3.0
+"""A measurement counts for no more standard deviations than these: a bump is not drag."""
+_MOST_ABOVE = 2.0
+"""The learned drag is at most this much larger than at first, 1/s,"""
+_MOST_QUADRATIC = 0.3
+"""and the quadratic drag at most this, 1/m."""
+_CERTAIN = 0.1
+"""Standard deviation of the drag at the top speed with which it counts as known, 1/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class DragPrior:
+    """What is believed of the drag before the vehicle has moved.
+
+    Attributes:
+        drag: the most likely.
+        linear_deviation: standard deviation of the linear drag, 1/s.
+        quadratic_deviation: standard deviation of the quadratic drag, 1/m.
+    """
+
+    drag: Drag
+    linear_deviation: float
+    quadratic_deviation: float
+
+
+ANY_VEHICLE = DragPrior(Drag(0.3), 0.4, 0.03)
+"""A multirotor that nobody knows: between 0.2/s (bare frame) and 1/s (PX4's simulated vehicle)."""
 
 
 class DragEstimate:
-    """Least squares of v̇ − thrust = wind − drag·v over the last moments, north and east alike.
+    """Least squares of v̇ − thrust = wind − (linear + quadratic·|v|)·v, recursive, over the flight.
 
-    The steady part is wind; only what changes with the velocity is drag.
+    The wind changes slowly; what changes with the velocity is drag. A Kalman filter of linear and
+    quadratic drag, which stay, and of the acceleration by wind (north, east), which wanders.
 
     Attributes:
-        configured: linear drag per mass, 1/s.
+        first: the drag that it began with.
     """
 
-    def __init__(self, configured: float) -> None:
-        self.configured = configured
-        self._most = configured + _LARGEST
-        self._weight = 0.0
-        self._speed: list[float] = [0.0, 0.0]
-        self._left: list[float] = [0.0, 0.0]
-        self._squares = self._products = 0.0
+    def __init__(self, prior: DragPrior) -> None:
+        self.begin(prior)
+
+    def begin(self, prior: DragPrior) -> None:
+        """Forget all but `prior`."""
+        self.first = prior.drag
+        self._top_speed = 0.0
+        self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0])
+        self._covariance = np.diag(
+            [prior.linear_deviation**2, prior.quadratic_deviation**2, _WIND**2, _WIND**2]
+        )
+        self._drag = prior.drag
+        self._forget_window()
 
     @property
-    def drag(self) -> float:
-        """What is known by now, 1/s."""
-        squares, products = self._centred()
-        found = (_PRIOR * self.configured - products) / (_PRIOR + squares)
-        return min(max(found, 0.0), self._most)
+    def drag(self) -> Drag:
+        """What is known by now."""
+        return self._drag
 
     @property
     def certain(self) -> bool:
         """Whether the vehicle has moved about enough to tell."""
-        return self._centred()[0] > _TOLD
+        speed, p = self._top_speed, self._covariance
+        variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
+        return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN
 
-    def _centred(self) -> tuple[float, float]:
-        """Σ(v − v̄)² and Σ(v − v̄)·left, of both axes."""
-        squares, products = self._squares, self._products
-        if self._weight > 0.0:
-            for speed, left in zip(self._speed, self._left, strict=True):
-                squares -= speed * speed / self._weight
-                products -= speed * left / self._weight
-        return squares, products
+    @property
+    def top_speed(self) -> float:
+        """The fastest mean speed of a window so far, m/s."""
+        return self._top_speed
 
-    def observe(self, dt: float, velocity: Horizontal, left: Horizontal) -> None:
-        """Take what the thrust does not explain.
+    def observe(self, dt: float, velocity: Vector, left: Horizontal) -> None:
+        """Take what the thrust does not explain; what is not finite is passed over.
 
         Args:
             dt: over which it was measured, s.
-            velocity: meanwhile, m/s.
+            velocity: meanwhile, m/s, NED.
             left: acceleration that was measured, less that by thrust, m/s².
         """
-        kept = exp(-dt / _MEMORY)
-        self._weight = kept * self._weight + 1.0
-        self._squares *= kept
-        self._products *= kept
+        speed = hypot(*velocity)
+        if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*left))) or dt <= 0.0:
+            return
         for axis in (0, 1):
-            self._speed[axis] = kept * self._speed[axis] + velocity[axis]
-            self._left[axis] = kept * self._left[axis] + left[axis]
-            self._squares += velocity[axis] * velocity[axis]
-            self._products += velocity[axis] * left[axis]
+            self._passed[axis] += dt * velocity[axis]
+            self._squared[axis] += dt * speed * velocity[axis]
+            self._left[axis] += dt * left[axis]
+        self._span += dt
+        if self._span >= _WINDOW:
+            self._learn()
+            self._forget_window()
+
+    def _learn(self) -> None:
+        """Take the window as one measurement of each axis."""
+        span = self._span
+        self._top_speed = max(self._top_speed, hypot(*self._passed) / span)
+        for wind in (2, 3):
+            self._covariance[wind, wind] += span * _WIND_CHANGE**2
+        for axis in (0, 1):
+            row = np.zeros(4)
+            row[0], row[1] = -self._passed[axis] / span, -self._squared[axis] / span
+            row[2 + axis] = 1.0
+            spread = self._covariance @ row
+            variance = float(row @ spread) + _NOISE**2
+            off, most = (
+                self._left[axis] / span - float(row @ self._state),
+                _CLIPPED * sqrt(variance),
+            )
+            gain = spread / variance
+            self._state = self._state + gain * min(max(off, -most), most)
+            self._covariance = self._covariance - np.outer(gain, spread)
+        self._drag = self._bounded()
+
+    def _bounded(self) -> Drag:
+        """The most likely drag within the bounds: where one of the two is at its, the other's."""
+        (linear, quadratic), p = self._state[:2].tolist(), self._covariance
+        within = min(max(quadratic, 0.0), _MOST_QUADRATIC)
+        linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
+        return Drag(min(max(linear, 0.0), self.first.linear + _MOST_ABOVE), within)
+
+    def _forget_window(self) -> None:
+        self._span = 0.0
+        self._passed, self._squared, self._left = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]

@@ -6,6 +6,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from companion.attitude import Coefficients, Target
+from companion.drag import Drag
 from companion.guidance.height import HeightGains, acceleration_down
 from companion.guidance.horizontal import Horizontal, limited
 from companion.guidance.inner_response import InnerResponse
@@ -46,7 +47,7 @@ class Situation(NamedTuple):
         acts: motion as it will be when what is commanded now acts.
         thrust: horizontal acceleration by the thrust there is, m/s².
         disturbance: horizontal acceleration that nobody asked for, m/s².
-        drag: linear drag per mass, 1/s.
+        drag: of the vehicle.
         thrust_limits: smallest and largest specific thrust there is, m/s².
     """
 
@@ -54,7 +55,7 @@ class Situation(NamedTuple):
     acts: VehicleMotion
     thrust: Horizontal
     disturbance: Horizontal
-    drag: float
+    drag: Drag
     thrust_limits: tuple[float, float]
 
 
@@ -106,13 +107,13 @@ class LinearGuidance:
     def _feedback(self, now: Reference, acts: Reference, situation: Situation) -> Horizontal:
         """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
         settings, gains = self._settings, self._settings.gains
-        wanted = []
+        wanted, slowed = [], situation.drag.deceleration(situation.now.velocity_ned)
         for axis in (0, 1):
             place = situation.acts.position_ned[axis] - acts.position_ned[axis]
             speed = situation.acts.velocity_ned[axis] - acts.velocity_ned[axis]
             acceleration = (
                 situation.thrust[axis]
-                - situation.drag * situation.now.velocity_ned[axis]
+                - slowed[axis]
                 + situation.disturbance[axis]
                 - now.acceleration_ned[axis]
             )
@@ -128,9 +129,10 @@ class LinearGuidance:
         self, reference: Reference, more: Horizontal, down: float, situation: Situation
     ) -> Coefficients:
         """Of the thrust that gives the reference's acceleration and `more` against drag."""
+        slowed = situation.drag.deceleration(reference.velocity_ned)
         north, east = limited(
-            reference.acceleration_ned[0] + situation.drag * reference.velocity_ned[0] + more[0],
-            reference.acceleration_ned[1] + situation.drag * reference.velocity_ned[1] + more[1],
+            reference.acceleration_ned[0] + slowed[0] + more[0],
+            reference.acceleration_ned[1] + slowed[1] + more[1],
             self._settings.max_horizontal,
         )
         north, east, down = height_first((north, east, down), *situation.thrust_limits)

@@ -1,7 +1,7 @@
 """How far the last body rates carry a vehicle whose setpoints have ended: a simple worst case.
 
 The autopilot holds the last rates and the last thrust. So the thrust axis goes on turning along a
-great circle, while linear drag slows the vehicle. What feedback had added to the rates may have any
+great circle, while drag slows the vehicle. What feedback had added to the rates may have any
 direction: it widens the result by a spread. Then the autopilot's failsafe levels the vehicle, and
 brakes or lets it drift. Compared with the bundled vehicles by `tests/flight/test_killed.py`.
 """
@@ -9,6 +9,7 @@ brakes or lets it drift. Compared with the bundled vehicles by `tests/flight/tes
 from math import acos, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
+from companion.drag import Drag
 from companion.guidance.fence import Fence
 from companion.guidance.reference import GRAVITY, Vector
 
@@ -47,14 +48,14 @@ class Loss(NamedTuple):
     Attributes:
         held: For how long the autopilot holds the last rates, s.
         brakes: Whether it stops the vehicle then; else the vehicle drifts on until drag ends it.
-        drag: Linear drag per mass, 1/s; 0 where it is not known.
+        drag: No drag where it is not known.
         max_tilt_rate: Of the rates that are sent, rad/s.
         fence: Its braking formula.
     """
 
     held: float
     brakes: bool
-    drag: float
+    drag: Drag
     max_tilt_rate: float
     fence: Fence
 
@@ -124,11 +125,11 @@ def _hold(flown: Flown, loss: Loss) -> _Held:
     for index in range(_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus(_scaled(axis, cos(angle)), ahead, sin(angle))
-        velocity = _plus(_slowed(velocity, loss.drag * step), thrust, size * step)
+        velocity = _plus(_slowed(velocity, loss.drag, step), thrust, size * step)
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         way = _plus(way, velocity, step)
         stray = 2.0 * size * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
-        extra_speed += (stray - loss.drag * extra_speed) * step
+        extra_speed += (stray - loss.drag.linear * extra_speed) * step
         extra_way += extra_speed * step
         highest = max(highest, -way[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
@@ -141,7 +142,7 @@ def _stop(speed: float, tilt: float, size: float, loss: Loss) -> float:
         return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
     levelled = _level_time(tilt)
     speed += size * sin(min(tilt, 0.5 * pi)) * levelled
-    return speed * levelled + speed / max(loss.drag, _LEAST_DRAG)
+    return speed * levelled + speed / max(loss.drag.linear, _LEAST_DRAG)
 
 
 def _fall(held: _Held, size: float) -> float:
@@ -172,15 +173,17 @@ def _plus(a: Vector, b: Vector, factor: float) -> Vector:
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
-def _slowed(velocity: Vector, share: float) -> Vector:
+def _slowed(velocity: Vector, drag: Drag, span: float) -> Vector:
     """Drag acts along the ground only: what it takes from a fall is not counted on."""
-    return velocity[0] * (1.0 - share), velocity[1] * (1.0 - share), velocity[2]
+    north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
+    return velocity[0] - north * span, velocity[1] - east * span, velocity[2]
 
 
-def path_thrust(acceleration: Vector, velocity: Vector, drag: float) -> Vector:
+def path_thrust(acceleration: Vector, velocity: Vector, drag: Drag) -> Vector:
     """Specific thrust that a path takes, m/s² NED: its acceleration, against drag and gravity."""
     north, east, down = acceleration
-    return north + drag * velocity[0], east + drag * velocity[1], down - GRAVITY
+    slowed = drag.deceleration(velocity)
+    return north + slowed[0], east + slowed[1], down - GRAVITY
 
 
 def tilted_thrust(north: float, east: float) -> Vector:

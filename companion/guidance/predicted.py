@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from math import sqrt, tan
 from typing import NamedTuple
 
+from companion.drag import NO_DRAG, Drag
 from companion.guidance.horizontal import Horizontal, rotated
 from companion.guidance.programmes import Programme
 from companion.guidance.reference import GRAVITY, Pose, Reference, Vector
@@ -25,13 +26,13 @@ class Moment(NamedTuple):
     acceleration: Vector
 
 
-def predicted(part: Programme, heading: float = 0.0, drag: float = 0.0) -> Iterator[Moment]:
+def predicted(part: Programme, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
     """The maneuver at its `check_times`, begun at rest.
 
     Args:
         part: the maneuver.
         heading: at its beginning, rad.
-        drag: linear, per mass, 1/s; against still air.
+        drag: against still air.
     """
     start = Pose((0.0, 0.0, 0.0), heading)
     before, open_loop = 0.0, _OpenLoop(heading, drag)
@@ -50,7 +51,7 @@ def predicted(part: Programme, heading: float = 0.0, drag: float = 0.0) -> Itera
 class _OpenLoop:
     """Horizontal motion by commanded tilt, from rest."""
 
-    def __init__(self, heading: float, drag: float) -> None:
+    def __init__(self, heading: float, drag: Drag) -> None:
         self._heading, self._drag = heading, drag
         self._place = self._speed = (0.0, 0.0)
         self._roll = self._pitch = 0.0
@@ -59,7 +60,8 @@ class _OpenLoop:
         """The moment `span` seconds later, with what the reference commands between."""
         (north, east), (fast_north, fast_east) = self._place, self._speed
         by_tilt = self._acceleration(reference, span)
-        pushed = by_tilt[0] - self._drag * fast_north, by_tilt[1] - self._drag * fast_east
+        slowed = self._drag.deceleration((fast_north, fast_east, 0.0))
+        pushed = by_tilt[0] - slowed[0], by_tilt[1] - slowed[1]
         self._place = (
             north + span * (fast_north + 0.5 * span * pushed[0]),
             east + span * (fast_east + 0.5 * span * pushed[1]),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.drag import Drag
 from companion.trajectory.sample import Trajectory
 
 Floats = NDArray[np.float64]
@@ -58,9 +59,10 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
 class Demand:
     """What the rotors must do for a motion, each (m,).
 
-    The rotors have to give f = a + d·v − g; the body's vertical axis points along it, and turns
-    with the part of ḟ = jerk + d·a that is across f. Differential flatness, as in Faessler, Franchi
-    & Scaramuzza, RA-L 2018, for drag that is the same along all axes.
+    The rotors have to give f = a + d − g, d the deceleration by drag; the body's vertical axis
+    points along it, and turns with the part of ḟ = jerk + ḋ that is across f. Differential
+    flatness, as in Faessler, Franchi & Scaramuzza, RA-L 2018, for drag that is the same along all
+    axes.
 
     Attributes:
         tilt: of f from the vertical, rad.
@@ -73,19 +75,25 @@ class Demand:
     thrust: Floats
 
 
-def demand(motion: Motion, drag: float, gravity: float) -> Demand:
+def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     """What a motion takes.
 
     Args:
         motion: in still air.
-        drag: linear, per mass, 1/s.
+        drag: of the vehicle.
         gravity: m/s².
     """
-    force = motion.acceleration + drag * motion.velocity - np.array([0.0, 0.0, gravity])
-    growth = motion.jerk + drag * motion.acceleration
+    velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)
+    slowed = np.stack(drag.deceleration(velocity), axis=1)
+    force = motion.acceleration + slowed - np.array([0.0, 0.0, gravity])
+    growth = motion.jerk + np.stack(drag.growth(velocity, acceleration), axis=1)
     thrust = np.linalg.norm(force, axis=1)
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), -force[:, 2])
     # Without thrust there is no axis that could turn, and the thrust itself is what is wrong.
     across = np.linalg.norm(np.cross(force, growth), axis=1)
     tilt_rate = np.divide(across, thrust**2, out=np.zeros_like(across), where=thrust > 0.0)
     return Demand(tilt, tilt_rate, thrust)
+
+
+def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+    return vectors[:, 0], vectors[:, 1], vectors[:, 2]

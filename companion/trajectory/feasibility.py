@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.drag import NO_DRAG, Drag
 from companion.trajectory.computable import computable
 from companion.trajectory.demand import Floats, Motion, demand, sampled
 from companion.trajectory.retimed import Slowed
@@ -64,7 +65,7 @@ class Envelope:
         max_descent: downward speed, m/s.
         max_speed: m/s.
         fence: judges where it goes, and where it would stop.
-        drag: linear against still air, equal in all directions, per mass, 1/s.
+        drag: against still air.
         gravity: m/s².
     """
 
@@ -77,7 +78,7 @@ class Envelope:
     max_descent: float | None = None
     max_speed: float | None = None
     fence: Callable[[Motion], Violation | None] | None = None
-    drag: float = 0.0
+    drag: Drag = NO_DRAG
     gravity: float = 9.80665
 
 

@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from companion.config import Config
+from companion.drag import Drag
 from companion.flight.fence_check import MARGIN, FenceCheck
 from companion.flight.programmes import programme, require_inside
 from companion.flight.safety.fence import braking
@@ -150,7 +151,7 @@ def test_the_ideal_doublet_ends_where_it_began():
         assert np.linalg.norm(moments[-1].offset) < 0.05
         far = max(np.hypot(*moment.offset[:2]) for moment in moments)
         assert 2.0 < far < 25.0
-        dragged = max(np.hypot(*moment.offset[:2]) for moment in predicted(part, drag=1.0))
+        dragged = max(np.hypot(*moment.offset[:2]) for moment in predicted(part, drag=Drag(1.0)))
         assert dragged < 0.9 * far
 
 

@@ -1,5 +1,6 @@
 """Trajectories flown whole by linear guidance, with a delayed and noisy position at 30 Hz."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -70,10 +71,11 @@ def test_without_the_lead_it_is_more_than_three_times_worse(eight, tmp_path):
 
 
 def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
-    summary = flown(tmp_path, "circle5.yaml", guidance={"drag_per_s": 0.0})
+    summary = flown(tmp_path, "circle5.yaml", guidance={"drag_per_s": None})
     assert summary.tracking()["position_rms_m"] <= 0.12
     (told,) = [text for _, text in summary.events if "drag" in text]
-    assert "guidance.drag_per_s says 0.00; set it to 0.9" in told
+    assert re.search(r"at 5\.\d m/s is (0.9[5-9]|1.0[0-4]) 1/s, and 0.30 was assumed", told), told
+    assert re.search(r"guidance.drag_per_s to \d.\d\d and guidance.quadratic_drag_per_m to 0", told)
 
 
 def test_what_the_limits_do_not_allow_is_refused_or_slowed_down(tmp_path):

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.attitude import Coefficients
+from companion.drag import Drag
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
@@ -26,10 +27,10 @@ from companion.guidance import (
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²
-DRAG = 0.5  # 1/s
+DRAG = Drag(0.5)
 TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
 SETTINGS = LinearSettings(
-    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, DRAG),
+    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, DRAG.linear),
     height=HeightGains(1.5, 3.5, 2.0, 1.0),
     tilt=TILT,
     heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
@@ -67,11 +68,13 @@ def flown(settings, reference_at, seconds, wind=REST, start=None):
         thrust = GRAVITY * c / math.sqrt(1.0 - c @ c)
         motion = VehicleMotion(tuple(p), tuple(v))
         ahead = guidance.acts_after
-        known = np.array([*thrust, 0.0]) + DRAG * (wind - v)
+        known = np.array([*thrust, 0.0]) + DRAG.linear * (wind - v)
         acts = VehicleMotion(
             tuple(p + ahead * v + 0.5 * ahead**2 * known), tuple(v + ahead * known)
         )
-        situation = Situation(motion, acts, tuple(thrust), tuple(DRAG * wind[:2]), DRAG, THRUST)
+        situation = Situation(
+            motion, acts, tuple(thrust), tuple(DRAG.linear * wind[:2]), DRAG, THRUST
+        )
         target, down = guidance.command(reference_at, t, situation)
         asked.append((target.north, target.east))
         wanted = np.array(asked[max(0, len(asked) - 1 - late)])

@@ -4,13 +4,14 @@ from math import cos, hypot, pi
 
 import pytest
 
+from companion.drag import NO_DRAG, Drag
 from companion.guidance import GRAVITY
 from companion.guidance.fence import Fence
 from companion.guidance.offboard_loss import Flown, Loss, path_thrust, reach
 
 LEVEL, NOTHING = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.0)
 FENCE = Fence(50.0, 30.0, 1.0, (), (), 2.5, 0.3)
-PX4 = Loss(1.0, brakes=True, drag=0.0, max_tilt_rate=pi, fence=FENCE)
+PX4 = Loss(1.0, brakes=True, drag=NO_DRAG, max_tilt_rate=pi, fence=FENCE)
 ARDUPILOT = PX4._replace(brakes=False)
 
 
@@ -36,7 +37,9 @@ def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_r
 
 def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
     east = flown(velocity=(0.0, 5.0, 0.0))
-    slippery, dragged = (reach(east, ARDUPILOT._replace(drag=drag)) for drag in (0.0, 0.5))
+    slippery, dragged = (
+        reach(east, ARDUPILOT._replace(drag=drag)) for drag in (NO_DRAG, Drag(0.5))
+    )
     assert slippery.place[1] > 5.5 + 5.0 / 0.2  # unknown drag: the least that any vehicle has
     assert 5.0 / 0.5 < dragged.place[1] < 0.6 * slippery.place[1]
 
@@ -52,7 +55,7 @@ def test_rates_that_are_held_turn_the_thrust_and_the_longer_the_worse():
 
 
 def test_a_tilted_vehicle_that_turns_through_level_climbs_by_its_surplus_of_thrust():
-    tilted = path_thrust((5.0, 0.0, 0.0), NOTHING, 0.0)
+    tilted = path_thrust((5.0, 0.0, 0.0), NOTHING, NO_DRAG)
     back = (-5.0, 0.0, 0.0)
     surplus = hypot(5.0, GRAVITY) - GRAVITY
     there = reach(flown(thrust=tilted, turn=back), PX4)
@@ -69,6 +72,6 @@ def test_upside_down_it_falls_for_as_long_as_it_takes_to_level():
 
 
 def test_drag_is_part_of_the_thrust_that_a_path_takes():
-    assert path_thrust((1.0, 0.0, -0.5), (2.0, -3.0, 1.0), 0.5) == pytest.approx(
+    assert path_thrust((1.0, 0.0, -0.5), (2.0, -3.0, 1.0), Drag(0.5)) == pytest.approx(
         (2.0, -1.5, -0.5 - GRAVITY)
     )

@@ -1,13 +1,19 @@
 """A ground station on a second link, with a pilot's commands, and what it sees."""
 
+import struct
 import threading
 import time
-from math import acos, cos, degrees, hypot, inf, radians
+from math import acos, cos, degrees, hypot, inf
 from typing import NamedTuple
 
 from pymavlink import mavutil
 
-_EARTH_M = 6371000.0
+from tests.real.build import Build
+from tests.real.hil_truth import HilTruth
+from tests.real.truth import north_east
+
+_INT32 = 6
+"""MAV_PARAM_TYPE_INT32."""
 
 
 class Seen(NamedTuple):
@@ -41,27 +47,25 @@ class Station:
 
     Attributes:
         told: each change of mode, arming or status.
-        seen: the true motion.
+        hil: PX4's truth.
         texts: what it said, with the time.
     """
 
-    def __init__(self, autopilot: str) -> None:
-        self.autopilot = autopilot
+    def __init__(self, build: Build) -> None:
+        self.autopilot = autopilot = build.autopilot
         self.told: list[Told] = []
-        self.seen: list[Seen] = []
+        self._seen: list[Seen] = []
         self.texts: list[tuple[float, str]] = []
         self.acks: list[tuple[float, int, int]] = []
         self.landed = 0
+        self._kinds: dict[str, int] = {}
         self._up = 0.0
         self._origin: tuple[float, float] | None = None
         self._base = 0
         self._status = 0
-        address = "udpin:127.0.0.1:14550" if autopilot == "px4" else "tcp:127.0.0.1:5762"
         dialect = "development" if autopilot == "px4" else "ardupilotmega"
-        self._links = [mavutil.mavlink_connection(address, dialect=dialect)]
-        if autopilot == "px4":
-            truth = "udpin:127.0.0.1:19410"
-            self._links.append(mavutil.mavlink_connection(truth, dialect=dialect))
+        self._links = [mavutil.mavlink_connection(build.station, dialect=dialect)]
+        self.hil = HilTruth() if build.truth == "hil" else None
         self._running = True
         self._threads = [
             threading.Thread(target=self._listen, args=(link,), daemon=True) for link in self._links
@@ -76,8 +80,12 @@ class Station:
             thread.join()
         for link in self._links:
             link.close()
+        if self.hil is not None:
+            self.hil.close()
 
     def ask_for_rates(self) -> None:
+        if self.hil is not None:
+            self.hil.ask_for_rate()
         wanted = {"px4": (436, 245), "ardupilot": (0, 245, 33, 164)}[self.autopilot]
         for number in wanted:
             self.command(511, number, 40_000)
@@ -96,8 +104,17 @@ class Station:
         return self.command(176, 1, ARDUPILOT_MODES[name])
 
     def set_parameter(self, name: str, value: float) -> None:
-        """ArduPilot's floats; PX4 has `px4-param`."""
-        self._links[0].mav.param_set_send(1, 1, name.encode(), value, 9)
+        """Set a parameter, whatever its type; PX4 wants the bytes of an integer as they are."""
+        self._kinds.pop(name, None)
+        deadline = time.monotonic() + 10.0
+        while name not in self._kinds:
+            assert time.monotonic() < deadline, f"the autopilot has no parameter {name}"
+            self._links[0].mav.param_request_read_send(1, 1, name.encode(), -1)
+            time.sleep(0.2)
+        kind = self._kinds[name]
+        if self.autopilot == "px4" and kind == _INT32:
+            (value,) = struct.unpack("<f", struct.pack("<i", round(value)))
+        self._links[0].mav.param_set_send(1, 1, name.encode(), value, kind)
 
     @property
     def mode(self) -> str:
@@ -119,6 +136,19 @@ class Station:
     @property
     def obeys(self) -> bool:
         return self.armed and self.mode in ("OFFBOARD", "GUIDED by rates")
+
+    @property
+    def seen(self) -> list[Seen]:
+        """The true motion."""
+        if self.hil is None:
+            return self._seen
+        rows = list(self.hil.rows)
+        origin = rows[0][6:8] if rows else (0.0, 0.0)
+        return [
+            Seen(row[0], *north_east(*row[6:8], origin), row[8], _tilt(1 - 2 * (x * x + y * y)))
+            for row in rows
+            for x, y in [row[3:5]]
+        ]
 
     def until(self, condition, seconds: float, what: str) -> float:
         """Wait until `condition()`; returns when it was so."""
@@ -169,9 +199,7 @@ class Station:
             message = link.recv_match(blocking=True, timeout=0.1)
             if message is None or message.get_srcSystem() != 1:
                 continue
-            # The link that tells the truth has heartbeats of its own, which may be read later.
-            if link is self._links[0] or message.get_type() == "HIL_STATE_QUATERNION":
-                self._take(message, time.monotonic())
+            self._take(message, time.monotonic())
 
     def _take(self, message, now: float) -> None:
         kind = message.get_type()
@@ -184,13 +212,10 @@ class Station:
             self.texts.append((now, message.text.strip()))
         elif kind == "COMMAND_ACK":
             self.acks.append((now, message.command, message.result))
+        elif kind == "PARAM_VALUE":
+            self._kinds[message.param_id] = message.param_type
         elif kind == "EXTENDED_SYS_STATE":
             self.landed = message.landed_state
-        elif kind == "HIL_STATE_QUATERNION":
-            _, x, y, _ = message.attitude_quaternion
-            self._see(
-                now, message.lat, message.lon, message.alt / 1e3, _tilt(1 - 2 * (x * x + y * y))
-            )
         elif kind == "GLOBAL_POSITION_INT":
             self._up = message.relative_alt / 1e3
         elif kind == "SIMSTATE":
@@ -205,9 +230,7 @@ class Station:
         place = latitude / 1e7, longitude / 1e7
         if self._origin is None:
             self._origin = place
-        north = radians(place[0] - self._origin[0]) * _EARTH_M
-        east = radians(place[1] - self._origin[1]) * _EARTH_M * cos(radians(place[0]))
-        self.seen.append(Seen(now, north, east, up, tilt))
+        self._seen.append(Seen(now, *north_east(*place, self._origin), up, tilt))
 
 
 def _tilt(cosine: float) -> float:

@@ -1,33 +1,36 @@
-"""A real autopilot in its simulation, and flights of `companion fly` on it.
-
-`REAL` names the folder that holds `px4/start`, `ardupilot/start` and `stop`; without it
-`../shared/real`, beside the repository.
-"""
+"""A real autopilot in its simulation, and flights of `companion fly` on it."""
 
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from fcntl import LOCK_EX, flock
 from pathlib import Path
 
 import yaml
 
+from tests.real.build import ROOT, Build, build_of, running
+from tests.real.dataflash import DataflashLog, newest_log
 from tests.real.relay import Relay
 from tests.real.station import Station
+from tests.real.truth import Truth
 
-ROOT = Path(__file__).parents[2]
-REAL = Path(os.environ.get("REAL", ROOT.parent / "shared" / "real"))
 PORTS = {"px4": (14540, 14640), "ardupilot": (5760, 5860)}
-"""The autopilot's, and the one that the program is given."""
+"""Of the autopilot, and of the relay that the program is given instead."""
 TUNED = {
     "px4": {"thrust": {"hover_thrust": 0.49}, "guidance": {"drag_per_s": 1.0}},
     "ardupilot": {"thrust": {"hover_thrust": 0.37}, "guidance": {"drag_per_s": 0.3}},
 }
+WIND = {
+    "px4": {"SIH_WIND_N": 3.0},
+    "ardupilot": {"SIM_WIND_SPD": 3.0, "SIM_WIND_DIR": 180.0, "SIM_WIND_TURB": 1.0},
+}
+"""Parameters of the simulators; PX4's has no turbulence."""
 HOVER = {
     "flight": {"arm": True, "takeoff_height_m": 5.0, "programme": ["hover"]},
     "hover": {"duration_s": 120.0},
@@ -42,51 +45,54 @@ def merged(base, changes):
 
 
 class Vehicle:
-    """A running autopilot with our relay and a ground station beside it."""
+    """A running autopilot with a ground station beside it.
 
-    def __init__(self, autopilot: str, folder: Path) -> None:
-        self.autopilot, self.folder = autopilot, folder
-        vehicle_port, port = PORTS[autopilot]
-        self.relay = Relay(autopilot, vehicle_port, port)
-        self.station = Station(autopilot)
-        self.station.until(lambda: self.station.told, 60.0, "heartbeat")
+    Attributes:
+        relay: stands between it and the program, or None.
+        endpoint: for `link.endpoint`.
+    """
+
+    def __init__(self, build: Build, folder: Path, *, relayed: bool = True) -> None:
+        self.autopilot, self.folder, self.build = build.autopilot, folder, build
+        self.relay = Relay(self.autopilot, *PORTS[self.autopilot]) if relayed else None
+        self.endpoint = build.endpoint if self.relay is None else self.relay.endpoint
+        # ArduPilot boots when a client comes to its first port, and must keep it until it runs.
+        scheme, _, address = self.endpoint.partition("://")
+        first = _connected(address, build.ready_s) if scheme == "tcp" else nullcontext()
+        with first:
+            self.station = Station(build)
+            self.station.until(lambda: self.station.told, build.ready_s, "heartbeat")
         self.station.ask_for_rates()
         self.flown: list[Flight] = []
+        self._logs: dict[Path, DataflashLog] = {}
 
     def close(self) -> None:
         for flight in self.flown:
             flight.process.kill()
             flight.process.wait()
         self.station.close()
-        self.relay.close()
+        if self.relay is not None:
+            self.relay.close()
 
     def parameter(self, name: str, value: float) -> None:
         """Set a parameter of the autopilot, whatever its type."""
-        if self.autopilot == "px4":
-            tool = self.folder / "bin" / "px4-param"
-            subprocess.run([tool, "set", name, f"{value:g}"], check=True, capture_output=True)
-        else:
-            self.station.set_parameter(name, value)
+        self.station.set_parameter(name, value)
 
     def fly(self, *, prelude: str = "", **changes) -> "Flight":
         """Begin `companion fly`; `prelude` is Python that its process runs before."""
+        include = {"include": str(ROOT / "configs" / f"vehicle-{self.autopilot}.yaml")}
+        config = merged(merged(HOVER, TUNED[self.autopilot]), changes) | include
+        return self.launch(config, prelude=prelude)
+
+    def launch(
+        self, config: dict, *, command: str = "fly", prelude: str = "", folder: Path | None = None
+    ) -> "Flight":
+        """Begin `companion fly` or `companion identify`; it records in `folder`."""
         if self.autopilot == "ardupilot":
             self.station.command(42651, 1, 100)  # its battery empties from flight to flight
-        folder = self.folder / f"flight{len(self.flown) + 1}"
-        folder.mkdir()
-        config = merged(merged(HOVER, TUNED[self.autopilot]), changes)
-        config["link"] = {"endpoint": self.relay.endpoint} | config.get("link", {})
-        config["recording"] = {"directory": str(folder)}
-        config["include"] = str(ROOT / "configs" / f"vehicle-{self.autopilot}.yaml")
-        path = folder / "fly.yaml"
-        path.write_text(yaml.safe_dump(config, sort_keys=False))
-        program = f"{prelude}\nfrom companion.cli import main\nraise SystemExit(main())"
-        command = [sys.executable, "-c", program, "fly", "--config", str(path), "--json"]
-        process = subprocess.Popen(
-            command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=(folder / "err.txt").open("w"), text=True,
-        )  # fmt: skip
-        self.flown.append(Flight(self, process))
+        folder = folder or self.folder / f"flight{len(self.flown) + 1}"
+        config = merged({"link": {"endpoint": self.endpoint}}, config)
+        self.flown.append(started(self, config, folder, command, prelude))
         return self.flown[-1]
 
     def hovering(self, seconds: float = 4.0, **changes) -> "Flight":
@@ -97,9 +103,26 @@ class Vehicle:
         assert self.station.obeys, f"{self.station.mode}: {flight.said()}"
         return flight
 
+    def blow(self, on: bool) -> None:
+        """Wind from now on, or none."""
+        for name, value in WIND[self.autopilot].items():
+            self.parameter(name, value if on else 0.0)
+
+    def truth(self, arrival: float, vehicle_time: float) -> Truth | None:
+        """The motion since then: by our clock (`time.monotonic`), by the vehicle's, s."""
+        if self.station.hil is not None:
+            return self.station.hil.since(arrival)
+        if self.build.truth == "none":
+            return None
+        log = newest_log(Path(self.build.truth).expanduser())
+        if log not in self._logs:
+            self._logs[log] = DataflashLog(log)
+        return self._logs[log].truth(vehicle_time)
+
     def bring_down(self) -> None:
         """As a pilot would, so that the next flight can begin."""
-        self.relay.plug(up=True, down=True)
+        if self.relay is not None:
+            self.relay.plug(up=True, down=True)
         if self.station.armed:
             if self.station.mode != "LAND":
                 self.station.set_mode("LAND")
@@ -111,17 +134,27 @@ class Vehicle:
 
 
 class Flight:
-    """A process that flies."""
+    """A process that flies.
 
-    def __init__(self, vehicle: Vehicle, process: subprocess.Popen) -> None:
+    Attributes:
+        began: when it was started, s of `time.monotonic`.
+        obeyed_at: since when the autopilot obeyed it, as far as was waited for.
+        result: its summary, with `finish`.
+    """
+
+    def __init__(self, vehicle, process: subprocess.Popen, errors: Path) -> None:
         self.vehicle, self.process, self.began = vehicle, process, time.monotonic()
+        self._errors = errors
+        self.obeyed_at: float | None = None
         self.result: dict = {}
 
     def until_obeyed(self, seconds: float = 120.0) -> float:
         station = self.vehicle.station
-        return station.until(
+        now = station.until(
             lambda: station.obeys or self.process.poll() is not None, seconds, "offboard"
         )
+        self.obeyed_at = now if station.obeys else None
+        return now
 
     def send(self, number: signal.Signals) -> float:
         now = time.monotonic()
@@ -140,25 +173,70 @@ class Flight:
             self.process.send_signal(signal.SIGINT)
         return [event["text"] for event in self.finish().get("events", [])]
 
+    def error(self) -> str:
+        """The last line that it said in case of an error."""
+        lines = self._errors.read_text().strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
     def last_setpoint(self, since: float) -> float | None:
         """How long after `since` the last setpoint passed, s; None if none did."""
         later = [at for at in self.vehicle.relay.setpoints if at > since]
         return round(later[-1] - since, 3) if later else None
 
 
+def started(vehicle, config: dict, folder: Path, command: str = "fly", prelude: str = "") -> Flight:
+    """Start the program with a configuration; it records in `folder`."""
+    folder.mkdir(parents=True)
+    path, errors = folder / "fly.yaml", folder / "err.txt"
+    path.write_text(
+        yaml.safe_dump(config | {"recording": {"directory": str(folder)}}, sort_keys=False)
+    )
+    program = f"{prelude}\nfrom companion.cli import main\nraise SystemExit(main())"
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, command, "--config", str(path), "--json"],
+        cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors.open("w"),
+        text=True,
+    )  # fmt: skip
+    return Flight(vehicle, process, errors)
+
+
 @contextmanager
-def real_vehicle(autopilot: str, *arguments: str, folder: Path | None = None):
-    """Start it, alone on this machine, and stop it afterwards whatever happens."""
-    folder = folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))
+def real_vehicle(
+    autopilot: str,
+    *arguments: str,
+    folder: Path | None = None,
+    relayed: bool = True,
+    fifo: bool = False,
+):
+    """Start it, alone on this machine, and stop it afterwards whatever happens.
+
+    Args:
+        autopilot: px4 or ardupilot.
+        arguments: of its `start`.
+        folder: where it keeps its files; null: a temporary one.
+        relayed: whether a `Relay` stands between it and the program.
+        fifo: before other programs of this computer (SCHED_FIFO), where that is allowed.
+    """
+    folder = (folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    build = build_of(autopilot, folder, list(arguments))
+    log = folder.with_suffix(".log")
     with Path(f"/tmp/{autopilot}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
-        start, stop = REAL / autopilot / "start", REAL / "stop"
-        try:
-            subprocess.run([start, folder, *arguments], check=True, capture_output=True)
-            vehicle = Vehicle(autopilot, folder)
+        with running(build, log, fifo=fifo):
+            vehicle = Vehicle(build, folder, relayed=relayed)
             try:
                 yield vehicle
             finally:
                 vehicle.close()
-        finally:
-            subprocess.run([stop, folder], check=False)
+
+
+def _connected(address: str, seconds: float) -> socket.socket:
+    """A connection to `host:port`, which may not listen yet."""
+    host, _, port = address.rpartition(":")
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        with suppress(OSError):
+            return socket.create_connection((host, int(port)))
+        time.sleep(0.2)
+    raise AssertionError(f"nobody listens on {address} after {seconds} s")

@@ -11,6 +11,7 @@ import pytest
 
 from companion import bounded_file
 from companion.bounded_file import FileRefusedError, read_text
+from companion.drag import Drag
 from companion.trajectory import Envelope, csv_file, curves, slow_down, violations
 from companion.trajectory.csv_file import table
 from companion.trajectory.curves import MOST_LOOKS
@@ -22,7 +23,7 @@ from companion.yaml_file import ConfigError
 fitted = importlib.import_module("companion.trajectory.from_samples")
 """The module; the package has a function of this name."""
 
-ENVELOPE = Envelope(1.0, 2.0, 1.0, 1.0, 20.0, 2.0, 1.0, 15.0, drag=0.5)
+ENVELOPE = Envelope(1.0, 2.0, 1.0, 1.0, 20.0, 2.0, 1.0, 15.0, drag=Drag(0.5))
 
 
 def judged(path):

@@ -5,6 +5,7 @@ from math import tau
 import numpy as np
 import pytest
 
+from companion.drag import Drag
 from companion.trajectory import (
     Envelope,
     Hover,
@@ -27,7 +28,7 @@ from companion.trajectory.demand import demand, sampled
 from companion.trajectory.from_samples import SampleOptions, from_samples
 from tests.trajectory.finite_differences import evenly
 
-DRAG, G = 0.6, 9.80665
+DRAG, G = Drag(0.6), 9.80665
 
 
 def wavy(rng):

@@ -5,6 +5,7 @@ from math import atan, degrees, hypot, radians
 import numpy as np
 import pytest
 
+from companion.drag import NO_DRAG, Drag
 from companion.trajectory import (
     Envelope,
     Hover,
@@ -35,14 +36,14 @@ CLIMB = line((0.0, 0.0, -8.0), 3.0, 2.0, 4.0)
 
 def test_the_demand_is_that_of_the_force_that_moves_the_vehicle():
     """The thrust axis and its turning, by differences of directions, with drag and in space."""
-    drag, h = 0.7, 1e-5
+    drag, h = Drag(0.7, 0.05), 1e-5
     path = waypoints([(4.0, 0.0, -2.0), (4.0, 5.0, 0.0), (0.0, 1.0, -3.0)], 4.0, 6.0)
     motion = sampled(path, evenly(path, 0.02))
     found = demand(motion, drag, G)
 
     def axis(time):
         s = path.at(time)
-        force = np.array(s.acceleration) + drag * np.array(s.velocity) - (0.0, 0.0, G)
+        force = np.array(s.acceleration) + np.array(drag.deceleration(s.velocity)) - (0.0, 0.0, G)
         return force / np.linalg.norm(force), np.linalg.norm(force)
 
     for k in range(5, len(motion.times) - 5):
@@ -57,16 +58,16 @@ def test_the_demand_is_that_of_the_force_that_moves_the_vehicle():
 def test_the_tilt_of_a_circle_is_that_of_the_books(speed, drag):
     tilt = atan(hypot(speed**2 / 5.0, drag * speed) / G)
     round_ = circle(5.0, Laps(speed, 4.0, acceleration=1.0))
-    assert violations(round_, Envelope(max_tilt=tilt + 0.002, drag=drag)) == ()
-    (broken,) = violations(round_, Envelope(max_tilt=tilt - 0.002, drag=drag))
+    assert violations(round_, Envelope(max_tilt=tilt + 0.002, drag=Drag(drag))) == ()
+    (broken,) = violations(round_, Envelope(max_tilt=tilt - 0.002, drag=Drag(drag)))
     assert broken.limit == "limits.max_tilt_deg"
 
 
 def test_a_violation_says_when_what_and_how_much():
-    (broken,) = violations(EIGHT, Envelope(max_tilt=radians(35.0), drag=1.0))
+    (broken,) = violations(EIGHT, Envelope(max_tilt=radians(35.0), drag=Drag(1.0)))
     assert broken.begins < broken.time
     motion = sampled(EIGHT, evenly(EIGHT, 0.005))
-    tilt = demand(motion, 1.0, G).tilt
+    tilt = demand(motion, Drag(1.0), G).tilt
     first = motion.times[np.argmax(tilt > radians(35.0))]
     assert broken.begins == pytest.approx(first, abs=0.01)
     assert broken.text == (
@@ -95,8 +96,8 @@ def test_each_limit_is_broken_where_the_need_exceeds_it_and_only_there(
 ):
     least = field == "min_thrust"
     slack = 0.01 * abs(need) * (-1.0 if least else 1.0)
-    assert violations(trajectory, Envelope(**{field: need + slack}, drag=drag)) == ()
-    (broken,) = violations(trajectory, Envelope(**{field: need - slack}, drag=drag))
+    assert violations(trajectory, Envelope(**{field: need + slack}, drag=Drag(drag))) == ()
+    (broken,) = violations(trajectory, Envelope(**{field: need - slack}, drag=Drag(drag)))
     assert broken.limit == f"limits.{key}"
     assert f"limits.{key} allows {'no less than ' if least else ''}" in broken.text
 
@@ -118,7 +119,7 @@ def test_all_broken_limits_are_told_in_the_order_of_time():
 
 def test_free_fall_demands_no_thrust_and_no_turning():
     falling = line((0.0, 0.0, 60.0), 100.0, G, 20.0)
-    found = demand(sampled(falling, evenly(falling, 0.005)), 0.0, G)
+    found = demand(sampled(falling, evenly(falling, 0.005)), NO_DRAG, G)
     assert found.thrust.min() == pytest.approx(0.0, abs=1e-9)
     assert np.isfinite(found.tilt_rate).all()
 
@@ -126,11 +127,11 @@ def test_free_fall_demands_no_thrust_and_no_turning():
 @pytest.mark.parametrize(
     "envelope",
     [
-        Envelope(max_tilt=radians(35.0), drag=1.0),
-        Envelope(max_tilt_rate=radians(90.0), drag=1.0),
+        Envelope(max_tilt=radians(35.0), drag=Drag(1.0)),
+        Envelope(max_tilt_rate=radians(90.0), drag=Drag(1.0)),
         Envelope(max_yaw_rate=1.0),
         Envelope(max_speed=1.0),
-        Envelope(max_tilt=radians(2.0), drag=1.0),
+        Envelope(max_tilt=radians(2.0), drag=Drag(1.0)),
     ],
 )
 def test_slowed_down_just_enough(envelope):

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
+from companion.drag import Drag
 from companion.trajectory.demand import demand, sampled
 from companion.trajectory_file import TrajectoryFile, load
 from companion.yaml_file import ConfigError
@@ -47,7 +48,7 @@ def test_a_shipped_trajectory_flies_as_its_first_lines_say(path):
     assert_derivatives_agree(trajectory, inner_times(trajectory), jumps)
     assert_rests_at_both_ends(trajectory)
     told = re.search(r"drag of 1/s it takes ([\d.]+)° of tilt and (\d+)°/s", path.read_text())
-    needs = demand(sampled(trajectory, evenly(trajectory, 0.005)), 1.0, 9.80665)
+    needs = demand(sampled(trajectory, evenly(trajectory, 0.005)), Drag(1.0), 9.80665)
     if told:
         assert degrees(needs.tilt.max()) == pytest.approx(float(told[1]), abs=0.06)
         assert degrees(needs.tilt_rate.max()) == pytest.approx(float(told[2]), abs=0.6)

@@ -1,0 +1,125 @@
+"""One flight: flown, and measured from what it recorded and from the truth beside it."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from companion.mavlink.tlog_file import messages
+from tests.real.flights import MOVING, PARTS, configuration, named, shipped
+from tests.real.incidents import INCIDENTS, ten
+from tests.real.measures import straightness, tracking_errors
+from tests.real.truth import Floats, NoTruthError
+from tests.real.vehicle import merged
+
+_LONGEST_S = 300.0
+
+
+class Flying:
+    """Flies on one vehicle what it is told to.
+
+    Args:
+        vehicle: a `Vehicle` or a `MockVehicle`.
+        changes: of the configuration, in all flights.
+        base: configurations above the one that ships.
+    """
+
+    def __init__(self, vehicle, changes: dict, base: list[Path]) -> None:
+        self._vehicle = vehicle
+        self._changes = changes
+        self._base = [shipped(vehicle.autopilot), *base]
+        self._identified: Path | None = None
+
+    def __call__(self, flight: str, folder: Path) -> list[dict]:
+        """Fly it; a row for it, or for each of a series."""
+        if flight == "ten":
+            return [{"flight": "ten", "planner": "", **row} for row in ten(self._vehicle, folder)]
+        folder.mkdir(parents=True)
+        try:
+            if flight == "identify":
+                row = self._identify(folder)
+            elif flight in INCIDENTS:
+                row = INCIDENTS[flight](self._vehicle, folder)
+                self._vehicle.bring_down()
+            else:
+                row = self._flown(flight, folder)
+        except (AssertionError, NoTruthError, OSError) as error:
+            row = {"error": str(error)}
+            self._vehicle.bring_down()
+        return [{"flight": flight, "planner": "", "load": self._vehicle.load(), **row}]
+
+    def _identify(self, folder: Path) -> dict:
+        config = merged(configuration("hover", self._base, folder, self._changes), _ALONE)
+        flight = self._vehicle.launch(config, command="identify", folder=folder / "flight")
+        result = flight.finish(_LONGEST_S)
+        self._vehicle.bring_down()
+        if result.get("result") != "ok":
+            return {**result, "error": result.get("result") or flight.error()}
+        self._identified = Path(result["file"])
+        return result
+
+    def _flown(self, name: str, folder: Path) -> dict:
+        asked = named(name)
+        base = list(self._base)
+        if asked.variant == "identified":
+            if self._identified is None:
+                return {"error": "fly identify before it, on the same vehicle"}
+            base.append(self._identified)
+        config = configuration(name, base, folder, self._changes)
+        self._vehicle.blow(asked.variant == "wind")
+        arrival = time.monotonic()
+        flight = self._vehicle.launch(config, folder=folder / "flight")
+        result = flight.finish(_LONGEST_S)
+        self._vehicle.bring_down()
+        if "log" not in result or result["log"] is None:
+            return {"error": result.get("result") or flight.error()}
+        out = {
+            "planner": result["planner"],
+            "result": result["result"],
+            "log": result["log"],
+            "rate_hz": result["rate_hz"],
+            "missed_deadlines": result["missed_deadlines"],
+            "dead_time_s": result["dead_time_s"],
+            "nmpc": result["nmpc"],
+        }
+        if result["result"] != "ok":
+            out["error"] = result["result"]
+        try:
+            return out | self._measured(name, result, arrival)
+        except (NoTruthError, OSError) as error:
+            return {"error": f"not measured: {error}", **out}
+
+    def _measured(self, name: str, result: dict, arrival: float) -> dict:
+        """All figures that the flight's folder and the truth give."""
+        log = Path(result["log"])
+        tracking = _rows(log / "tracking.csv")
+        assert len(tracking) > 2, "hardly anything was flown under control"
+        truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
+        out: dict = {"reported": result["tracking"]}
+        if (log / "response.csv").exists():
+            found = straightness(_rows(log / "response.csv"), truth, result["gain_per_s"])
+            if found is not None:
+                told = result["response"]
+                out["cross_axis"] = {"reported": told["cross_axis_max"], **found}
+                out["time_constant_s"] = told["time_constant_s"]
+        errors = tracking_errors(tracking, positions(log / "flight.tlog"), truth)
+        moving = [part for part in named(name).parts if PARTS[part].programme in MOVING]
+        out["tracking"] = dict(zip(moving, errors["moving"], strict=False))
+        if named(name).parts == ["hover"] and errors["hover"]:
+            out["tracking"]["hover"] = max(errors["hover"], key=lambda part: part["seconds"])
+        return out
+
+
+_ALONE = {"flight": {"programme": ["identify"]}}
+
+
+def positions(log: Path) -> Floats:
+    """(n, 4), rising: vehicle time s, north, east, down m, of LOCAL_POSITION_NED."""
+    rows = np.array(
+        [(m.time_boot_ms / 1e3, m.x, m.y, m.z) for _, m in messages(log, {"LOCAL_POSITION_NED"})]
+    )
+    return rows[np.unique(rows[:, 0], return_index=True)[1]]
+
+
+def _rows(path: Path) -> Floats:
+    return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
