@@ -61,7 +61,7 @@ class History(Generic[Row]):
 
     def start(self, time: float, row: Row, motion: Row) -> None:
         """Forget all; up to `row` the plan moved evenly, by `motion` a second."""
-        earlier = row._make([a - self._span * b for a, b in zip(row, motion, strict=True)])
+        earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
 
@@ -85,4 +85,4 @@ class History(Generic[Row]):
         start = times[later - 1]
         share = (time - start) / (times[later] - start)
         before, after = self._rows[later - 1], self._rows[later]
-        return before._make([a + share * (b - a) for a, b in zip(before, after, strict=True)])
+        return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])

@@ -30,9 +30,7 @@ class Lag:
         if square > 0.0:
             self._model = SecondOrderReference(1.0 / sqrt(square), 0.5 * lag / sqrt(square))
 
-    def after(
-        self, rate: float, slope: float, aim: float, dt: float
-    ) -> tuple[float, float, float]:
+    def after(self, rate: float, slope: float, aim: float, dt: float) -> tuple[float, float, float]:
         """How far a rate moves on within `dt`, the rate then, and its slope.
 
         Args:

@@ -35,14 +35,15 @@ _QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample r
 class ModelFollowingPlanner:
     """Two degrees of freedom: a planned motion is fed forward, what differs from it is fed back.
 
-    The plan is a `ReferenceModel`: second order, straight, within the limits. Fed forward are the
-    body rates that move the attitude along it in the middle of the coming sample, led by the lag of
-    the rate loop (ω + τ·ω̇). They take effect one dead time later, so fed back is the difference of
-    the measured coefficients from the plan as it stood one dead time ago, by the paper's law; that
-    way the loop does not fight its own delay. The gain of the feedback is p, but at most a quarter
-    of what is stable for dead time and lag (`margin.largest_gain`): it stays stable as long as the
-    real largest gain is more than a quarter of the one believed. Heading is treated likewise. A
-    larger gain would be stable too, and worse where the dead time is known wrongly.
+    The plan is a `ReferenceModel`: smooth, straight, within the limits. Fed forward are the body
+    rates that move the attitude along it in the middle of the coming sample, each led by the lag of
+    its own axis (`AxisLead`). They take effect one dead time later, on both axes at once, for the
+    quicker one waits. So fed back is the difference of the measured coefficients from the plan as
+    it stood one dead time ago, by the paper's law; that way the loop does not fight its own delay.
+    The gain of the feedback is p, but at most a quarter of what is stable for dead time and lag of
+    the slower axis (`margin.largest_gain`): it stays stable as long as the real largest gain is
+    more than a quarter of the one believed. Heading is treated likewise. A larger gain would be
+    stable too, and worse where the dead time is known wrongly.
 
     Yaw answers slowly, so while the vehicle tilts its heading moves although it is asked to stand
     still. It is foreseen from the yaw rates that were sent (`YawModel`), and the tilt rates are
@@ -239,7 +240,9 @@ class ModelFollowingPlanner:
         still = self._past.newest.still + stilled
         slopes = model.rate_slopes()
         self._time += dt
-        self._past.add(self._time, PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still))
+        self._past.add(
+            self._time, PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still)
+        )
         self._past_yaw.add(self._time, PlannedYaw(self._heading.heading, body.turned, body.rate))
 
 

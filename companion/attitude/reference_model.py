@@ -50,6 +50,12 @@ def braking(gain: float, lag: float) -> float:
     return max(0.0, sqrt(_DAMPED * lag / gain) - 1.0 / gain)
 
 
+def model_response(gain: float, lag: float) -> tuple[float, float]:
+    """The model as c̈ = (p'·(c_d − c) − ċ)/τ': p' in 1/s, and τ' in s, of this p and τ."""
+    slowed = 1.0 + gain * braking(gain, lag)
+    return gain / slowed, lag / slowed
+
+
 class ReferenceModel:
     """σ·c⃛ + τ·c̈ + ċ = v with v = p·(c_d − c − κ·ċ), limited.
 
