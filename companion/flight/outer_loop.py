@@ -42,7 +42,7 @@ def tilt_response(config: Config) -> InnerResponse:
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
         lag = model_lag(gain, lag)
-    return InnerResponse(gain, lag, _acts_after(config, dead_time), follows)
+    return InnerResponse(gain, lag, dead_time, follows)
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
@@ -64,20 +64,17 @@ def heading_response(config: Config) -> InnerResponse:
     return InnerResponse(
         config.planner.yaw_gain_per_s,
         _MS * (yaw.lag_ms or 0.0),
-        _acts_after(config, _MS * (yaw.dead_time_ms or 0.0)),
+        _MS * (yaw.dead_time_ms or 0.0),
         config.planner_name == MODEL_FOLLOWING,
     )
-
-
-def _acts_after(config: Config, dead_time: float) -> float:
-    """A command is held for a period of guidance: on average it is half of one late, s."""
-    return dead_time + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
-    tilt, heading = tilt_response(config), heading_response(config)
+    tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
+    # The feedback is held for a period: on average it acts half of one late.
+    slowness = tilt.slowness + 0.5 * period
     drag = drag_prior(config).drag.linear
     weights = Weights(guidance.position_weight_per_s4, guidance.velocity_weight_per_s2)
     if _identifies(config):
@@ -86,7 +83,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, tilt_response(config).slowness, drag),
+            gains=chain_gains(weights, slowness, drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
@@ -97,6 +94,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
             heading=heading,
             max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
             thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
+            period=period,
         )
     )
 
