@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all matrix lint soak fuzz bench clean
+.PHONY: demo test test-all matrix lint real soak fuzz bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -34,6 +34,12 @@ lint: $(VENV)/.test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# TIMES=3 for medians, FIFO=--fifo on a busy computer; docs/real-autopilots.md.
+REALLY := $(if $(AUTOPILOT),--autopilot $(AUTOPILOT)) $(if $(TIMES),--times $(TIMES)) $(FIFO)
+
+real: $(VENV)/.test  ## real autopilots in their simulations, against truth: REAL=folder or YAML file, AUTOPILOT=px4
+	REAL="$(REAL)" $(BIN)/python -m tests.real.campaign $(REALLY)
 
 soak: $(VENV)/.test  ## half an hour in real time over a bad link
 	$(BIN)/python -m tests.soak --minutes 30

@@ -111,6 +111,7 @@ class MotionEstimate:
             self._q,
             self._body_rates,
             (*situation.disturbance, 0.0),
+            situation.drag,
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:

@@ -150,7 +150,6 @@ def predictive_settings(config: Config) -> Settings:
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=slower_tilt(config)[1],
-            drag=drag_prior(config).drag.linear,
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
             max_yaw_rate=radians(limits.max_yaw_rate_deg_s),

@@ -27,6 +27,8 @@ has only jumped."""
 _CERTAINLY_BACK = 0.5
 """TIMESYNC lags the samples' stamps a little; behind the newest by this, s, time has gone back, and
 has not only stood still."""
+_TIMESYNC_LAG = 0.012
+"""TIMESYNC lags the samples' stamps by up to this, s, in the simulators (measured)."""
 _WRAP = 2**32 / 1000.0
 """time_boot_ms is a uint32: it wraps after 49.7 days, s."""
 _NEAR_WRAP = 600.0
@@ -157,6 +159,9 @@ class VehicleClock:
     def exchange(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
 
+        It also tells when the clock has slipped: simulators lose time on a busy computer and do not
+        catch up. Samples then seem late, and no longer than until the next exchange.
+
         Args:
             sent: When we asked, s on our clock.
             received: When the answer came, s on our clock.
@@ -169,8 +174,11 @@ class VehicleClock:
         quickest = self._quickest + self.rate.rate * (middle - self._received)
         attitude_fits = received - self._received < 1.0 and self._late < JUMP
         error = half + self.rate.spread(max(0.0, received - self._received))
-        behind = self.delay.compare(received, error, time - middle - quickest)
+        delay = time - middle - quickest
+        behind = self.delay.compare(received, error, delay)
         if behind is None:
+            if -delay < JUMP:
+                self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
             return
         if attitude_fits:  # then it is TIMESYNC's clock that has changed
             self.delay.forget(DelayUnknown.OTHER_CLOCK)

@@ -5,13 +5,14 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from companion.attitude import BodyRates, Quaternion
+from companion.drag import NO_DRAG, Drag
 from companion.nmpc.reference import Start
 from companion.trajectory.sample import Vector
 
 READY = b"ready"
 """The solver's first word, once it is warm."""
 
-_HEAD = struct.Struct("<q22d")
+_HEAD = struct.Struct("<q24d")
 _INPUT = struct.Struct("<5d")
 _ANSWER = struct.Struct("<2q9d")
 
@@ -26,6 +27,7 @@ class Vehicle(NamedTuple):
         q: attitude, body → world; must be a unit quaternion.
         body_rates: rad/s, FRD.
         disturbance: acceleration by wind and what else is not modelled, m/s², NED.
+        drag: as far as it is known by now.
     """
 
     time: float
@@ -34,6 +36,7 @@ class Vehicle(NamedTuple):
     q: Quaternion
     body_rates: BodyRates
     disturbance: Vector = (0.0, 0.0, 0.0)
+    drag: Drag = NO_DRAG
 
 
 class Input(NamedTuple):
@@ -125,6 +128,7 @@ def pack_request(request: Request) -> bytes:
         *vehicle.q,
         *vehicle.body_rates,
         *vehicle.disturbance,
+        *vehicle.drag,
     )
     return head + b"".join(_INPUT.pack(*one) for one in request.inputs)
 
@@ -139,6 +143,7 @@ def unpack_request(message: bytes) -> Request:
         (v[11], v[12], v[13], v[14]),
         BodyRates(v[15], v[16], v[17]),
         (v[18], v[19], v[20]),
+        Drag(v[21], v[22]),
     )
     inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_HEAD.size :]))
     return Request(number, vehicle, at, Start((v[0], v[1], v[2]), v[3]), inputs)

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 
+from companion.drag import Drag
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
@@ -43,6 +44,7 @@ class Given(NamedTuple):
         w_n, w_e, w_d: acceleration by wind and what else is not modelled, m/s², NED.
         yaw: Euler yaw at the start, rad.
         longest: length of the longest coefficients that may be asked for.
+        linear_drag, quadratic_drag: `Drag`, 1/s and 1/m.
     """
 
     w_n: float
@@ -50,14 +52,17 @@ class Given(NamedTuple):
     w_d: float
     yaw: float
     longest: float
+    linear_drag: float
+    quadratic_drag: float
 
 
 YAW, LONGEST = Given._fields.index("yaw"), Given._fields.index("longest")
+_DRAG = slice(Given._fields.index("linear_drag"), len(Given._fields))
 """Where they stand in the symbols of what is given."""
 
 
 def given_symbols() -> ca.SX:
-    """(5,), a symbol for each of `Given`."""
+    """(7,), a symbol for each of `Given`."""
     return ca.SX.sym("given", len(Given._fields))
 
 
@@ -68,7 +73,7 @@ class Model:
     Attributes:
         state: (n,), begins with position and velocity.
         control: (m,), ends with the specific thrust.
-        given: (5,), the symbols of `Given`.
+        given: (7,), the symbols of `Given`.
         derivative: (n,), ẋ.
         aim: (k,), the reference of a node in the model's own terms.
         heading_error: rad, of `state` against `aim`.
@@ -98,18 +103,21 @@ class Model:
 def translation(
     velocity: ca.SX, thrust: ca.SX, axis: ca.SX, given: ca.SX, settings: Settings
 ) -> ca.SX:
-    """Velocity and acceleration, (6,), of a point mass with linear drag (equation 10 with drag).
+    """Velocity and acceleration, (6,), of a point mass with drag (equation 10 with drag).
 
     Args:
         velocity: (3,), NED, m/s.
         thrust: specific, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
-        given: (5,), the symbols of `Given`.
-        settings: drag and gravity.
+        given: (7,), the symbols of `Given`.
+        settings: gravity.
     """
     lift = thrust * ca.vertcat(axis[0], axis[1], -axis[2])
     weight = ca.vertcat(0.0, 0.0, settings.gravity)
-    return ca.vertcat(velocity, lift + weight - settings.drag * velocity + given[0:3])
+    told: list[Any] = ca.vertsplit(given[_DRAG])  # symbols for its numbers
+    moving: list[Any] = ca.vertsplit(velocity)
+    slowed = ca.vertcat(*Drag(*told).deceleration((moving[0], moving[1], moving[2])))
+    return ca.vertcat(velocity, lift + weight - slowed + given[0:3])
 
 
 def led_target(

@@ -81,7 +81,7 @@ class Planning:
         motion = self._predictor.ahead(vehicle, request.inputs, until)
         _, _, yaw = euler_near(motion.north, motion.east, motion.heading)
         longest = max(sin(self._settings.max_tilt), hypot(motion.north, motion.east))
-        given = Given(*vehicle.disturbance, yaw=yaw, longest=longest)
+        given = Given(*vehicle.disturbance, yaw, longest, *vehicle.drag)
         nodes = self._nodes(request, motion.heading)
         return self._problem.solve(until, motion, nodes, given)
 
@@ -94,7 +94,7 @@ class Planning:
                 sample,
                 request.start,
                 heading,
-                settings.drag,
+                request.vehicle.drag,
                 settings.gravity,
                 request.vehicle.disturbance,
             )

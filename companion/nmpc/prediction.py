@@ -8,10 +8,9 @@ from companion.attitude import wrap_angle
 from companion.attitude.kinematics import heading_of, rates_to_speed, tilt_products
 from companion.attitude.representation import normalised
 from companion.nmpc.messages import Input, Vehicle
-from companion.nmpc.model import Motion, integrator
+from companion.nmpc.model import Given, Motion, integrator
 from companion.nmpc.models import make_model
 from companion.nmpc.settings import Settings
-from companion.trajectory.sample import Vector
 
 _LEAST_COSINE = 0.2
 """Of the tilt, below which the models do not reach: 78°."""
@@ -68,13 +67,14 @@ class Predictor:
             ToppledError: as `motion_of`, or it will be tilted so far.
         """
         motion = motion_of(vehicle)
-        time, disturbance = vehicle.time, vehicle.disturbance
+        time = vehicle.time
+        given = Given(*vehicle.disturbance, 0.0, 0.0, *vehicle.drag)
         acting = [one for one in inputs if self._acts(one) <= time][-1:] or [*inputs[:1]]
         current = acting[0] if acting else self._kept(vehicle.time, motion)
         for following in [one for one in inputs if time < self._acts(one) < until]:
-            motion = self._carried(motion, current, self._acts(following) - time, disturbance)
+            motion = self._carried(motion, current, self._acts(following) - time, given)
             time, current = self._acts(following), following
-        motion = self._carried(motion, current, until - time, disturbance)
+        motion = self._carried(motion, current, until - time, given)
         if hypot(motion.north, motion.east) > _FURTHEST:
             raise ToppledError
         return motion
@@ -88,7 +88,7 @@ class Predictor:
         thrust = self._settings.gravity / upright
         return Input(time, motion.north, motion.east, motion.heading, thrust)
 
-    def _carried(self, motion: Motion, current: Input, span: float, disturbance: Vector) -> Motion:
+    def _carried(self, motion: Motion, current: Input, span: float, given: Given) -> Motion:
         heading = motion.heading + wrap_angle(current.heading - motion.heading)
         # The planner takes no longer target than its limit allows.
         length = hypot(current.north, current.east)
@@ -96,6 +96,6 @@ class Predictor:
         control = (share * current.north, share * current.east, heading, current.thrust)
         steps = int(span / _LONGEST_STEP) + 1
         for _ in range(steps):
-            after = self._advance(motion, control, (*disturbance, 0.0, 0.0), span / steps)
+            after = self._advance(motion, control, list(given), span / steps)
             motion = Motion(*(float(value) for value in after.elements()))
         return motion

@@ -4,6 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from companion.attitude import wrap_angle
+from companion.drag import Drag
 from companion.trajectory.sample import Sample, Vector
 
 _LEAST_LIFT = 0.2
@@ -47,25 +48,27 @@ class Start(NamedTuple):
 
 
 def node_of(
-    sample: Sample, start: Start, near: float, drag: float, gravity: float, disturbance: Vector
+    sample: Sample, start: Start, near: float, drag: Drag, gravity: float, disturbance: Vector
 ) -> Node:
     """The attitude and thrust that a sample takes: differential flatness of a point mass with drag.
 
-    The rotors have to give f = a + d·v − w − g; its length is the specific thrust, its horizontal
-    part over that the coefficients, and with ḟ = jerk + d·a follows their speed.
+    The rotors have to give f = a + d − w − g, d the deceleration by drag; its length is the
+    specific thrust, its horizontal part over that the coefficients, and with ḟ = jerk + ḋ follows
+    their speed.
 
     Args:
         sample: of the trajectory.
         start: of the trajectory.
         near: the heading is given within π of this, rad.
-        drag: linear, per mass, 1/s.
+        drag: of the vehicle.
         gravity: m/s².
         disturbance: w, acceleration by wind and what else is not modelled, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
-    f_n, f_e, f_d = (acceleration[i] + drag * velocity[i] - disturbance[i] for i in range(3))
+    slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)
+    f_n, f_e, f_d = (acceleration[i] + slowed[i] - disturbance[i] for i in range(3))
     f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
-    d_n, d_e, d_d = (jerk[i] + drag * acceleration[i] for i in range(3))
+    d_n, d_e, d_d = (jerk[i] + growing[i] for i in range(3))
     thrust = sqrt(f_n * f_n + f_e * f_e + f_d * f_d)
     growth = (f_n * d_n + f_e * d_e + f_d * d_d) / thrust
     north, east = f_n / thrust, f_e / thrust

@@ -49,7 +49,6 @@ class Settings:
         yaw_gain: of its heading, 1/s.
         lag: τ of its response τ·c̈ + ċ = p·(c_d − c), s.
         dead_time: from an answer's use to the beginning of its effect, s.
-        drag: linear drag per mass against the air, the same in all directions, 1/s.
         gravity: m/s².
         max_tilt: rad; of the planner.
         max_tilt_rate: W_M of the planner, rad/s.
@@ -73,7 +72,6 @@ class Settings:
     yaw_gain: float = 2.0
     lag: float = 0.05
     dead_time: float = 0.0
-    drag: float = 0.0
     gravity: float = 9.80665
     max_tilt: float = 0.7
     max_tilt_rate: float = 2.0
@@ -94,7 +92,7 @@ class Settings:
             _check_positive(name, getattr(self, name))
         for name in ("min_thrust", "horizon", "deadline", "steps", "iterations"):
             _check_positive(name, getattr(self, name))
-        for name in ("dead_time", "drag", "lead", "niceness"):
+        for name in ("dead_time", "lead", "niceness"):
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} must be finite and not negative, not {value}")

@@ -8,14 +8,14 @@ _TOLERATED = 0.3
 """Share of the configured dead time by which the measured one may differ."""
 _DOUBT = 0.008
 """And it may always differ by this, s: no rate loop is just a lag behind a dead time, so what is
-measured depends on what is flown, slow circles or steps, by up to 7 ms."""
+measured depends on what is flown: by up to 3 ms over a flight, by up to 7 ms over a few seconds."""
 
 
 class AxisDeadTime(NamedTuple):
     """One axis; each from a sample to the first effect of its answer, s.
 
     Attributes:
-        measured: None where too little was turned to tell, or the lag is not known.
+        measured: None where not enough undisturbed rotation was flown, or the lag is not known.
         configured: None where the configuration names none.
     """
 

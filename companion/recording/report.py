@@ -85,7 +85,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
 
 
 def _measured(axis: AxisDeadTime) -> str:
-    return "too little turned to tell" if axis.measured is None else _milliseconds(axis.measured)
+    return "not enough rotation to tell" if axis.measured is None else _milliseconds(axis.measured)
 
 
 def _milliseconds(value: float | None) -> str:

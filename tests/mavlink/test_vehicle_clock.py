@@ -294,6 +294,40 @@ def test_simulators_that_send_in_bursts_and_slip_are_not_late():
     assert clock.timeline == 0
 
 
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("backlog", [0.02, 0.048, 0.068, 0.3])
+def test_a_backlog_at_the_start_is_no_drift(backlog, seed):
+    """What waited while we started is read at once: PX4's had 17 samples, ArduPilot's 12."""
+    link = Link(timesync=False, seed=seed)
+    for waited in range(round(backlog / 0.004)):
+        link.received = link.now + backlog + 1e-4 * waited
+        link.arrive(link.vehicle + 0.004 * waited)
+    link.now += backlog
+    link.vehicle += backlog
+    link.ages.clear()
+    link.run(60.0, stall=0.0)
+    assert max(link.ages) < 0.012
+    assert link.misfits == []
+
+
+@pytest.mark.parametrize(("slip", "seen"), [(0.010, 0.014), (0.016, 0.018), (0.045, 0.020)])
+def test_a_slip_of_the_clock_makes_samples_old_for_seconds_at_most(slip, seen):
+    """Measured: a busy computer's simulator loses 10 to 16 ms, now and then 45 ms."""
+    link = Link().run(30.0, jitter=0.002, stall=0.0)
+    for _ in range(4):
+        link.now += slip  # time that the vehicle never had
+        link.ages.clear()
+        link.run(1.2, jitter=0.002, stall=0.0)
+        assert max(link.ages) < slip + 0.01
+        link.ages.clear()
+        link.run(0.2, jitter=0.002, stall=0.0)
+        assert max(link.ages) < link.delay + seen
+        link.ages.clear()
+        link.run(6.0, jitter=0.002, stall=0.0)
+        assert max(link.ages[-250:]) < link.delay + 0.006
+    assert (link.misfits, link.clock.timeline) == ([], 0)
+
+
 def test_in_lockstep_there_is_one_clock_and_timesync_is_not_needed():
     clock = VehicleClock(lockstep=True)
     told = []

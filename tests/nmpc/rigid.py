@@ -3,17 +3,18 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from companion.drag import Drag
 from companion.nmpc.model import Motion
 
-GRAVITY, DRAG = 9.80665, 0.8
+GRAVITY, DRAG = 9.80665, Drag(0.8, 0.1)
 WIND = np.array([0.4, -0.3, 0.2])
 
 
 def acceleration(r, thrust, velocity):
     """NED, of an attitude (body → world); thrust pushes along −body z."""
-    return (
-        [0.0, 0.0, GRAVITY] - thrust * r.apply([0.0, 0.0, 1.0]) - DRAG * np.asarray(velocity) + WIND
-    )
+    share = DRAG.linear + DRAG.quadratic * np.linalg.norm(velocity)
+    lift = thrust * r.apply([0.0, 0.0, 1.0])
+    return [0.0, 0.0, GRAVITY] - lift - share * np.asarray(velocity) + WIND
 
 
 def turned(r, body_rates, seconds):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from companion.attitude import BodyRates
+from companion.drag import Drag
 from companion.extras import MissingExtraError
 from companion.nmpc import Input, Request, Settings, Solver, Start, Status, Vehicle
 from companion.nmpc.planning import Planning
@@ -21,7 +22,7 @@ PYTHON = os.environ.get("COMPANION_ACADOS_PYTHON")
 pytestmark = pytest.mark.skipif(PYTHON is None, reason="COMPANION_ACADOS_PYTHON names none")
 
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
-SETTINGS = Settings(drag=1.0, dead_time=0.045, deadline=20.0, solver="acados")
+SETTINGS = Settings(dead_time=0.045, deadline=20.0, solver="acados")
 KEYS = """
 from dataclasses import replace
 from companion.nmpc import Settings
@@ -59,7 +60,9 @@ def asked(number):
     north, east, down = CIRCLE.at(6.0).position
     position = north + 0.01 * number, east, down
     rest = BodyRates(0.0, 0.0, 0.0)
-    vehicle = Vehicle(time, position, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), rest)
+    vehicle = Vehicle(
+        time, position, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), rest, drag=Drag(0.6, 0.08)
+    )
     inputs = tuple(Input(time - 0.02 * k, 0.01 * k, 0.0, 0.1, 9.8) for k in range(5, 0, -1))
     return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)
 

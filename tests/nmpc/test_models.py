@@ -21,7 +21,7 @@ HELIX = helix(4.0, 3.0, Laps(4.0, laps=3.0, along=True))
 
 
 def settings(model, **changes):
-    return Settings(model=model, drag=rigid.DRAG, gravity=rigid.GRAVITY, **changes)
+    return Settings(model=model, gravity=rigid.GRAVITY, **changes)
 
 
 def attitudes():
@@ -32,7 +32,7 @@ def attitudes():
 
 def given(r=None):
     yaw = 0.0 if r is None else r.as_euler("ZYX")[0]
-    return Given(*rigid.WIND, yaw, 0.7)
+    return Given(*rigid.WIND, yaw, 0.7, *rigid.DRAG)
 
 
 def derivative(model, state, control, of):

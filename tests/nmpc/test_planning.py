@@ -6,19 +6,21 @@ from math import radians
 import pytest
 
 from companion.attitude import BodyRates, Coefficients, attitude
+from companion.drag import Drag
 from companion.nmpc import Input, Request, Settings, Start, Status, Vehicle
 from companion.nmpc.planning import Planning
 from companion.nmpc.reference import node_of
 from companion.trajectory.figures import Hover, Laps, circle
 
+DRAG = Drag(0.6, 0.08)
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
-SETTINGS = Settings(drag=1.0, dead_time=0.2, lead=0.04, max_tilt=0.9, iterations=20)
+SETTINGS = Settings(dead_time=0.2, lead=0.04, max_tilt=0.9, iterations=20)
 STILL = BodyRates(0.0, 0.0, 0.0)
 
 
 def wanted(at):
     """The target that keeps a first-order response on the circle, and its thrust."""
-    node = node_of(CIRCLE.at(at), Start((0.0, 0.0, 0.0)), 0.0, 1.0, 9.80665, (0.0, 0.0, 0.0))
+    node = node_of(CIRCLE.at(at), Start((0.0, 0.0, 0.0)), 0.0, DRAG, 9.80665, (0.0, 0.0, 0.0))
     led = node.north + node.speed_north / 5.0, node.east + node.speed_east / 5.0
     return node, led
 
@@ -41,7 +43,7 @@ def test_it_plans_for_when_the_answer_acts_on_where_the_vehicle_is_then():
         w * later[3] - z * later[0] - x * later[2] + y * later[1],
     )
     rates = BodyRates(*(2.0 * v / 1e-4 for v in turn))
-    vehicle = Vehicle(0.0, node.position, node.velocity, q, rates)
+    vehicle = Vehicle(0.0, node.position, node.velocity, q, rates, drag=DRAG)
     start = Start((0.0, 0.0, 0.0))
     answer = Planning(SETTINGS, CIRCLE).answer(Request(1, vehicle, at, start, tuple(inputs)))
     assert answer.status is Status.SOLVED

@@ -12,9 +12,7 @@ from companion.nmpc import Input, Settings, Vehicle
 from companion.nmpc.prediction import Predictor, ToppledError, motion_of
 from tests.nmpc import rigid
 
-SETTINGS = Settings(
-    drag=rigid.DRAG, gravity=rigid.GRAVITY, dead_time=0.05, gain=4.0, lag=0.08, yaw_gain=1.5
-)
+SETTINGS = Settings(gravity=rigid.GRAVITY, dead_time=0.05, gain=4.0, lag=0.08, yaw_gain=1.5)
 INPUTS = (
     Input(9.90, 0.3, 0.1, 0.2, 11.0),
     Input(9.96, -0.2, 0.3, 0.1, 9.0),
@@ -28,6 +26,7 @@ VEHICLE = Vehicle(
     attitude(Coefficients(0.2, -0.1), 0.4),
     BodyRates(0.6, -0.4, 0.2),
     tuple(rigid.WIND),
+    rigid.DRAG,
 )
 
 
@@ -36,7 +35,8 @@ def late(time, x):
     acting = [one for one in INPUTS if one.time + SETTINGS.dead_time <= time][-1]
     c, speed = x[6:8], x[9:11]
     axis = np.array([c[0], c[1], -np.sqrt(1.0 - c @ c)])
-    fall = acting.thrust * axis + [0.0, 0.0, rigid.GRAVITY] - rigid.DRAG * x[3:6] + rigid.WIND
+    share = rigid.DRAG.linear + rigid.DRAG.quadratic * np.linalg.norm(x[3:6])
+    fall = acting.thrust * axis + [0.0, 0.0, rigid.GRAVITY] - share * x[3:6] + rigid.WIND
     pull = SETTINGS.gain * (np.array([acting.north, acting.east]) - c)
     turn = SETTINGS.yaw_gain * (acting.heading - x[8])
     return np.concatenate([x[3:6], fall, speed, [turn], (pull - speed) / SETTINGS.lag])
@@ -76,7 +76,9 @@ def test_without_inputs_the_attitude_is_taken_to_be_kept():
     still = VEHICLE._replace(body_rates=BodyRates(0.0, 0.0, 0.0))
     found = Predictor(SETTINGS).ahead(still, (), 10.1)
     assert (found.north, found.east, found.heading) == pytest.approx((0.2, -0.1, 0.4))
-    assert found.v_d == pytest.approx(-0.5 + 0.1 * (0.2 + 0.8 * 0.5), abs=0.005)
+    assert found.v_d == pytest.approx(
+        -0.5 + 0.1 * (0.2 + rigid.DRAG.per_velocity(3.2) * 0.5), abs=0.005
+    )
 
 
 def test_what_the_models_do_not_reach_is_refused():

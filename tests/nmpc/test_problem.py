@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from companion.drag import Drag
 from companion.nmpc import Settings, Start, Weights
 from companion.nmpc.model import Given, Motion
 from companion.nmpc.models import MODEL_NAMES, make_model
@@ -19,7 +20,8 @@ from tests.attitude.independent import attitudes
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
 STEADY = 6.0
 """On it, s: long after its beginning, long before its end."""
-SETTINGS = Settings(drag=1.0, iterations=30)
+DRAG = Drag(0.75, 0.05)
+SETTINGS = Settings(iterations=30)
 
 
 def nodes(settings, time):
@@ -29,7 +31,7 @@ def nodes(settings, time):
             CIRCLE.at(time + k * settings.step),
             start,
             0.0,
-            settings.drag,
+            DRAG,
             settings.gravity,
             (0,) * 3,
         )
@@ -39,7 +41,7 @@ def nodes(settings, time):
 
 def given(settings, c=(0.0, 0.0)):
     yaw = attitudes(c, [0.0])[0].as_euler("ZYX")[0]
-    return Given(0.0, 0.0, 0.0, yaw, max(sin(settings.max_tilt), hypot(*c)))
+    return Given(0.0, 0.0, 0.0, yaw, max(sin(settings.max_tilt), hypot(*c)), *DRAG)
 
 
 def on_circle(time):
@@ -61,7 +63,7 @@ def at_rest(time):
 
 @pytest.mark.parametrize("model", MODEL_NAMES)
 def test_on_the_reference_the_plan_is_what_the_reference_takes(model):
-    settings = Settings(model=model, drag=1.0, iterations=30, max_tilt_rate=4.0)
+    settings = Settings(model=model, iterations=30, max_tilt_rate=4.0)
     node = nodes(settings, STEADY)[0]
     known = given(settings, (node.north, node.east))
     plan = Problem(settings).solve(0.0, on_circle(STEADY), nodes(settings, STEADY), known)
@@ -112,7 +114,7 @@ def tilt_rate(c, speed):
 
 
 def test_a_single_iteration_from_anywhere_keeps_the_limits():
-    settings = Settings(drag=1.0, max_tilt=0.6, max_tilt_rate=1.5, max_yaw_rate=0.5)
+    settings = Settings(max_tilt=0.6, max_tilt_rate=1.5, max_yaw_rate=0.5)
     problem, random = Problem(settings), np.random.default_rng(3)
     ahead, reached = nodes(settings, STEADY), []
     for _ in range(40):
@@ -145,7 +147,7 @@ def test_tilted_beyond_the_limit_it_comes_back_instead_of_failing():
 
 
 def test_the_proposed_model_knows_no_limit():
-    settings = Settings(model="proposed", drag=1.0)
+    settings = Settings(model="proposed")
     plan = Problem(settings).solve(0.0, at_rest(STEADY), nodes(settings, STEADY), given(settings))
     assert hypot(plan.north, plan.east) > 1.0
 
@@ -176,7 +178,7 @@ def test_a_plan_is_moved_on_by_parts_of_a_step():
 
 
 def test_a_real_time_iteration_is_one():
-    problem = Problem(Settings(drag=1.0))
+    problem = Problem(Settings())
     plan = problem.solve(0.0, at_rest(STEADY), nodes(SETTINGS, STEADY), given(SETTINGS))
     assert (plan.iterations, plan.converged, plan.solved) == (1, False, True)
 

@@ -14,6 +14,7 @@ import psutil
 import pytest
 
 from companion.attitude import BodyRates, Coefficients, attitude
+from companion.drag import Drag
 from companion.extras import MissingExtraError
 from companion.nmpc import Input, Request, Settings, Solver, Start, Trouble, Vehicle, process
 from companion.nmpc.messages import (
@@ -27,7 +28,8 @@ from companion.nmpc.messages import (
 from companion.nmpc.planning import Planning
 from companion.trajectory.figures import Hover, Laps, circle
 
-SETTINGS = Settings(drag=1.0, dead_time=0.045, deadline=2.0)
+SETTINGS = Settings(dead_time=0.045, deadline=2.0)
+DRAG = Drag(0.6, 0.08)
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
 LONG = 20.0
 """More than anything here takes, s."""
@@ -65,7 +67,7 @@ def request(number, **changes):
     time = 6.0 + 0.02 * number
     sample = CIRCLE.at(time)
     rest = BodyRates(0.0, 0.0, 0.0)
-    vehicle = Vehicle(time, sample.position, sample.velocity, (1.0, 0.0, 0.0, 0.0), rest)
+    vehicle = Vehicle(time, sample.position, sample.velocity, (1.0, 0.0, 0.0, 0.0), rest, drag=DRAG)
     inputs = tuple(Input(time - 0.02 * k, 0.01 * k, 0.0, 0.1, 9.8) for k in range(5, 0, -1))
     vehicle = vehicle._replace(**changes)
     return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)

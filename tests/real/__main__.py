@@ -1,6 +1,6 @@
 """Flights on a real autopilot in its simulation: `python -m tests.real px4 killed pilot*20`.
 
-One line of JSON a flight. Needs the autopilots (see `vehicle.py`), so `make test` leaves it alone.
+One line of JSON a flight. Needs the autopilots (see `build.py`), so `make test` leaves it alone.
 """
 
 import argparse
@@ -8,8 +8,9 @@ import json
 import sys
 import traceback
 
+from tests.real.build import REAL
 from tests.real.rows import ROWS
-from tests.real.vehicle import REAL, real_vehicle
+from tests.real.vehicle import real_vehicle
 
 ARGUMENTS = {"px4": ["PX4_PARAM_COM_OBL_RC_ACT=4"], "ardupilot": []}
 

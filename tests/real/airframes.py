@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.real.vehicle import REAL
+from tests.real.build import REAL
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Figures of stated flights: `python -m tests.real.figures px4 corners400*3 circle5+eight5`.
 
 One line of JSON a flight, at the end one table. Vehicles: px4, ardupilot (real ones, see
-`vehicle.py`), mock-px4, mock-ardupilot.
+`build.py`), mock-px4, mock-ardupilot.
 """
 
 import argparse

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import yaml
 
-from tests.real.vehicle import ROOT, merged
+from tests.real.build import ROOT
+from tests.real.vehicle import merged
 
 SIMULATION = {
     # The program arms: nobody holds a transmitter.
@@ -43,16 +44,19 @@ class Part(NamedTuple):
         programme: its name in `flight.programme`.
         settings: what it needs.
         trajectory: what `flight.trajectory` is to hold, or None.
+        predictive: the same maneuver as a trajectory, which is all that predictive control flies.
     """
 
     programme: str
     settings: dict
     trajectory: dict | None = None
+    predictive: dict | None = None
 
 
 def _circle(radius: float, speed: float, laps: float, settings: dict) -> Part:
-    circle = {"circle": {"radius_m": radius, "speed_m_s": speed, "laps": laps}}
-    return Part("circle", merged(settings, circle))
+    circle = {"radius_m": radius, "speed_m_s": speed, "laps": laps}
+    same = {"circle": {**circle, "acceleration_m_s2": 3.0, "heading": "fixed"}}
+    return Part("circle", merged(settings, {"circle": circle}), predictive=same)
 
 
 def _eight(half_width: float, speed: float, settings: dict) -> Part:
@@ -111,6 +115,8 @@ def configuration(flight: str, base: list[Path], folder: Path, changes: dict) ->
     asked, programme = named(flight), []
     for name in asked.parts:
         part = PARTS[name]
+        if asked.variant == "nmpc" and part.predictive is not None:
+            part = part._replace(programme="trajectory", trajectory=part.predictive)
         config = _within(config, part.settings)
         if part.trajectory is not None:
             path = folder / f"{name}.yaml"

@@ -93,6 +93,7 @@ class Flying:
         """All figures that the flight's folder and the truth give."""
         log = Path(result["log"])
         tracking = _rows(log / "tracking.csv")
+        assert len(tracking) > 2, "hardly anything was flown under control"
         truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
         out: dict = {"reported": result["tracking"]}
         if (log / "response.csv").exists():

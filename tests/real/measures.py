@@ -34,17 +34,19 @@ _SHORTEST = 1.0
 """A part that lasts less is not measured, s."""
 
 
-def straightness(response: Floats, truth: Truth, gain: float) -> dict[str, float] | None:
+def straightness(response: Floats, truth: Truth | None, gain: float) -> dict[str, float] | None:
     """Cross-axis of the steps by telemetry and by truth; None where none was flown.
 
     Args:
         response: (n, 7), rows of `FlightTrace.response`.
-        truth: of that flight.
+        truth: of that flight, or None where there is none to be had.
         gain: p, 1/s.
     """
     told = measure_response(response, gain)
     if told is None:
         return None
+    if truth is None:
+        return {"telemetry": told.cross_axis_max}
     q = true_attitudes(response, truth)
     turn = mean_angle([heading(a) - heading(b) for a, b in zip(response[:, 1:5], q, strict=True)])
     rows = response.copy()
@@ -137,38 +139,41 @@ def maneuvers(tracking: Floats) -> tuple[list[slice], list[slice]]:
     return [part for part in parts if _lasts(time, part)], [p for p in calm if _lasts(time, p)]
 
 
-def tracking_errors(tracking: Floats, positions: Floats, truth: Truth) -> dict[str, list[dict]]:
-    """Per maneuver, errors by telemetry and by truth, m.
+def tracking_errors(
+    tracking: Floats, positions: Floats, truth: Truth | None
+) -> dict[str, list[dict]]:
+    """Per maneuver, errors by the program's estimate, by telemetry and by truth, m.
 
     Args:
         tracking: (n, 7), rows of `FlightTrace.tracking`.
         positions: (m, 4), vehicle time s, north, east, down m, as telemetry told them.
-        truth: of that flight.
+        truth: of that flight, or None where there is none to be had.
     """
-    time = tracking[:, 0]
-    inside = (time > positions[0, 0]) & (time < positions[-1, 0])
+    inside = (tracking[:, 0] > positions[0, 0]) & (tracking[:, 0] < positions[-1, 0])
     tracking = tracking[inside]
     time = tracking[:, 0]
     told = np.column_stack([np.interp(time, positions[:, 0], axis) for axis in positions[:, 1:].T])
-    true = truth.position_at(time)
-    shift = (told - true).mean(axis=0)
+    seen = {"program": tracking[:, 4:7], "telemetry": told}
+    if truth is not None:
+        true = truth.position_at(time)
+        seen["truth"] = true + (told - true).mean(axis=0)
     moving, calm = maneuvers(tracking)
     return {
-        name: [_part_errors(tracking[part], told[part], true[part] + shift) for part in parts]
+        name: [_part_errors(tracking, seen, part) for part in parts]
         for name, parts in (("moving", moving), ("hover", calm))
     }
 
 
-def _part_errors(rows: Floats, told: Floats, true: Floats) -> dict:
-    reference = rows[:, 1:4]
-    velocity = np.gradient(reference, rows[:, 0], axis=0)
+def _part_errors(tracking: Floats, seen: dict[str, Floats], part: slice) -> dict:
+    time, reference = tracking[part, 0], tracking[part, 1:4]
+    velocity = np.gradient(reference, time, axis=0)
+    errors = {name: split_error(at[part] - reference, velocity) for name, at in seen.items()}
+    if "truth" in seen:
+        errors["estimator"] = split_error(seen["telemetry"][part] - seen["truth"][part], velocity)
     return {
-        "seconds": round(float(rows[-1, 0] - rows[0, 0]), 1),
+        "seconds": round(float(time[-1] - time[0]), 1),
         "speed": round(float(np.linalg.norm(velocity, axis=1).max()), 2),
-        "program": split_error(rows[:, 4:7] - reference, velocity),
-        "telemetry": split_error(told - reference, velocity),
-        "truth": split_error(true - reference, velocity),
-        "estimator": split_error(told - true, velocity),
+        **errors,
     }
 
 

@@ -1,5 +1,6 @@
 """The mock vehicle in the place of a real autopilot: the same flights, the same measures."""
 
+import itertools
 import json
 import os
 import socket
@@ -13,11 +14,14 @@ import numpy as np
 import yaml
 
 from companion.demo import free_port
-from tests.real.truth import Truth, truth_from
-from tests.real.vehicle import ROOT, Flight, merged, started
+from tests.real.build import ROOT
+from tests.real.truth import Floats, NoTruthError, Truth, truth_from
+from tests.real.vehicle import Flight, merged, started
 
 _POLLED_S = 0.0005
 """Between two questions for the truth; in lockstep vehicle time runs several times as fast."""
+_FILLED_S, _LONGEST_S = 0.01, 0.3
+"""Between two answers of the truth, filled by a cubic with their velocities (1e-4 m), s."""
 _WIND = {"speed_m_s": 3.0, "from_deg": 180.0, "gust_m_s": 0.5}
 
 
@@ -65,8 +69,11 @@ class MockVehicle:
         Raises:
             NoTruthError: it told none.
         """
-        rows = np.array(self._mock.rows if self._mock else []).reshape(-1, 8)
-        return truth_from(rows[:, :4], rows[:, [0, 4, 5, 6, 7]])
+        rows = np.array(self._mock.rows if self._mock else []).reshape(-1, 11)
+        if len(rows) < 2:
+            raise NoTruthError("the mock told no truth")
+        rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
+        return truth_from(_filled(rows[:, :7]), rows[:, [0, 7, 8, 9, 10]])
 
     def bring_down(self) -> None:
         """The next flight has a vehicle of its own."""
@@ -74,6 +81,25 @@ class MockVehicle:
     def load(self) -> str:
         """Of this computer, over 1, 5 and 15 minutes."""
         return " ".join(f"{each:.1f}" for each in os.getloadavg())
+
+
+def _filled(rows: Floats) -> Floats:
+    """Positions every 10 ms or more often: a busy computer lets us ask more rarely.
+
+    Args:
+        rows: (n, 7), rising: time s, position m, velocity m/s.
+    """
+    parts = [rows[:, :4]]
+    for (t0, *a), (t1, *b) in itertools.pairwise(rows):
+        h = t1 - t0
+        if not _FILLED_S < h < _LONGEST_S:
+            continue
+        s = np.arange(_FILLED_S, h, _FILLED_S)[:, None] / h
+        (p0, v0), (p1, v1) = (np.split(np.array(each), 2) for each in (a, b))
+        cubic = (1 + 2 * s) * (1 - s) ** 2 * p0 + s * (1 - s) ** 2 * h * v0
+        cubic += s**2 * (3 - 2 * s) * p1 + s**2 * (s - 1) * h * v1
+        parts.append(np.column_stack([t0 + h * s, cubic]))
+    return np.concatenate(parts)
 
 
 class _Mock:
@@ -111,5 +137,7 @@ class _Mock:
                     state = json.loads(channel.recv(65536))
                 except (TimeoutError, ConnectionRefusedError):
                     continue
-                self.rows.append([state["time"], *state["position"], *state["q"]])
+                self.rows.append(
+                    [state["time"], *state["position"], *state["velocity"], *state["q"]]
+                )
                 time.sleep(_POLLED_S)

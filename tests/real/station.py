@@ -1,5 +1,6 @@
 """A ground station on a second link, with a pilot's commands, and what it sees."""
 
+import struct
 import threading
 import time
 from math import acos, cos, degrees, hypot, inf
@@ -7,8 +8,12 @@ from typing import NamedTuple
 
 from pymavlink import mavutil
 
+from tests.real.build import Build
 from tests.real.hil_truth import HilTruth
 from tests.real.truth import north_east
+
+_INT32 = 6
+"""MAV_PARAM_TYPE_INT32."""
 
 
 class Seen(NamedTuple):
@@ -46,21 +51,21 @@ class Station:
         texts: what it said, with the time.
     """
 
-    def __init__(self, autopilot: str) -> None:
-        self.autopilot = autopilot
+    def __init__(self, build: Build) -> None:
+        self.autopilot = autopilot = build.autopilot
         self.told: list[Told] = []
         self._seen: list[Seen] = []
         self.texts: list[tuple[float, str]] = []
         self.acks: list[tuple[float, int, int]] = []
         self.landed = 0
+        self._kinds: dict[str, int] = {}
         self._up = 0.0
         self._origin: tuple[float, float] | None = None
         self._base = 0
         self._status = 0
-        address = "udpin:127.0.0.1:14550" if autopilot == "px4" else "tcp:127.0.0.1:5762"
         dialect = "development" if autopilot == "px4" else "ardupilotmega"
-        self._links = [mavutil.mavlink_connection(address, dialect=dialect)]
-        self.hil = HilTruth() if autopilot == "px4" else None
+        self._links = [mavutil.mavlink_connection(build.station, dialect=dialect)]
+        self.hil = HilTruth() if build.truth == "hil" else None
         self._running = True
         self._threads = [
             threading.Thread(target=self._listen, args=(link,), daemon=True) for link in self._links
@@ -99,8 +104,17 @@ class Station:
         return self.command(176, 1, ARDUPILOT_MODES[name])
 
     def set_parameter(self, name: str, value: float) -> None:
-        """ArduPilot's floats; PX4 has `px4-param`."""
-        self._links[0].mav.param_set_send(1, 1, name.encode(), value, 9)
+        """Set a parameter, whatever its type; PX4 wants the bytes of an integer as they are."""
+        self._kinds.pop(name, None)
+        deadline = time.monotonic() + 10.0
+        while name not in self._kinds:
+            assert time.monotonic() < deadline, f"the autopilot has no parameter {name}"
+            self._links[0].mav.param_request_read_send(1, 1, name.encode(), -1)
+            time.sleep(0.2)
+        kind = self._kinds[name]
+        if self.autopilot == "px4" and kind == _INT32:
+            (value,) = struct.unpack("<f", struct.pack("<i", round(value)))
+        self._links[0].mav.param_set_send(1, 1, name.encode(), value, kind)
 
     @property
     def mode(self) -> str:
@@ -198,6 +212,8 @@ class Station:
             self.texts.append((now, message.text.strip()))
         elif kind == "COMMAND_ACK":
             self.acks.append((now, message.command, message.result))
+        elif kind == "PARAM_VALUE":
+            self._kinds[message.param_id] = message.param_type
         elif kind == "EXTENDED_SYS_STATE":
             self.landed = message.landed_state
         elif kind == "GLOBAL_POSITION_INT":

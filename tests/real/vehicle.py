@@ -1,8 +1,4 @@
-"""A real autopilot in its simulation, and flights of `companion fly` on it.
-
-`REAL` names the folder that holds `px4/start`, `ardupilot/start` and `stop`; without it
-`../shared/real`, beside the repository.
-"""
+"""A real autopilot in its simulation, and flights of `companion fly` on it."""
 
 import json
 import os
@@ -12,23 +8,20 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from fcntl import LOCK_EX, flock
 from pathlib import Path
 
 import yaml
 
+from tests.real.build import ROOT, Build, build_of, running
 from tests.real.dataflash import DataflashLog, newest_log
 from tests.real.relay import Relay
 from tests.real.station import Station
 from tests.real.truth import Truth
 
-ROOT = Path(__file__).parents[2]
-REAL = Path(os.environ.get("REAL", ROOT.parent / "shared" / "real"))
 PORTS = {"px4": (14540, 14640), "ardupilot": (5760, 5860)}
-"""The autopilot's, and the one that the program is given."""
-DIRECT = {"px4": "udpin://127.0.0.1:14540", "ardupilot": "tcp://127.0.0.1:5760"}
-"""The autopilot's own link, where nothing stands between."""
+"""Of the autopilot, and of the relay that the program is given instead."""
 TUNED = {
     "px4": {"thrust": {"hover_thrust": 0.49}, "guidance": {"drag_per_s": 1.0}},
     "ardupilot": {"thrust": {"hover_thrust": 0.37}, "guidance": {"drag_per_s": 0.3}},
@@ -59,19 +52,16 @@ class Vehicle:
         endpoint: for `link.endpoint`.
     """
 
-    def __init__(self, autopilot: str, folder: Path, *, relayed: bool = True) -> None:
-        self.autopilot, self.folder = autopilot, folder
-        vehicle_port, port = PORTS[autopilot]
-        self.relay = Relay(autopilot, vehicle_port, port) if relayed else None
+    def __init__(self, build: Build, folder: Path, *, relayed: bool = True) -> None:
+        self.autopilot, self.folder, self.build = build.autopilot, folder, build
+        self.relay = Relay(self.autopilot, *PORTS[self.autopilot]) if relayed else None
+        self.endpoint = build.endpoint if self.relay is None else self.relay.endpoint
         # ArduPilot boots when a client comes to its first port, and must keep it until it runs.
-        first = None
-        if autopilot == "ardupilot" and not relayed:
-            first = socket.create_connection(("127.0.0.1", vehicle_port))
-        self.endpoint = DIRECT[autopilot] if self.relay is None else self.relay.endpoint
-        self.station = Station(autopilot)
-        self.station.until(lambda: self.station.told, 60.0, "heartbeat")
-        if first is not None:
-            first.close()
+        scheme, _, address = self.endpoint.partition("://")
+        first = _connected(address, build.ready_s) if scheme == "tcp" else nullcontext()
+        with first:
+            self.station = Station(build)
+            self.station.until(lambda: self.station.told, build.ready_s, "heartbeat")
         self.station.ask_for_rates()
         self.flown: list[Flight] = []
         self._logs: dict[Path, DataflashLog] = {}
@@ -86,11 +76,7 @@ class Vehicle:
 
     def parameter(self, name: str, value: float) -> None:
         """Set a parameter of the autopilot, whatever its type."""
-        if self.autopilot == "px4":
-            tool = self.folder / "bin" / "px4-param"
-            subprocess.run([tool, "set", name, f"{value:g}"], check=True, capture_output=True)
-        else:
-            self.station.set_parameter(name, value)
+        self.station.set_parameter(name, value)
 
     def fly(self, *, prelude: str = "", **changes) -> "Flight":
         """Begin `companion fly`; `prelude` is Python that its process runs before."""
@@ -122,11 +108,13 @@ class Vehicle:
         for name, value in WIND[self.autopilot].items():
             self.parameter(name, value if on else 0.0)
 
-    def truth(self, arrival: float, vehicle_time: float) -> Truth:
+    def truth(self, arrival: float, vehicle_time: float) -> Truth | None:
         """The motion since then: by our clock (`time.monotonic`), by the vehicle's, s."""
         if self.station.hil is not None:
             return self.station.hil.since(arrival)
-        log = newest_log(self.folder / "logs")
+        if self.build.truth == "none":
+            return None
+        log = newest_log(Path(self.build.truth).expanduser())
         if log not in self._logs:
             self._logs[log] = DataflashLog(log)
         return self._logs[log].truth(vehicle_time)
@@ -229,17 +217,26 @@ def real_vehicle(
         relayed: whether a `Relay` stands between it and the program.
         fifo: before other programs of this computer (SCHED_FIFO), where that is allowed.
     """
-    folder = folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))
-    before = ["chrt", "-f", "40"] if fifo else []
+    folder = (folder or Path(tempfile.mkdtemp(prefix=f"real-{autopilot}-"))).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    build = build_of(autopilot, folder, list(arguments))
+    log = folder.with_suffix(".log")
     with Path(f"/tmp/{autopilot}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
-        start, stop = REAL / autopilot / "start", REAL / "stop"
-        try:
-            subprocess.run([*before, start, folder, *arguments], check=True, capture_output=True)
-            vehicle = Vehicle(autopilot, folder, relayed=relayed)
+        with running(build, log, fifo=fifo):
+            vehicle = Vehicle(build, folder, relayed=relayed)
             try:
                 yield vehicle
             finally:
                 vehicle.close()
-        finally:
-            subprocess.run([stop, folder], check=False)
+
+
+def _connected(address: str, seconds: float) -> socket.socket:
+    """A connection to `host:port`, which may not listen yet."""
+    host, _, port = address.rpartition(":")
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        with suppress(OSError):
+            return socket.create_connection((host, int(port)))
+        time.sleep(0.2)
+    raise AssertionError(f"nobody listens on {address} after {seconds} s")

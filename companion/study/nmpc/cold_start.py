@@ -4,8 +4,10 @@ from math import inf
 from typing import NamedTuple
 
 from companion.attitude import BodyRates, Coefficients, attitude
+from companion.drag import Drag
 from companion.nmpc import ModelName, Request, Start, Status, Vehicle
 from companion.nmpc.planning import Planning
+from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contest import CIRCLE
 from companion.study.nmpc.contestants import MODELS, Contestant
 from companion.trajectory.sample import Vector
@@ -65,7 +67,12 @@ def count_iterations() -> Counts:
 
 def _request(state: State) -> Request:
     vehicle = Vehicle(
-        0.0, state.away, state.velocity, attitude(state.coefficients, 0.0), state.body_rates
+        0.0,
+        state.away,
+        state.velocity,
+        attitude(state.coefficients, 0.0),
+        state.body_rates,
+        drag=Drag(plant.DRAG),
     )
     north, east, down = _ON_THE_CIRCLE.position
     return Request(0, vehicle, CIRCLE.begin, Start((-north, -east, -down)), ())

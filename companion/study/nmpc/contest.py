@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.attitude import Target
+from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
 from companion.nmpc import Input, Request, Start, Status, Vehicle
 from companion.nmpc.planning import Planning
@@ -72,7 +73,14 @@ class Flight:
     def step(self) -> None:
         """One period: ask, and meanwhile fly what was answered before."""
         now, vehicle, flown = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
-        known = Vehicle(now, vehicle.position, vehicle.velocity, vehicle.body.q, vehicle.body.rates)
+        known = Vehicle(
+            now,
+            vehicle.position,
+            vehicle.velocity,
+            vehicle.body.q,
+            vehicle.body.rates,
+            drag=Drag(plant.DRAG),
+        )
         at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS:])
         answer = self._planning.answer(Request(self._periods, known, at, self._start, inputs))
         self.seconds.append(answer.solving)

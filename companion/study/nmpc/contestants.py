@@ -33,7 +33,6 @@ class Contestant(NamedTuple):
             yaw_gain=plant.YAW_GAIN,
             lag=max(0.25 / plant.GAIN, 1e-3 * plant.LAG_MS),  # of the planner's reference model
             dead_time=1e-3 * plant.DEAD_TIME_MS if self.told else 0.0,
-            drag=plant.DRAG,
             max_tilt=plant.MAX_TILT,
             max_tilt_rate=plant.MAX_TILT_RATE,
             max_yaw_rate=plant.MAX_YAW_RATE,

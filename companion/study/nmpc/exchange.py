@@ -6,8 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.attitude import BodyRates
+from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
 from companion.nmpc import Input, Request, Solver, Start, Trouble, Vehicle
+from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contest import EIGHT
 from companion.study.nmpc.contestants import RATE_HZ, Contestant
 from companion.study.step import Floats
@@ -69,7 +71,12 @@ def _request(number: int) -> Request:
     time = number / RATE_HZ
     sample = EIGHT.trajectory.at(time)
     vehicle = Vehicle(
-        time, sample.position, sample.velocity, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+        time,
+        sample.position,
+        sample.velocity,
+        (1.0, 0.0, 0.0, 0.0),
+        BodyRates(0.0, 0.0, 0.0),
+        drag=Drag(plant.DRAG),
     )
     inputs = tuple(Input(time - k / RATE_HZ, 0.0, 0.0, 0.0, GRAVITY) for k in range(5, 0, -1))
     return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)
