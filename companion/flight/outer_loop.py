@@ -22,6 +22,7 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.known_drag import drag_prior
 from companion.nmpc import Settings, Solver
 from companion.yaml_file import ConfigError
@@ -34,6 +35,15 @@ _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
+_POSITION_PULL = 4.0
+"""How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
+0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
+_CORRECTS_WITHIN = 0.65
+"""Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
+_CORRECTION_WINDOW = 0.15
+"""Over which their corrections are averaged, s."""
+_LARGEST_CORRECTION = 0.2
+"""Of what they still have to correct, m: the noise of a bad GPS must not move the vehicle."""
 
 
 def tilt_response(config: Config) -> InnerResponse:
@@ -110,8 +120,21 @@ def motion_estimate(
     """
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
-    settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), DragEstimate(drag_prior(config)), offset)
+    settings = ObserverSettings(
+        bandwidth, _POSITION_TIME, _POSITION_PULL, guidance.max_disturbance_m_s2
+    )
+    correction = CorrectionSettings(
+        _CORRECTS_WITHIN,
+        _CORRECTION_WINDOW,
+        _LARGEST_CORRECTION,
+        _MS * guidance.position_lateness_ms,
+    )
+    return MotionEstimate(
+        MotionObserver(settings),
+        PositionCorrection(correction),
+        DragEstimate(drag_prior(config)),
+        offset,
+    )
 
 
 def thrust_limits(config: Config) -> tuple[float, float]:
