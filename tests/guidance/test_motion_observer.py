@@ -70,7 +70,8 @@ def test_a_gap_and_a_reset_begin_anew():
     observer = MotionObserver(SETTINGS)
     assert observer.at(0.0, (0.0, 0.0)) is None
     for n in range(60):
-        observer.observe(n / 30, VehicleMotion((0.0, 0.0, 0.0), (n / 10, 0.0, 0.0)), (0.0, 0.0))
+        position, velocity = (1.5 * (n / 30) ** 2, 0.0, 0.0), (n / 10, 0.0, 0.0)
+        observer.observe(n / 30, VehicleMotion(position, velocity), (0.0, 0.0))
     assert observer.disturbance[0] == pytest.approx(3.0, abs=0.1)
     after = VehicleMotion((9.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     observer.observe(10.0, after, (0.0, 0.0))
