@@ -35,13 +35,13 @@ _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
-_POSITION_PULL = 4.0
+_POSITION_PULL = 2.0
 """How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
 0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
 _CORRECTS_WITHIN = 0.65
 """Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
-_CORRECTION_WINDOW = 0.15
-"""Over which their corrections are averaged, s."""
+_CORRECTION_WINDOW = 0.1
+"""Over which their corrections are averaged, twice, s."""
 _LARGEST_CORRECTION = 0.2
 """Of what they still have to correct, m: the noise of a bad GPS must not move the vehicle."""
 

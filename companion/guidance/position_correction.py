@@ -16,7 +16,7 @@ class CorrectionSettings:
 
     Attributes:
         ahead: for how long the estimator would go on correcting, s: 1/(its gain on a position).
-        window: over which its correction is averaged, s, positive.
+        window: over which its correction is averaged, twice, s, positive: positions are noisy.
         largest: of what is taken ahead, m.
         lateness: by which its position is late even when it has corrected all, s.
     """
@@ -48,6 +48,7 @@ class PositionCorrection:
         self._time = 0.0
         self._before: VehicleMotion | None = None
         self._unexplained: Horizontal = (0.0, 0.0)
+        self._more: Horizontal = (0.0, 0.0)
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its position corrected.
@@ -60,32 +61,30 @@ class PositionCorrection:
         before, dt = self._before, time - self._time
         self._time, self._before = time, measured
         if before is None or not 0.0 < dt < _LONGEST:
-            self._unexplained = (0.0, 0.0)
+            self._unexplained = self._more = (0.0, 0.0)
         else:
-            self._unexplained = self._moved_on(before, measured, dt)
-        scale = settings.ahead / settings.window
-        more = limited(scale * self._unexplained[0], scale * self._unexplained[1], settings.largest)
+            self._take(before, measured, dt)
         (north, east, down), velocity = measured
         return VehicleMotion(
             (
-                north + more[0] + settings.lateness * velocity[0],
-                east + more[1] + settings.lateness * velocity[1],
+                north + self._more[0] + settings.lateness * velocity[0],
+                east + self._more[1] + settings.lateness * velocity[1],
                 down,
             ),
             velocity,
         )
 
-    def _moved_on(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> Horizontal:
-        """The way of the latest `window` s that the velocity does not explain, m."""
-        kept, most = exp(-dt / self._settings.window), self._settings.largest
-        north, east = (
-            kept
-            * (
-                self._unexplained[axis]
-                + now.position_ned[axis]
-                - before.position_ned[axis]
-                - 0.5 * dt * (before.velocity_ned[axis] + now.velocity_ned[axis])
-            )
-            for axis in (0, 1)
-        )
-        return limited(north, east, most)
+    def _take(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
+        """Go on by what the velocity does not explain of the way since the last position."""
+        settings = self._settings
+        kept = exp(-dt / settings.window)
+        (p_before, v_before), (p_now, v_now) = before, now
+        way, more = [0.0, 0.0], [0.0, 0.0]
+        for axis in (0, 1):
+            explained = 0.5 * dt * (v_before[axis] + v_now[axis])
+            step = p_now[axis] - p_before[axis] - explained
+            way[axis] = kept * (self._unexplained[axis] + step)
+            wanted = settings.ahead / settings.window * way[axis]
+            more[axis] = wanted + kept * (self._more[axis] - wanted)
+        self._unexplained = limited(way[0], way[1], settings.largest)
+        self._more = limited(more[0], more[1], settings.largest)
