@@ -31,6 +31,8 @@ WIND = {
     "ardupilot": {"SIM_WIND_SPD": 3.0, "SIM_WIND_DIR": 180.0, "SIM_WIND_TURB": 1.0},
 }
 """Parameters of the simulators; PX4's has no turbulence."""
+_HEARTBEATS_S = 1.2
+"""PX4 tells once a second whether it is armed."""
 HOVER = {
     "flight": {"arm": True, "takeoff_height_m": 5.0, "programme": ["hover"]},
     "hover": {"duration_s": 120.0},
@@ -124,6 +126,8 @@ class Vehicle:
         if self.relay is not None:
             self.relay.plug(up=True, down=True)
         if self.station.armed:
+            time.sleep(_HEARTBEATS_S)  # it may have been disarmed since the latest one
+        if self.station.armed:
             if self.station.mode != "LAND":
                 self.station.set_mode("LAND")
             self.station.until(lambda: not self.station.armed, 90.0, "disarming")
@@ -162,8 +166,17 @@ class Flight:
         return now
 
     def finish(self, seconds: float = 120.0) -> dict:
-        """The summary, with the exit code."""
-        out, _ = self.process.communicate(timeout=seconds)
+        """The summary; a program that takes longer than this is killed.
+
+        Raises:
+            AssertionError: it was.
+        """
+        try:
+            out, _ = self.process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+            raise AssertionError(f"the program did not end within {seconds} s") from None
         lines = out.splitlines()
         self.result = json.loads(lines[-1]) if lines else {}
         return self.result
