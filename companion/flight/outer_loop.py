@@ -35,7 +35,7 @@ _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
-_POSITION_PULL = 2.0
+_POSITION_PULL = 4.0
 """How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
 0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
 _CORRECTS_WITHIN = 0.65

@@ -6,7 +6,7 @@ import pytest
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import VehicleMotion
 
-SETTINGS = ObserverSettings(bandwidth=4.0, position_time=0.1, position_pull=2.0, largest=6.0)
+SETTINGS = ObserverSettings(bandwidth=4.0, position_time=0.1, position_pull=4.0, largest=6.0)
 
 
 def flown(wind, seconds=4.0, dt=1.0 / 30.0, noise=0.0, drag=1.0, seed=1, settings=SETTINGS):
