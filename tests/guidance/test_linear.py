@@ -148,3 +148,25 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
     situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     target, _, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))
+
+
+def test_the_later_target_is_the_one_of_a_period_later():
+    moving = replace(SETTINGS, period=0.02)
+    at = circling(2.0)
+    motion = VehicleMotion(at.position_ned, at.velocity_ned)
+    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
+    target, later, _ = LinearGuidance(moving).command(circling, 2.0, situation)
+    turn = math.atan2(later.east, later.north) - math.atan2(target.east, target.north)
+    assert math.remainder(turn, math.tau) == pytest.approx(0.02, abs=2e-3)  # of 1 rad/s
+    assert later.heading == pytest.approx(target.heading + 0.02)
+
+
+def test_an_open_loop_step_does_not_move():
+    step = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
+    situation = Situation(
+        VehicleMotion(REST, REST), VehicleMotion(REST, REST), (0.0, 0.0), (0.0, 0.0), DRAG, THRUST
+    )
+    target, later, _ = LinearGuidance(replace(SETTINGS, period=0.02)).command(
+        lambda _: step, 0.0, situation
+    )
+    assert target == later
