@@ -24,6 +24,7 @@ from companion.guidance import (
     chain_gains,
     specific_thrust,
 )
+from companion.guidance.lqr import ChainGains
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²
@@ -150,15 +151,15 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))
 
 
-def test_the_later_target_is_the_one_of_a_period_later():
-    moving = replace(SETTINGS, period=0.02)
-    at = circling(2.0)
-    motion = VehicleMotion(at.position_ned, at.velocity_ned)
+def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
+    settings = replace(SETTINGS, period=0.02, gains=ChainGains(0.0, 0.0, 0.0))
+    motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
-    target, later, _ = LinearGuidance(moving).command(circling, 2.0, situation)
-    turn = math.atan2(later.east, later.north) - math.atan2(target.east, target.north)
-    assert math.remainder(turn, math.tau) == pytest.approx(0.02, abs=2e-3)  # of 1 rad/s
-    assert later.heading == pytest.approx(target.heading + 0.02)
+    guidance = LinearGuidance(settings)
+    before, later, _ = guidance.command(circling, 2.0, situation)
+    then = guidance.command(circling, 2.02, situation).target
+    assert later == pytest.approx(then, abs=1e-3)
+    assert math.hypot(later.north - before.north, later.east - before.east) >= 0.008
 
 
 def test_an_open_loop_step_does_not_move():
