@@ -1,6 +1,7 @@
 """The page is made from rows alone, and its ratios are those of truths."""
 
 from tests.real import table
+from tests.real.build import ROOT
 
 
 def steps(vehicle, truth, **more):
@@ -58,3 +59,10 @@ def test_what_identify_found_is_shown_with_its_spread():
     assert cells(table.markdown(rows), "px4")[1:] == [
         "roll", "48.0 (46.0 to 49.0)", "40.0 (40.0 to 40.0)", "3 of 4"
     ]  # fmt: skip
+
+
+def test_the_page_is_put_between_its_marks_in_the_docs():
+    docs = (ROOT / "docs" / "real-autopilots.md").read_text()
+    once = table.with_page(docs, "first")
+    assert "\nfirst\n" in once
+    assert table.with_page(once, "second") == once.replace("\nfirst\n", "\nsecond\n")
