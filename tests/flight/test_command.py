@@ -19,7 +19,7 @@ def test_halfway_it_is_in_the_middle_and_the_heading_goes_the_short_way():
     )
     between = command.target_at(10.01)
     assert between == pytest.approx((0.15, -0.1, pi, 0.5))
-    assert command.target_at(10.02) == command.later
+    assert command.target_at(10.03) == command.later
 
 
 def test_a_command_without_a_later_target_stays():
