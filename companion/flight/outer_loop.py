@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import radians, tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
-from companion.attitude.reference_model import model_lag
+from companion.attitude.reference_model import model_lag, model_response
 from companion.config import Config
 from companion.flight.follow import Follow
 from companion.flight.motion_estimate import MotionEstimate
@@ -22,6 +22,7 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.known_drag import drag_prior
 from companion.nmpc import Settings, Solver
 from companion.yaml_file import ConfigError
@@ -36,6 +37,15 @@ _USUAL_RATE_LOOP = 0.12
 """Lag and dead time of a rate loop that nobody identified, s: a heavy vehicle's."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
+_POSITION_PULL = 4.0
+"""How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
+0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
+_CORRECTS_WITHIN = 0.65
+"""Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
+_CORRECTION_WINDOW = 0.1
+"""Over which their corrections are averaged, twice, s."""
+_LARGEST_CORRECTION = 0.2
+"""Of what they still have to correct, m: the noise of a bad GPS must not move the vehicle."""
 
 
 def tilt_response(config: Config) -> InnerResponse:
@@ -43,8 +53,8 @@ def tilt_response(config: Config) -> InnerResponse:
     gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
-        lag = model_lag(gain, lag)
-    return InnerResponse(gain, lag, _acts_after(config, dead_time), follows)
+        gain, lag = model_response(gain, model_lag(gain, lag))
+    return InnerResponse(gain, lag, dead_time, follows)
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
@@ -66,14 +76,9 @@ def heading_response(config: Config) -> InnerResponse:
     return InnerResponse(
         config.planner.yaw_gain_per_s,
         _MS * (yaw.lag_ms or 0.0),
-        _acts_after(config, _MS * (yaw.dead_time_ms or 0.0)),
+        _MS * (yaw.dead_time_ms or 0.0),
         config.planner_name == MODEL_FOLLOWING,
     )
-
-
-def _acts_after(config: Config, dead_time: float) -> float:
-    """A command is held for a period of guidance: on average it is half of one late, s."""
-    return dead_time + 0.5 / config.guidance.rate_hz
 
 
 def hold_weights(config: Config) -> Weights:
@@ -82,7 +87,7 @@ def hold_weights(config: Config) -> Weights:
     With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
     own. `tests/flight/test_margins.py` shows what may be wrong with T and with the thrust then.
     """
-    guidance, delay = config.guidance, _delay(config)
+    guidance, delay = config.guidance, hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
         1.0 / delay**4 if position is None else position,
@@ -93,26 +98,31 @@ def hold_weights(config: Config) -> Weights:
 def disturbance_bandwidth(config: Config) -> float:
     """How quickly wind is found, rad/s: as is told, or half as quick again as the hold."""
     told = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / _delay(config) if told is None else told
+    return 1.5 / hold_delay(config) if told is None else told
 
 
-def _delay(config: Config) -> float:
-    """T, s: with a usual rate loop where the vehicle's is not known."""
-    delay = tilt_response(config).slowness
+def hold_delay(config: Config) -> float:
+    """T, s: with a usual rate loop where the vehicle's is not known.
+
+    A command is held for a period of guidance: on average it acts half of one late.
+    """
+    delay = tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
-    tilt, heading = tilt_response(config), heading_response(config)
+    tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
+    # The feedback is held for a period: on average it acts half of one late.
+    slowness = tilt.slowness + 0.5 * period
     drag = drag_prior(config).drag.linear
     weights = _CALM if _identifies(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, tilt_response(config).slowness, drag),
+            gains=chain_gains(weights, slowness, drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
@@ -123,6 +133,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
             heading=heading,
             max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
             thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
+            period=period,
         )
     )
 
@@ -138,8 +149,21 @@ def motion_estimate(
     """
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
-    settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), DragEstimate(drag_prior(config)), offset)
+    settings = ObserverSettings(
+        bandwidth, _POSITION_TIME, _POSITION_PULL, guidance.max_disturbance_m_s2
+    )
+    correction = CorrectionSettings(
+        _CORRECTS_WITHIN,
+        _CORRECTION_WINDOW,
+        _LARGEST_CORRECTION,
+        _MS * guidance.position_lateness_ms,
+    )
+    return MotionEstimate(
+        MotionObserver(settings),
+        PositionCorrection(correction),
+        DragEstimate(drag_prior(config)),
+        offset,
+    )
 
 
 def thrust_limits(config: Config) -> tuple[float, float]:
@@ -171,12 +195,13 @@ def predictive_settings(config: Config) -> Settings:
         ConfigError: the planner's response is too quick for the horizon's steps.
     """
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
+    response = tilt_response(config)
     period = 1.0 / config.guidance.rate_hz
     try:
         return Settings(
-            gain=config.planner.gain_per_s,
+            gain=response.gain,
             yaw_gain=config.planner.yaw_gain_per_s,
-            lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
+            lag=response.lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=slower_tilt(config)[1],
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
