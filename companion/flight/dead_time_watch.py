@@ -33,11 +33,13 @@ class RateLoop(NamedTuple):
         lag: s.
         dead_time: s.
         acceleration_limit: rad/s².
+        damping: of a lag of second order; None: first order.
     """
 
     lag: float | None = None
     dead_time: float | None = None
     acceleration_limit: float | None = None
+    damping: float | None = None
 
 
 class DeadTimeWatch:
@@ -118,6 +120,7 @@ class DeadTimeWatch:
                 followed[sure],
                 loop.lag,
                 loop.acceleration_limit,
+                inf if loop.damping is None else loop.damping,
             )
         return AxisDeadTime(measured, loop.dead_time)
 
