@@ -1,5 +1,7 @@
 """A vehicle that stands disarmed in offboard is asked to hold: it could not be armed again.
 
+PX4's pre-arm checks also fail in AUTO.LAND, where it stays if it was told to land on the ground.
+
 PX4 goes back to the last mode that its user chose when it disarms. After a landing that began in
 OFFBOARD, by our command or by its failsafe, that is OFFBOARD, and without setpoints its pre-arm
 checks fail there for ever (measured).
@@ -8,20 +10,26 @@ checks fail there for ever (measured).
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.orders import enter
 from companion.flight.rig import Rig
-from companion.flight.roles import in_role, require_role
+from companion.flight.roles import in_role, require_role, roles_of
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.mavlink.roles import Role
 
+_OFFBOARD = frozenset({Role.OFFBOARD})
 
-async def leave_offboard(rig: Rig) -> None:
+
+async def leave_offboard(rig: Rig, unready_in: frozenset[Role] = _OFFBOARD) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, and wait until it does.
 
     Nothing is asked of a vehicle that is armed or in any other mode.
 
+    Args:
+        rig: of the flight.
+        unready_in: what the modes are to a flight that are to be left.
+
     Raises:
         FlightEnded: Somebody else changed its mode meanwhile, or it does not want to hold.
     """
-    if rig.armed() or not in_role(rig.link, Role.OFFBOARD):
+    if rig.armed() or not roles_of(rig.link) & unready_in:
         return
     mode = rig.link.state.mode
     rig.note(f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold")
@@ -30,7 +38,7 @@ async def leave_offboard(rig: Rig) -> None:
     def ours() -> None:
         if rig.armed():
             raise FlightEnded("somebody else armed the vehicle", Exit.LET_GO)
-        require_role(rig.link, {Role.OFFBOARD})
+        require_role(rig.link, unready_in)
 
     try:
         await enter(rig, rig.link.family.hold(), ours, lambda: in_role(rig.link, Role.HOLD))

@@ -30,7 +30,10 @@ async def checks(rig: Rig) -> None:
     rig.heartbeat_limit = SLOWEST_HEARTBEAT
     rig.detail = "asking for telemetry"
     await rig.preflight.ask_for_telemetry()
-    await leave_offboard(rig)
+    if rig.config.flight.arm:  # else the pilot, who may have chosen the mode by a switch
+        await leave_offboard(rig, rig.link.family.unready_in)
+    else:
+        await leave_offboard(rig)
     await rig.until(lambda: _ready(rig))
     # Counted only now: a position is not sent before the estimator has one.
     rig.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
@@ -133,7 +136,7 @@ def _ready(rig: Rig) -> bool:
     _refuse(vehicle_checks.armed(state))
     _check_battery(rig)
     missing = rig.link.family.not_ready(state.readiness)
-    rig.detail = missing or ""
+    rig.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 
 

@@ -69,6 +69,7 @@ class ArduPilot:
     dead_man = DeadMan(
         "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
     )
+    unready_in = frozenset[Role]()
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

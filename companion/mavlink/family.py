@@ -58,6 +58,7 @@ class AutopilotFamily(Protocol):
         wanted_rates: Messages the flight needs, with the rate to ask for, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL counts in whole multiples of this.
         dead_man: What it does when setpoints stop.
+        unready_in: What the modes are to a flight in which it stands disarmed and never is ready.
         parameters: Those that matter to a flight by body rates.
     """
 
@@ -69,6 +70,7 @@ class AutopilotFamily(Protocol):
     wanted_rates: Mapping[str, float]
     interval_step_us: int
     dead_man: DeadMan
+    unready_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

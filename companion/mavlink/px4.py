@@ -87,6 +87,7 @@ class Px4:
     )
     interval_step_us = 1
     dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True)
+    unready_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:

@@ -9,7 +9,9 @@ import pytest
 from companion.flight.ending import Exit, FlightEnded
 from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.procedures import _require_landing
+from companion.mavlink.ardupilot import ArduPilot
 from companion.mavlink.errors import CommandRefused
+from companion.mavlink.px4 import Px4
 from companion.mavlink.roles import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
@@ -79,6 +81,14 @@ def test_it_is_asked_once_and_said_so():
 def test_nothing_is_asked_of_any_other_vehicle(vehicle):
     asyncio.run(leave_offboard(vehicle))
     assert (vehicle.sent, vehicle.notes) == (0, [])
+
+
+def test_a_vehicle_that_was_told_to_land_on_the_ground_is_asked_to_hold_before_a_flight():
+    """A real PX4 stays in AUTO.LAND then, and its pre-arm checks fail until another mode."""
+    vehicle = Vehicle(Role.LAND)
+    asyncio.run(leave_offboard(vehicle, Px4.unready_in))
+    assert (vehicle.mode, vehicle.sent, len(vehicle.notes)) == (Role.HOLD, 1, 1)
+    assert not ArduPilot.unready_in  # it is armed in GUIDED, wherever it stood
 
 
 @pytest.mark.parametrize("change", [{"mode": Role.READY}, {"is_armed": True}])

@@ -92,7 +92,7 @@ def began_by(flight: Flight) -> dict:
 
 def begun(vehicle: Vehicle, folder: Path, changes: dict) -> Flight:
     """A flight with the configuration that ships, from when the autopilot obeys it."""
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     config = configuration("hover", [shipped(vehicle.autopilot)], folder, changes)
     flight = vehicle.launch(config, folder=folder / "flight")
     flight.until_obeyed()

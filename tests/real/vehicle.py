@@ -31,6 +31,8 @@ WIND = {
     "ardupilot": {"SIM_WIND_SPD": 3.0, "SIM_WIND_DIR": 180.0, "SIM_WIND_TURB": 1.0},
 }
 """Parameters of the simulators; PX4's has no turbulence."""
+_HEARTBEATS_S = 1.2
+"""PX4 tells once a second whether it is armed."""
 HOVER = {
     "flight": {"arm": True, "takeoff_height_m": 5.0, "programme": ["hover"]},
     "hover": {"duration_s": 120.0},
@@ -123,6 +125,8 @@ class Vehicle:
         """As a pilot would, so that the next flight can begin."""
         if self.relay is not None:
             self.relay.plug(up=True, down=True)
+        if self.station.armed:
+            time.sleep(_HEARTBEATS_S)  # it may have been disarmed since the latest one
         if self.station.armed:
             if self.station.mode != "LAND":
                 self.station.set_mode("LAND")
