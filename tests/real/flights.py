@@ -22,15 +22,13 @@ SIMULATION = {
 }
 """What any flight in a simulation changes."""
 
-FIGURE_2 = {
+CORNERS = {
     "limits": {"max_tilt_deg": 45.0},
-    "corners": {"north_coefficient": 0.4, "east_coefficient": 0.5},
     # Open loop, it flies some metres per corner and up to 9 m/s; what the autopilot does should we
     # fall silent in the middle of it is known and accepted here.
     "flight": {"accept": ["safety.offboard_loss"]},
 }
 STEPS = {"limits": {"max_tilt_deg": 35.0}}
-"""The steps of the paper's figure 2: from corner to corner 80° of tilt."""
 _SPINNING = {"limits": {"max_tilt_rate_deg_s": 400.0}, "safety": {"max_body_rate_deg_s": 700.0}}
 _TILTED = {"limits": {"max_tilt_deg": 52.0, "max_tilt_rate_deg_s": 200.0}}
 _FAST = {"limits": {"max_tilt_deg": 58.0, "max_tilt_rate_deg_s": 200.0, "max_thrust": 1.0}}
@@ -53,6 +51,12 @@ class Part(NamedTuple):
     predictive: dict | None = None
 
 
+def _corners(north: float, east: float, settings: dict) -> Part:
+    """0.4 and 0.5 are the steps of the paper's figure 2: from corner to corner 80° of tilt."""
+    corners = {"corners": {"north_coefficient": north, "east_coefficient": east}}
+    return Part("corners", merged(merged(CORNERS, corners), settings))
+
+
 def _circle(radius: float, speed: float, laps: float, settings: dict) -> Part:
     circle = {"radius_m": radius, "speed_m_s": speed, "laps": laps}
     same = {"circle": {**circle, "acceleration_m_s2": 3.0, "heading": "fixed"}}
@@ -67,8 +71,10 @@ def _eight(half_width: float, speed: float, settings: dict) -> Part:
 PARTS = {
     "hover": Part("hover", {}),
     "steps": Part("steps", STEPS),
-    "corners400": Part("corners", merged(FIGURE_2, _SPINNING)),
-    "corners90": Part("corners", FIGURE_2),
+    "corners400": _corners(0.4, 0.5, _SPINNING),
+    "corners90": _corners(0.4, 0.5, {}),
+    "corners400-small": _corners(0.3, 0.35, _SPINNING),
+    "corners90-small": _corners(0.3, 0.35, {}),
     "circle2": _circle(3.0, 2.0, 3.0, {}),
     "circle5": _circle(5.0, 5.0, 4.0, {"limits": {"max_tilt_deg": 45.0}}),
     "circle8": _circle(8.0, 8.0, 4.0, _FAST),
