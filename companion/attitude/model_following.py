@@ -20,6 +20,7 @@ from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.reference_model import ReferenceModel, model_lag
 from companion.attitude.representation import normalised, wrap_angle
 from companion.attitude.rotation import within, within_limits
+from companion.attitude.sample_hold import SampleHold
 from companion.attitude.target import admissible
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
 from companion.attitude.yaw_model import YawModel
@@ -60,6 +61,7 @@ class ModelFollowingPlanner:
         self._constants = constants
         self._tilt, self._yaw = tilt, yaw
         self._frame_lead = response.frame_lead
+        self._hold = SampleHold()
         self._gain = _fed_back(constants.gain, tilt)
         self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
@@ -94,6 +96,7 @@ class ModelFollowingPlanner:
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         """Begin the plan at `q`, a unit quaternion below the recovery angle."""
+        self._hold.restart()
         w, x, y, z = q
         square, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
@@ -138,8 +141,10 @@ class ModelFollowingPlanner:
             self._started = True
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
-        by_tilt = self._past.at(self._time - self._tilt.dead_time)
-        by_yaw = self._past.at(self._time - self._yaw.dead_time)
+        self._hold.take(dt)
+        now, dt = self._time + self._hold.late, self._hold.step
+        by_tilt = self._past.at(now - self._tilt.dead_time)
+        by_yaw = self._past.at(now - self._yaw.dead_time)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
@@ -149,6 +154,7 @@ class ModelFollowingPlanner:
             heading += (self._tilt.dead_time + self._tilt.lag) * unforeseen
         heading += by_tilt.still - by_yaw.turned
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
+        roll, pitch = self._hold.rates(roll, pitch)
         return BodyRates(
             *within_limits(
                 roll + more_roll,

@@ -43,9 +43,9 @@ def largest_cross_axis(steps_ms, tilt_rate):
 
 @pytest.mark.parametrize(
     ("steps", "bends"),
-    [("regular", 1e-4), ("PX4 at 190 Hz", 1e-3), ("ArduPilot's pairs", 1e-3), ("a stall", 4e-3)],
+    [("regular", 1e-4), ("PX4 at 190 Hz", 1e-4), ("ArduPilot's pairs", 1e-4), ("a stall", 4e-3)],
 )
 def test_the_step_of_figure_2_stays_straight(steps, bends):
-    """The real autopilots are to stay within 0.010 at 400 °/s and 0.004 at 90 °/s."""
+    """Without `SampleHold` PX4's samples bent it by 0.0009, a tenth of what it may bend there."""
     assert largest_cross_axis(STEPS[steps], 400.0) < bends
     assert largest_cross_axis(STEPS[steps], 90.0) < 0.3 * bends
