@@ -33,6 +33,9 @@ class Airframe:
 
 AIRFRAMES = {
     "stock": Airframe(),
+    # The stock one, flown on the simulator's own state: what is left of an error is not the
+    # estimator's.
+    "true-state": Airframe(ardupilot={"AHRS_EKF_TYPE": 10}),
     "unlike": Airframe(
         px4={"SIH_MASS": 1.2, "SIH_IXX": 0.04, "SIH_IYY": 0.03, "SIH_KDV": 0.5},
     ),

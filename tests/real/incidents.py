@@ -111,7 +111,7 @@ def _watched(vehicle: Vehicle, event: float) -> dict:
     """What followed; a vehicle that lands by itself is left to."""
     station = vehicle.station
     time.sleep(max(0.0, event + _WATCHED_S - time.monotonic()))
-    if station.mode not in ("LOITER", "BRAKE"):
+    if station.mode in ("LAND", "RTL", "DESCEND"):
         deadline = time.monotonic() + _LANDED_S
         while station.armed and time.monotonic() < deadline:
             time.sleep(0.1)

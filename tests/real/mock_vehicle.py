@@ -20,6 +20,13 @@ from tests.real.vehicle import Flight, merged, started
 
 _POLLED_S = 0.0005
 """Between two questions for the truth; in lockstep vehicle time runs several times as fast."""
+# The other one's answer is waited for asleep: a real autopilot may fly on the same computer.
+_PATIENT = "from companion.mavlink import lockstep; lockstep._SPIN_S = 0.0"
+_MOCK = """
+from sitl_mock import __main__, server
+server.SPIN_S = 0.0
+raise SystemExit(__main__.main())
+"""
 _FILLED_S, _LONGEST_S = 0.01, 0.3
 """Between two answers of the truth, filled by a cubic with their velocities (1e-4 m), s."""
 _WIND = {"speed_m_s": 3.0, "from_deg": 180.0, "gust_m_s": 0.5}
@@ -60,7 +67,7 @@ class MockVehicle:
         settings = merged(yaml.safe_load(shipped.read_text())["mock"], self._settings)
         self._mock = _Mock(merged(settings, self._wind | {"gcs_port": 0}), folder.parent)
         link = {"endpoint": self._mock.endpoint, "lockstep": True}
-        self.flown.append(started(self, merged(config, {"link": link}), folder, command))
+        self.flown.append(started(self, merged(config, {"link": link}), folder, command, _PATIENT))
         return self.flown[-1]
 
     def truth(self, arrival: float, vehicle_time: float) -> Truth:
@@ -114,7 +121,7 @@ class _Mock:
         arguments = ["--headless", "--lockstep", "--config", str(config)]
         arguments += ["--port", str(port), "--control-port", str(control)]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "sitl_mock", *arguments], cwd=ROOT, stdin=subprocess.DEVNULL,
+            [sys.executable, "-c", _MOCK, *arguments], cwd=ROOT, stdin=subprocess.DEVNULL,
             stdout=(folder / "mock.log").open("w"), stderr=subprocess.STDOUT,
         )  # fmt: skip
         self._address = ("127.0.0.1", control)

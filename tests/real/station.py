@@ -12,6 +12,8 @@ from tests.real.build import Build
 from tests.real.hil_truth import HilTruth
 from tests.real.truth import north_east
 
+_UNREAD = (30, 31, 32, 33, 36, 65, 83, 85, 100)
+"""What PX4 sends a ground station 50 times a second; to decode it takes this computer's time."""
 _INT32 = 6
 """MAV_PARAM_TYPE_INT32."""
 
@@ -89,6 +91,9 @@ class Station:
         wanted = {"px4": (436, 245), "ardupilot": (0, 245, 33, 164)}[self.autopilot]
         for number in wanted:
             self.command(511, number, 40_000)
+            time.sleep(0.05)
+        for number in _UNREAD if self.autopilot == "px4" else ():
+            self.command(511, number, -1)
             time.sleep(0.05)
 
     def command(self, command: int, *parameters: float) -> float:

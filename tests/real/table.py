@@ -1,9 +1,12 @@
 """Rows of flights as one page: `python -m tests.real.table FOLDER...` reads their rows.jsonl.
 
+`--into docs/real-autopilots.md` puts the page between the marks in that file.
+
 Figures are medians over the flights of one kind. `mock` is the truth of the same flight on the mock
 with that autopilot's personality, where it was flown, and `ratio` that of the real one to it.
 """
 
+import argparse
 import json
 import sys
 from collections.abc import Iterable
@@ -15,10 +18,34 @@ _HEAD = ("vehicle", "flight", "planner", *_SAID, "late, ms", "flown", "load", "m
 STRAIGHT, TRACKING = "Straightness: largest distance from the line of a step", "Tracking: RMS, m"
 
 
-def main(folders: list[str]) -> int:
-    """Print the page of what these folders hold."""
-    print(markdown(read(map(Path, folders))))
+_BEGIN, _END = "<!-- table: python -m tests.real.table FOLDER -->", "<!-- end of table -->"
+
+
+def main() -> int:
+    """Print the page of what these folders hold, or put it into a file."""
+    parser = argparse.ArgumentParser(prog="python -m tests.real.table", description=__doc__)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--into", type=Path, metavar="FILE")
+    options = parser.parse_args()
+    page = markdown(read(options.folders))
+    if options.into is None:
+        print(page)
+    else:
+        options.into.write_text(with_page(options.into.read_text(), page))
     return 0
+
+
+def with_page(text: str, page: str) -> str:
+    """A file's text with the page between its marks.
+
+    Raises:
+        ValueError: it has no marks.
+    """
+    before, begin, rest = text.partition(_BEGIN)
+    _, end, after = rest.partition(_END)
+    if not begin or not end:
+        raise ValueError(f"the file lacks the lines {_BEGIN} and {_END}")
+    return f"{before}{begin}\n\n{page}\n{end}{after}"
 
 
 def read(folders: Iterable[Path]) -> list[dict]:
@@ -190,4 +217,4 @@ def _text(value: float | None, digits: int) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

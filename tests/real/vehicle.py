@@ -166,8 +166,17 @@ class Flight:
         return now
 
     def finish(self, seconds: float = 120.0) -> dict:
-        """The summary, with the exit code."""
-        out, _ = self.process.communicate(timeout=seconds)
+        """The summary; a program that takes longer than this is killed.
+
+        Raises:
+            AssertionError: it was.
+        """
+        try:
+            out, _ = self.process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.communicate()
+            raise AssertionError(f"the program did not end within {seconds} s") from None
         lines = out.splitlines()
         self.result = json.loads(lines[-1]) if lines else {}
         return self.result
