@@ -1,6 +1,6 @@
 """ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
@@ -73,6 +73,7 @@ class ArduPilot:
     boot_mode = Mode.STABILIZE
     any_component = True
     system_id_parameter = "MAV_SYSID"
+    unsigned_links: Collection[str] = ("companion",)
     identity = Identity(
         capabilities=64495,
         flight_sw_version=0x04070000,

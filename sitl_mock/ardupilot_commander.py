@@ -9,7 +9,7 @@ from sitl_mock.ardupilot_guided import Guided, Task
 from sitl_mock.ardupilot_mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot_modes import NEEDS_POSITION, STICKS_HOLD
 from sitl_mock.ardupilot_setpoints import FatalSetpointError, attitude_setpoint
-from sitl_mock.ardupilot_texts import CRITICAL
+from sitl_mock.ardupilot_texts import CRITICAL, INFO
 from sitl_mock.commander import ACCEPTED, FAILED
 from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
@@ -23,6 +23,8 @@ from sitl_mock.wire import Message
 LANDED_TO_DISARM_US = 500_000
 """LAND disarms this much after the landing (recorded)."""
 _OWN_COMPONENT = 1
+YAW_ALIGNED_M = 2.8
+"""Above this height the estimator aligns its heading anew, once a flight (recorded: 2.7 to 2.9)."""
 
 
 class ArduPilotCommander:
@@ -64,6 +66,7 @@ class ArduPilotCommander:
         self._landed_since_us = 0
         self._crashed = False
         self._internal_error = False
+        self._yaw_aligned = False
 
     @property
     def under_setpoints(self) -> bool:
@@ -83,7 +86,7 @@ class ArduPilotCommander:
             return FAILED
         state.armed = True
         state.armed_at_us = self._landed_since_us = state.time_us
-        state.flown = False
+        state.flown = self._yaw_aligned = False
         state.home_ned = state.estimate.position_ned
         state.home_set_at_us = state.time_us
         self._announce(Occasion.ARMED, "")
@@ -181,7 +184,18 @@ class ArduPilotCommander:
         self.failsafe.step()
         self._check()
         if state.armed:
+            self._align_yaw()
             self._disarm_on_ground()
+
+    def _align_yaw(self) -> None:
+        """Say that the heading was aligned in the air, as soon as it is high enough."""
+        state = self._state
+        height = state.home_ned[2] - state.estimate.position_ned[2]
+        if self._yaw_aligned or height < YAW_ALIGNED_M:
+            return
+        self._yaw_aligned = True
+        for unit in (0, 1):
+            self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
     def _check(self) -> str | None:
         """Look for what forbids arming, note it in the state and return it."""

@@ -6,6 +6,8 @@ from sitl_mock.ardupilot_boot import RECORDED_READY_S
 from sitl_mock.ardupilot_thrust import specific_thrust
 from sitl_mock.config import AirframeConfig, AxisGains, RateLoopConfig
 
+BURST_MS = 5.6
+"""Wall time from burst to burst of the simulator's telemetry (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 28.0
 """Specific thrust answers with this time constant."""
 
@@ -66,7 +68,8 @@ RATE_LOOP = _rate_loop()
 
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     """Return the settings given, what they leave open filled in."""
-    filled = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, **section}
+    own = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
+    filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":
         filled["rate_loop"] = RATE_LOOP
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY)):

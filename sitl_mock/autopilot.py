@@ -62,7 +62,7 @@ class Autopilot:
                 name,
                 Framer(system_id, 1, signed=signed),
                 personality.streams(name, settings),
-                link_signing(settings.signing, name),
+                link_signing(settings.signing, name, unsigned_links=personality.unsigned_links),
             )
             for name in ("companion", "gcs")
         )

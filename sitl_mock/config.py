@@ -3,24 +3,14 @@
 The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; see README.
 """
 
-from collections.abc import Mapping
 from math import radians
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class Section(BaseModel):
-    """Base of every configuration section: unknown keys are refused, values never change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
+from sitl_mock.ekf_config import EKFS, EkfConfig
+from sitl_mock.section import Finite, Fraction, NonNegative, Positive, Section, meaning
 
 AIRFRAMES: dict[str, dict[str, object]] = {
     "sih": {},
@@ -34,15 +24,6 @@ AIRFRAMES: dict[str, dict[str, object]] = {
     },
 }
 """What the words that may stand for a whole airframe mean: what differs from the defaults."""
-
-
-def _meaning(words: Mapping[str, object], value: object, what: str) -> object:
-    """Return what a word stands for, and anything else as it is."""
-    if not isinstance(value, str):
-        return value
-    if value not in words:
-        raise ValueError(f"known {what} are {', '.join(words)}")
-    return words[value]
 
 
 class AirframeConfig(Section):
@@ -83,7 +64,7 @@ class AirframeConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        return _meaning(AIRFRAMES, value, "airframes")
+        return meaning(AIRFRAMES, value, "airframes")
 
 
 class AxisShaping(Section):
@@ -188,7 +169,7 @@ class RateLoopConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        return _meaning(RATE_LOOPS, value, "rate loops")
+        return meaning(RATE_LOOPS, value, "rate loops")
 
     @model_validator(mode="after")
     def _shaped_whole(self) -> Self:
@@ -236,6 +217,8 @@ class BatteryConfig(Section):
 class SensorConfig(Section):
     """Errors of what the autopilot believes: white noise (standard deviations) and delays."""
 
+    ekf: EkfConfig | None = None
+    """Errors of the navigation filter, added to the rest: px4, ardupilot, none, or keys."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01
@@ -246,13 +229,19 @@ class SensorConfig(Section):
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""
 
+    @field_validator("ekf", mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        return meaning(EKFS, value, "navigation filters")
+
 
 class SigningConfig(Section):
     """MAVLink 2 signing, on every link of the vehicle."""
 
     passphrase_file: Path
     """Its first line is the passphrase; the key is its SHA-256, as ground stations make it."""
-    accept_unsigned: bool = False
-    """Obey frames without a signature, too; wrongly signed ones never."""
+    accept_unsigned: bool | None = None
+    """Obey frames without a signature, too; wrongly signed ones never. Null: as the autopilot does,
+    ArduPilot on the companion's link (its SERIAL0), PX4 on none."""
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
     """Of the companion's link in our signatures; the ground station's has the next."""

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config import Finite, Fraction, NonNegative, Positive, Section
 from sitl_mock.config_errors import suggestion
+from sitl_mock.section import Finite, Fraction, NonNegative, Positive, Section
 
 _MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
 
@@ -65,6 +65,14 @@ class FreezeClock(Timed):
     kind: Literal["freeze_clock"]
 
 
+class SlipClock(Timed):
+    """The vehicle stands still for a moment, and its clock does not catch up (paced time only)."""
+
+    kind: Literal["slip_clock"]
+    slip_ms: Annotated[float, Field(gt=0.0, le=60_000.0)] = 12.0
+    """How far the clock falls behind; ArduPilot's simulator on a busy computer: 10 to 16."""
+
+
 class NanField(Timed):
     """One float field of one message is NaN."""
 
@@ -121,6 +129,7 @@ class GpsLoss(Timed):
 VehicleFault = (
     StopTelemetry
     | FreezeClock
+    | SlipClock
     | NanField
     | PilotTakeover
     | EstimatorReset

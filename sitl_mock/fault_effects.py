@@ -15,6 +15,7 @@ from sitl_mock.fault_config import (
     NanField,
     PilotTakeover,
     RefuseArming,
+    SlipClock,
     StopTelemetry,
     VehicleFault,
 )
@@ -56,6 +57,7 @@ class FaultEffects:
         self._stopped: list[StopTelemetry] = []
         self._nan: list[NanField] = []
         self._gps_lost_us = 0
+        self._slipped_s = 0.0
 
     def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
         """Let faults take effect, and undo those that ended."""
@@ -63,6 +65,11 @@ class FaultEffects:
             self._begin(fault)
         for fault in ended:
             self._end(fault)
+
+    def take_slip(self) -> float:
+        """Wall time by which the vehicle's clock fell behind since this was asked, s."""
+        slipped, self._slipped_s = self._slipped_s, 0.0
+        return slipped
 
     def silenced(self, message_id: int) -> bool:
         """Whether a message is not streamed at present."""
@@ -84,6 +91,8 @@ class FaultEffects:
                 self._stopped.append(fault)
             case FreezeClock():
                 self.clock_frozen = True
+            case SlipClock():
+                self._slipped_s += fault.slip_ms * 1e-3
             case NanField():
                 self._nan.append(fault)
                 self._hook_links()
@@ -116,8 +125,8 @@ class FaultEffects:
                 self._commander.refusal = None
             case GpsLoss():
                 self._state.gps_ok = True
-            case EstimatorReset() | LowBattery():
-                pass  # a jump and an empty battery stay
+            case EstimatorReset() | LowBattery() | SlipClock():
+                pass  # a jump, an empty battery and lost time stay
 
     def _hook_links(self) -> None:
         for link in self._links:

@@ -10,7 +10,7 @@ from enum import Enum, auto
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from sitl_mock.commander import Commander
     from sitl_mock.commands import Commands
@@ -45,6 +45,7 @@ class Occasion(Enum):
     DEFAULT_TAKEOFF_ALTITUDE = auto()
     TAKEOFF_DETECTED = auto()
     LANDING_DETECTED = auto()
+    LANDING_COMMANDED = auto()
     DISARMED_BY_FAILSAFE = auto()
     FAILSAFE = auto()
     FAILSAFE_UNNAMED = auto()
@@ -128,6 +129,8 @@ class Personality(Protocol):
     """Name of the parameter that holds the vehicle's system id."""
     any_component: bool
     """Whether messages to any component of this system are taken."""
+    unsigned_links: Collection[str]
+    """Links on which frames without a signature are obeyed though signing is on."""
 
     def slot_us(self, settings: MockSettings) -> int:
         """Return the period of the turns in which telemetry leaves, us."""

@@ -1,6 +1,7 @@
 """PX4's personality: its numbers, and its rules put together (recorded from PX4 main, SIH)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from random import Random
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -82,6 +83,7 @@ class Px4:
     boot_mode = Mode.LOITER
     any_component = False
     system_id_parameter = "MAV_SYS_ID"
+    unsigned_links: Collection[str] = ()
     identity = Identity(
         capabilities=0xE8FF,
         flight_sw_version=18022464,
@@ -100,8 +102,9 @@ class Px4:
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
         if lockstep and link == "companion":
             del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # there, that message is the beacon
-        misses = settings.inner_loop_hz == 250 and not lockstep and not settings.exact_rates
-        return Px4Streams(rates, misses=misses)
+        exact = lockstep if settings.exact_rates is None else settings.exact_rates
+        busy = settings.inner_loop_hz == 250 and not exact
+        return Px4Streams(rates, luck=Random(f"{settings.seed}/{link}") if busy else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode a custom_mode means, None if there is no such mode."""

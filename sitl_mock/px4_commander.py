@@ -123,6 +123,13 @@ class Px4Commander:
         self._enter(mode, hold=hold)
         return ACCEPTED
 
+    def land(self) -> int:
+        """Land here, and return a MAV_RESULT; it is told, as a change of mode is not."""
+        result = self.request_mode(Mode.LAND)
+        if result == ACCEPTED:
+            self._announce(Occasion.LANDING_COMMANDED, "")
+        return result
+
     def take_over(self, mode: Mode) -> None:
         """Let the pilot's sticks change the mode (fault injection)."""
         self.pilot = True

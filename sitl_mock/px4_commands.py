@@ -45,7 +45,7 @@ class Px4Commands(Commands):
         self.handlers |= {
             dialect.MAV_CMD_DO_SET_MODE: self._set_mode,
             dialect.MAV_CMD_NAV_TAKEOFF: self._takeoff,
-            dialect.MAV_CMD_NAV_LAND: lambda *_: commander.request_mode(Mode.LAND),
+            dialect.MAV_CMD_NAV_LAND: lambda *_: commander.land(),
             dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: commander.request_mode(Mode.RTL),
             dialect.MAV_CMD_NAV_LOITER_UNLIM: lambda *_: commander.request_mode(Mode.LOITER),
             dialect.MAV_CMD_DO_REPOSITION: self._reposition,

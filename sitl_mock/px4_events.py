@@ -71,6 +71,9 @@ PX4_EVENTS: dict[Occasion, Event] = {
         "navigator_takeoff_default_alt", _INFO, "Using default takeoff altitude: {} m"
     ),
     Occasion.TAKEOFF_DETECTED: _event("commander_takeoff_detected", _INFO, "Takeoff detected"),
+    Occasion.LANDING_COMMANDED: _event(
+        "commander_landing_current_pos", _INFO, "Landing at current position"
+    ),
     Occasion.LANDING_DETECTED: _event("commander_landing_detected", _INFO, "Landing detected"),
     Occasion.FAILSAFE: _event(
         "commander_failsafe_enter", _CRITICAL, "Failsafe activated", internal=_WARNING

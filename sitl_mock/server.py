@@ -2,6 +2,7 @@
 
 import os
 import time
+from math import ceil
 
 from sitl_mock.autopilot import Autopilot
 from sitl_mock.endpoint import Endpoint
@@ -22,6 +23,11 @@ SPIN_S = 0.0005
 """The mock spins this long for an answer before it sleeps."""
 
 _ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
+
+
+def in_burst(elapsed_s: float, burst_s: float) -> float:
+    """When the burst comes that a time belongs to, both in s; without bursts that very time."""
+    return ceil(elapsed_s / burst_s) * burst_s if burst_s > 0.0 else elapsed_s
 
 
 class Server:
@@ -191,9 +197,12 @@ class Server:
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
 
-        Faster than the machine can, or after a pause, the time lost is not caught up.
+        Faster than the machine can, or after a pause, the time lost is not caught up; nor is what
+        the clock slipped.
         """
-        due = self._base_wall + self._elapsed_us(self._autopilot.next_us) / 1e6
+        self._base_wall += self._autopilot.effects.take_slip()
+        elapsed_s = self._elapsed_us(self._autopilot.next_us) / 1e6
+        due = self._base_wall + in_burst(elapsed_s, self._settings.burst_ms * 1e-3)
         left = due - time.monotonic()
         if left < -MAX_LAG_S:
             self._rebase()

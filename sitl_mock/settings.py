@@ -11,11 +11,7 @@ from sitl_mock.ardupilot_settings import with_ardupilot_defaults
 from sitl_mock.config import (
     AirframeConfig,
     BatteryConfig,
-    Finite,
-    NonNegative,
-    Positive,
     RateLoopConfig,
-    Section,
     SensorConfig,
     SigningConfig,
     WindConfig,
@@ -24,6 +20,7 @@ from sitl_mock.config_errors import ConfigError, explain, suggestion
 from sitl_mock.fault_config import Fault
 from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
 from sitl_mock.px4_parameters import PX4_PARAMETERS
+from sitl_mock.section import Finite, NonNegative, Positive, Section
 from sitl_mock.wiring import for_vehicle, parse_wiring
 from sitl_mock.yaml_file import load_yaml
 
@@ -33,6 +30,8 @@ GCS_PORT_OFFSET = 4020
 """The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
 
 _PARAMETERS = {"px4": PX4_PARAMETERS, "ardupilot": ARDUPILOT_PARAMETERS}
+
+SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
 
 Port = Annotated[int, Field(ge=0, le=65535)]
 
@@ -62,7 +61,8 @@ class MockSettings(Section):
     """Everything about one mock vehicle."""
 
     autopilot: Literal["px4", "ardupilot"] = "px4"
-    """Whose rules it follows; ArduPilot's brings its own airframe, battery and rate loop along."""
+    """Whose rules it follows; each brings the errors of its navigation filter along, ArduPilot's
+    its own airframe, battery and rate loop, too."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
     """The companion's wire: udp (by ``port``), tcpin://HOST:PORT (for one client, and nothing boots
@@ -76,8 +76,11 @@ class MockSettings(Section):
     """Vehicle seconds per wall second, when not in lockstep."""
     inner_loop_hz: Literal[250, 800] = 250
     """Sets which telemetry rates PX4 achieves; ArduPilot has SCHED_LOOP_RATE for it."""
-    exact_rates: bool = False
-    """Never skip a slot at the full rate, as PX4's loop does; always so in lockstep."""
+    exact_rates: bool | None = None
+    """Never skip a slot at the full rate, as PX4's loop does; null: only in lockstep."""
+    burst_ms: NonNegative = 0.0
+    """In paced time the vehicle lives in bursts, one in this wall time, as ArduPilot's simulator
+    does, whose default is 5.6; 0 = it does not."""
     prearm_delay_s: NonNegative = 4.5
     """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""
     lockstep: LockstepConfig = LockstepConfig()
@@ -102,7 +105,10 @@ class MockSettings(Section):
     @model_validator(mode="before")
     @classmethod
     def _as_the_family_is(cls, section: object) -> object:
-        if isinstance(section, dict) and section.get("autopilot") == "ardupilot":
+        if not isinstance(section, dict):
+            return section
+        section = {**section, "sensors": _with_ekf(section)}
+        if section.get("autopilot") == "ardupilot":
             return with_ardupilot_defaults(section)
         return section
 
@@ -138,6 +144,16 @@ class MockSettings(Section):
                 "seed": self.seed + index,
             }
         )
+
+
+def _with_ekf(section: dict[str, Any]) -> object:
+    """Return the sensors' settings, with the errors of the autopilot's own navigation filter."""
+    sensors = section.get("sensors", {})
+    if not isinstance(sensors, dict):
+        return sensors
+    filled = {"ekf": section.get("autopilot", "px4"), **sensors}
+    # What a navigation filter tells is smooth, and no older than the attitude.
+    return filled if filled["ekf"] in (None, "none") else {**SMOOTH, **filled}
 
 
 def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:

@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from pymavlink.dialects.v20 import development as dialect
@@ -35,8 +35,15 @@ def key_from_passphrase(path: Path) -> bytes:
     return hashlib.sha256(passphrase.encode()).digest()
 
 
-def link_signing(config: SigningConfig | None, link: str) -> "Signing | None":
+def link_signing(
+    config: SigningConfig | None, link: str, *, unsigned_links: Collection[str] = ()
+) -> "Signing | None":
     """Return the signing of a link (``companion`` or ``gcs``), None if there is none.
+
+    Args:
+        config: what the user asks for.
+        link: its name.
+        unsigned_links: where the autopilot obeys frames without a signature by itself.
 
     Raises:
         ConfigError: the passphrase cannot be used.
@@ -45,7 +52,8 @@ def link_signing(config: SigningConfig | None, link: str) -> "Signing | None":
         return None
     link_id = config.link_id + (link == "gcs")
     key = key_from_passphrase(config.passphrase_file)
-    return Signing(key, link_id, accept_unsigned=config.accept_unsigned)
+    asked = config.accept_unsigned
+    return Signing(key, link_id, accept_unsigned=link in unsigned_links if asked is None else asked)
 
 
 class Signing:

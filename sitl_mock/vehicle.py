@@ -13,10 +13,11 @@ from sitl_mock.config import (
 )
 from sitl_mock.ground import Ground
 from sitl_mock.multirotor import ZERO, Multirotor
+from sitl_mock.navigation_filter import Snapshot
 from sitl_mock.physics import Load
 from sitl_mock.quaternion import Quaternion, Vector, from_yaw
 from sitl_mock.rotors import Four
-from sitl_mock.sensors import Estimate, Estimator, Snapshot
+from sitl_mock.sensors import Estimate, Estimator
 from sitl_mock.wind import Wind
 
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
@@ -152,7 +153,7 @@ class Vehicle:
 
     def estimate(self) -> Estimate:
         """What the autopilot believes now; every call draws fresh noise."""
-        return self._estimator.estimate()
+        return self._estimator.estimate(self.time)
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
         """An estimator reset: the estimate jumps by this yaw (rad) and position (m)."""

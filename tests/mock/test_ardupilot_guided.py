@@ -76,7 +76,8 @@ def test_a_flight_from_the_ground_to_the_ground_with_its_times_and_flags():
     rig.run_until(lambda: not rig.state.armed, 1.0)
     assert rig.time - landed == pytest.approx(2.1, abs=0.2)  # recorded
     assert rig.truth.touchdown_speed < 0.7
-    assert rig.texts()[-2:] == ["Arming motors", "Disarming motors"]
+    aligned = [f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete" for unit in (0, 1)]
+    assert rig.texts()[-4:] == ["Arming motors", *aligned, "Disarming motors"]
     rig.run(1.1)
     beat = rig.messages("HEARTBEAT")[-1]
     assert (beat.base_mode, beat.custom_mode, beat.system_status) == (89, LAND, 3)
@@ -257,3 +258,19 @@ def test_a_quaternion_of_nan_in_use_ends_the_process():
     rig.run(1.0)
     assert len(rig.received) == heard
     assert rig.truth.position_ned == where
+
+
+def test_the_heading_is_aligned_anew_in_each_flight():
+    """ardupilot-circle-5ms.tlog and the others: at 2.67 to 2.88 m, told for both units."""
+    rig = ArduRig()
+    aligned = [f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete" for unit in (0, 1)]
+    for flight in (1, 2):
+        assert rig.switch(GUIDED) == ACCEPTED
+        assert rig.arm() == ACCEPTED
+        assert rig.start(4.0) == ACCEPTED
+        rig.run_until(lambda: rig.height > 2.5, 10.0)
+        assert [text for text in rig.texts() if text in aligned] == aligned * (flight - 1)
+        rig.run_until(lambda: rig.height > 3.2, 10.0)
+        assert [text for text in rig.texts() if text in aligned] == aligned * flight
+        assert rig.switch(LAND) == ACCEPTED
+        rig.run_until(lambda: not rig.state.armed, 30.0)

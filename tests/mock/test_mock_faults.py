@@ -248,3 +248,14 @@ def test_after_offboard_begins_with_the_first_armed_offboard():
     assert rig.state.gps_ok
     rig.run(0.2)
     assert not rig.state.gps_ok
+
+
+def test_a_clock_that_slips_loses_its_time_once():
+    rig = Rig()
+    rig.autopilot.faults.add(
+        fault("slip_clock", slip_ms=14.0, duration_s=1.0), rig.autopilot.time_us
+    )
+    rig.run(0.1)
+    assert rig.autopilot.effects.take_slip() == pytest.approx(0.014)
+    rig.run(2.0)
+    assert rig.autopilot.effects.take_slip() == 0.0

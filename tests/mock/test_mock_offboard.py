@@ -330,6 +330,23 @@ def test_land_command_from_offboard():
     assert rig.state.mode.name == "LAND"
 
 
+@pytest.mark.parametrize(("by_loiter", "ends_in"), [(False, "OFFBOARD"), (True, "LOITER")])
+def test_a_landing_ends_in_the_mode_that_it_was_asked_in(by_loiter, ends_in):
+    """Measured: NAV_LAND straight from OFFBOARD is OFFBOARD again once disarmed, and not ready."""
+    rig = Rig(parameters={"MPC_LAND_SPEED": 3.0, "MPC_LAND_CRWL": 1.5})
+    rig.fly_offboard(height=3.0)
+    rig.each_tick = None
+    if by_loiter:
+        assert rig.mode(4, 3) == ACCEPTED
+    assert rig.command(dialect.MAV_CMD_NAV_LAND) == ACCEPTED
+    rig.run_until(lambda: not rig.state.armed, 20.0)
+    rig.run(1.5)
+    beat = rig.messages("HEARTBEAT")[-1]
+    assert rig.state.mode.name == ends_in
+    assert (beat.base_mode, beat.system_status) == ((29, 3) if by_loiter else (1, 0))
+    assert (rig.state.prearm_problem is None) is by_loiter
+
+
 def test_thrust_off_after_touchdown_is_a_landing_then_a_disarm():
     rig = Rig()
     rig.fly_offboard(height=3.0)

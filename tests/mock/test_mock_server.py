@@ -5,13 +5,15 @@ import signal
 import socket
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 from mock_process import HOST, Client, ask, free_gcs_port, free_port, mock_process
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.endpoint import bundles
-from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET
+from sitl_mock.server import in_burst
+from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
 from sitl_mock.wire import Framer, decode
 
 FAST = "MPC_TKO_RAMP_T: 0.3, COM_SPOOLUP_TIME: 0.1, MPC_TKO_SPEED: 3.0"
@@ -287,3 +289,17 @@ def test_bundles_keep_order_and_fit():
     assert max(map(len, joined)) <= 1400
     assert len(joined) < 12
     assert bundles([]) == []
+
+
+def test_bursts_come_as_often_as_recorded():
+    """ardupilot-circle-5ms, -corners, -identify: every 5.4 to 5.8 ms, 20 to 28 % in pairs."""
+    burst_s = MockSettings.model_validate({"autopilot": "ardupilot"}).burst_ms * 1e-3
+    slots = [n * 0.0025 for n in range(1, 4001)]
+    # 250 Hz of the 400 Hz loop, five slots of eight.
+    samples = [slot for number, slot in enumerate(slots) if number % 8 in (1, 3, 4, 6, 7)]
+    times = [in_burst(each, burst_s) for each in samples]
+    waited = [burst - slot for burst, slot in zip(times, samples, strict=True)]
+    assert -1e-9 < min(waited) < max(waited) < burst_s
+    paired = sum(after - before < 1e-6 for before, after in pairwise(times)) / len(times)
+    assert 0.18 < paired < 0.42
+    assert in_burst(0.0123, 0.0) == 0.0123

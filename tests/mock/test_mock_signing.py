@@ -101,6 +101,17 @@ def test_only_what_is_signed_arms_the_vehicle(tmp_path):
         assert rig.state.armed is armed
 
 
+def test_ardupilot_obeys_what_is_unsigned_on_its_first_link_only(tmp_path):
+    """Measured: on SERIAL0 (TCP 5760) an unsigned command is obeyed, on 5762 it is not."""
+    (tmp_path / "phrase").write_text(PASSPHRASE)
+    for asked, obeyed in (({}, [True, False]), ({"accept_unsigned": False}, [False, False])):
+        signing = {"passphrase_file": tmp_path / "phrase", **asked}
+        rig = Rig(boot=False, autopilot="ardupilot", gcs_port=14550, signing=signing)
+        unsigned = ARM.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
+        [message] = decode(bytes(unsigned))
+        assert [link.signing.admits(message) for link in rig.autopilot.links] == obeyed
+
+
 def test_a_passphrase_that_cannot_be_used_is_one_clear_error(tmp_path):
     assert link_signing(None, "companion") is None
     with pytest.raises(ConfigError, match="cannot be read"):

@@ -1,5 +1,7 @@
 """Telemetry rates: the defaults, and what is achieved when something else is asked."""
 
+from itertools import pairwise
+
 import pytest
 from mock_rig import ACCEPTED, FAILED, Rig
 from pymavlink.dialects.v20 import development as dialect
@@ -29,9 +31,40 @@ def achieved(rig, name, seconds):
     ],
 )  # fmt: skip
 def test_measured_rates_of_px4(loop, asked, got):
+    """At the full rate of the 250 Hz loop slots are missed by chance: flights had 190 to 235 Hz."""
     rig = Rig(inner_loop_hz=loop, lockstep={"enabled": False})
     rig.command(511, ATTITUDE_QUATERNION, 1e6 / asked)
-    assert achieved(rig, "ATTITUDE_QUATERNION", 2.0) == pytest.approx(got, rel=0.06)
+    by_chance = loop == 250 and asked >= 250
+    got, within = (212, 0.105) if by_chance else (got, 0.06)
+    assert achieved(rig, "ATTITUDE_QUATERNION", 2.0) == pytest.approx(got, rel=within)
+
+
+def test_the_steps_between_stamps_are_those_recorded():
+    """px4-corners, px4-circle-5ms: attitude after 4 or 8 ms, position after 16 or 24 ms."""
+    rig = Rig(lockstep={"enabled": False})
+    rig.command(511, ATTITUDE_QUATERNION, 4000)
+    rig.command(511, dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 20000)
+    start = rig.time + 0.1
+    rig.run(4.0)
+    steps = {}
+    for name in ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"):
+        stamps = [message.time_boot_ms for message in rig.messages(name, since=start)]
+        steps[name] = [after - before for before, after in pairwise(stamps)]
+    attitude, position = steps.values()
+    assert set(attitude) == {4, 8}
+    assert 0.13 < attitude.count(8) / len(attitude) < 0.27
+    assert set(position) == {16, 24}
+    assert position.count(16) == pytest.approx(position.count(24), abs=1)
+
+
+def test_missed_slots_are_a_function_of_the_seed_even_in_lockstep():
+    def stamps(seed):
+        rig = Rig(seed=seed, exact_rates=False)
+        rig.command(511, ATTITUDE_QUATERNION, 4000)
+        rig.run(1.0)
+        return [message.time_boot_ms for message in rig.messages("ATTITUDE_QUATERNION")]
+
+    assert stamps(3) == stamps(3) != stamps(4)
 
 
 @pytest.mark.parametrize(("asked", "got"), [(50, 50), (100, 100), (250, 250), (1000, 250)])

@@ -115,6 +115,17 @@ def test_the_events_of_a_flight_have_the_recorded_numbers(flown):
     assert (31382480, 2, 4, "0000060006") in flown.told(flown.landmarks["lost"])
 
 
+def test_a_landing_is_told_where_it_is_commanded():
+    """px4-corners, px4-circle-5ms: NAV_LAND; px4-flight-gcs changes the mode and says nothing."""
+    for command, told in (((21,), True), ((176, 1, 4, 6), False)):
+        rig = Listener()
+        rig.take_off(3.0)
+        before = rig.time
+        assert rig.command(*command) == ACCEPTED
+        rig.run(0.1)
+        assert ((20099806, 6, 6, "") in rig.told(before)) is told
+
+
 def test_sequences_run_on_and_the_latest_is_told_every_three_seconds(flown):
     sequences = [event[4] for event in flown.events()]
     assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
