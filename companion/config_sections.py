@@ -227,6 +227,9 @@ class GuidanceConfig(Section):
     """Weight of the horizontal velocity error; a larger one makes a calmer hold."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] = 5.0
     """How quickly wind is found, from how the vehicle moves against what its tilt gives."""
+    position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """By how much the autopilot's position is late where its GPS is later than its estimator
+    believes; measured against another measurement of the position."""
     max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0)] = 6.0
     """Largest acceleration by wind that is believed."""
     lead: bool = True

@@ -7,7 +7,8 @@ from typing import NoReturn
 from companion.attitude import Target
 from companion.config import Config
 from companion.flight.assembly import hover_thrust, planner, rate_limits
-from companion.flight.control_loop import Command, ControlLoop, Deadlines
+from companion.flight.command import Command
+from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.mavlink import Link, LinkSettings
 from companion.mavlink import loop as link_loop
 from companion.recording.trace import FlightTrace

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nan
 from time import perf_counter_ns
-from typing import NamedTuple
 
 from companion.attitude import (
     AttitudeError,
@@ -17,6 +16,7 @@ from companion.attitude import (
     is_unit,
 )
 from companion.attitude.rotation import within_limits
+from companion.flight.command import Command
 from companion.flight.estimator_resets import EstimatorResets
 from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust
@@ -35,28 +35,6 @@ _GAPS = 32
 """So many of the latest gaps are kept; far fewer end a flight."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
-
-
-class Command(NamedTuple):
-    """What guidance left behind for the loop.
-
-    Attributes:
-        target: for the planner; its heading is the one without jumps (`EstimatorResets`).
-        acceleration_down: wanted vertical acceleration, m/s².
-        made_at: when, s on our clock.
-        idle: on the ground: no rates, no thrust.
-        is_step: an open-loop step, whose response is measured.
-        body_rates: instead of the planner's, rad/s; sent as far as the limits allow.
-        turn: sum of the estimate's jumps in heading when it was made, rad.
-    """
-
-    target: Target
-    acceleration_down: float
-    made_at: float
-    idle: bool = False
-    is_step: bool = False
-    body_rates: BodyRates | None = None
-    turn: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +191,8 @@ class ControlLoop:
     def _rates(self, sample: AttitudeSample, command: Command, dt: float) -> BodyRates:
         """The planner's answer, or the rates that guidance asks for within the same limits."""
         if command.body_rates is None:
-            return self._plan(sample, self.resets.target(command.target, command.turn), dt)
+            target = command.target_at(sample.received - sample.age)
+            return self._plan(sample, self.resets.target(target, command.turn), dt)
         limits = self._limits
         return BodyRates(*within_limits(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 

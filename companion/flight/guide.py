@@ -6,7 +6,8 @@ from math import degrees, dist, nan, sin
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
-from companion.flight.control_loop import Command, ControlLoop
+from companion.flight.command import Command
+from companion.flight.control_loop import ControlLoop
 from companion.flight.follow import Follow
 from companion.flight.ground_contact import GroundContact
 from companion.flight.hover_learning import HoverLearning
@@ -15,6 +16,7 @@ from companion.flight.predictive import Following, Predictive
 from companion.guidance import (
     GRAVITY,
     HoverThrust,
+    LinearCommand,
     LinearGuidance,
     Pose,
     Reference,
@@ -177,7 +179,8 @@ class Guide:
         reference_at = self._reference(situation.now)
         reference = reference_at(now)
         command = self._guidance.command(reference_at, now, situation)
-        target, down = self._height_first(*self._predicted(now, command, situation))
+        target, later, down = self._predicted(now, command, situation)
+        target, later = (self._height_first(each, down) for each in (target, later))
         self.estimate.vertical = GRAVITY - down if self._loop.guarded else GRAVITY
         self._loop.command = Command(
             target,
@@ -186,6 +189,8 @@ class Guide:
             is_step=reference.coefficients is not None,
             body_rates=reference.body_rates,
             turn=self._loop.resets.turn,
+            later=later,
+            period=self._period,
         )
         self.off_course = self._distance(reference, situation.now)
         if not standing:
@@ -199,27 +204,31 @@ class Guide:
     def _heading(self) -> float:
         return heading(self._loop.resets.attitude(self._q))
 
-    def _height_first(self, target: Target, down: float) -> tuple[Target, float]:
-        """The command with no more tilt than leaves the thrust for its height.
+    def _height_first(self, target: Target, down: float) -> Target:
+        """The target with no more tilt than leaves the thrust for its height.
 
         Whoever made it: open-loop steps, predictive control and the lead do not ask what the
         vehicle's thrust has turned out to be.
         """
         most = sin(self.learning.largest_tilt(down))
         north, east = limited(target.north, target.east, most)
-        return target._replace(north=north, east=east), down
+        return target._replace(north=north, east=east)
 
-    def _predicted(
-        self, now: float, linear: tuple[Target, float], situation: Situation
-    ) -> tuple[Target, float]:
-        """What predictive control says, if it flies; its headings are the estimate's own."""
+    def _predicted(self, now: float, linear: LinearCommand, situation: Situation) -> LinearCommand:
+        """What predictive control says, if it flies; its headings are the estimate's own.
+
+        Its targets stay for a period, which it accounts for.
+        """
         if self.predictive is None:
             return linear
-        turn, (target, down) = self._loop.resets.turn, linear
+        turn = self._loop.resets.turn
+        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
         vehicle = self.estimate.vehicle(now, situation)
-        linear = target._replace(heading=target.heading + turn), down
-        target, down = self.predictive.command(linear, vehicle, self._following(now))
-        return target._replace(heading=target.heading - turn), down
+        target, down = chosen = self.predictive.command(own, vehicle, self._following(now))
+        if chosen is own:
+            return linear
+        target = target._replace(heading=target.heading - turn)
+        return LinearCommand(target, target, down)
 
     def _distance(self, reference: Reference, motion: VehicleMotion) -> float | None:
         distance = dist(reference.position_ned, motion.position_ned)

@@ -6,6 +6,7 @@ from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
 from companion.guidance.horizontal import Horizontal
+from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.slope_history import SlopeHistory
 from companion.mavlink.records import LocalPosition
 from companion.mavlink.samples import AttitudeSample
@@ -27,6 +28,7 @@ class MotionEstimate:
 
     Args:
         observer: of position, velocity and disturbance.
+        correction: of the measured positions.
         drag: of the vehicle.
         offset: the vehicle's clock minus ours, s, None before the first attitude: it tells how old
             a position was when it came.
@@ -35,11 +37,13 @@ class MotionEstimate:
     def __init__(
         self,
         observer: MotionObserver,
+        correction: PositionCorrection,
         drag: DragEstimate,
         offset: Callable[[], float | None] = lambda: None,
     ) -> None:
         self.vertical = GRAVITY
         self._observer = observer
+        self._correction = correction
         self._drag = drag
         self._offset = offset
         self._slopes = SlopeHistory()
@@ -60,6 +64,7 @@ class MotionEstimate:
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
             self._slopes.forget()
+            self._correction.reset()
             self._turn = turn
 
     def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
@@ -72,7 +77,9 @@ class MotionEstimate:
             return
         since = position.vehicle_time if before is None else before.vehicle_time
         slope = self._slopes.mean(since, position.vehicle_time)
-        measured = VehicleMotion(position.position_ned, position.velocity_ned)
+        measured = self._correction.corrected(
+            position.vehicle_time, VehicleMotion(position.position_ned, position.velocity_ned)
+        )
         known = self._known(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known)
         if obeyed and before is not None:

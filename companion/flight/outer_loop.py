@@ -22,6 +22,7 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.known_drag import drag_prior
 from companion.nmpc import Settings, Solver
 from companion.yaml_file import ConfigError
@@ -34,6 +35,15 @@ _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
+_POSITION_PULL = 4.0
+"""How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
+0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
+_CORRECTS_WITHIN = 0.65
+"""Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
+_CORRECTION_WINDOW = 0.1
+"""Over which their corrections are averaged, twice, s."""
+_LARGEST_CORRECTION = 0.2
+"""Of what they still have to correct, m: the noise of a bad GPS must not move the vehicle."""
 
 
 def tilt_response(config: Config) -> InnerResponse:
@@ -42,7 +52,7 @@ def tilt_response(config: Config) -> InnerResponse:
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
         lag = model_lag(gain, lag)
-    return InnerResponse(gain, lag, _acts_after(config, dead_time), follows)
+    return InnerResponse(gain, lag, dead_time, follows)
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
@@ -64,20 +74,17 @@ def heading_response(config: Config) -> InnerResponse:
     return InnerResponse(
         config.planner.yaw_gain_per_s,
         _MS * (yaw.lag_ms or 0.0),
-        _acts_after(config, _MS * (yaw.dead_time_ms or 0.0)),
+        _MS * (yaw.dead_time_ms or 0.0),
         config.planner_name == MODEL_FOLLOWING,
     )
-
-
-def _acts_after(config: Config, dead_time: float) -> float:
-    """A command is held for a period of guidance: on average it is half of one late, s."""
-    return dead_time + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
-    tilt, heading = tilt_response(config), heading_response(config)
+    tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
+    # The feedback is held for a period: on average it acts half of one late.
+    slowness = tilt.slowness + 0.5 * period
     drag = drag_prior(config).drag.linear
     weights = Weights(guidance.position_weight_per_s4, guidance.velocity_weight_per_s2)
     if _identifies(config):
@@ -86,7 +93,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, tilt_response(config).slowness, drag),
+            gains=chain_gains(weights, slowness, drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
@@ -97,6 +104,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
             heading=heading,
             max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
             thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
+            period=period,
         )
     )
 
@@ -112,8 +120,21 @@ def motion_estimate(
     """
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
-    settings = ObserverSettings(bandwidth, _POSITION_TIME, guidance.max_disturbance_m_s2)
-    return MotionEstimate(MotionObserver(settings), DragEstimate(drag_prior(config)), offset)
+    settings = ObserverSettings(
+        bandwidth, _POSITION_TIME, _POSITION_PULL, guidance.max_disturbance_m_s2
+    )
+    correction = CorrectionSettings(
+        _CORRECTS_WITHIN,
+        _CORRECTION_WINDOW,
+        _LARGEST_CORRECTION,
+        _MS * guidance.position_lateness_ms,
+    )
+    return MotionEstimate(
+        MotionObserver(settings),
+        PositionCorrection(correction),
+        DragEstimate(drag_prior(config)),
+        offset,
+    )
 
 
 def thrust_limits(config: Config) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from companion.guidance.drag_estimate import DragEstimate
 from companion.guidance.height import HeightGains
 from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
-from companion.guidance.linear import LinearGuidance, LinearSettings, Situation
+from companion.guidance.linear import LinearCommand, LinearGuidance, LinearSettings, Situation
 from companion.guidance.lqr import Weights, chain_gains
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.programmes import Circle, Corners, Hover, Programme, Sequence, Steps
@@ -23,6 +23,7 @@ __all__ = [
     "Hover",
     "HoverThrust",
     "InnerResponse",
+    "LinearCommand",
     "LinearGuidance",
     "LinearSettings",
     "MotionObserver",

@@ -29,6 +29,7 @@ class LinearSettings:
         heading: response of the heading to its target.
         max_horizontal: largest horizontal acceleration asked for, m/s².
         thrust_lag: of the rotors, s.
+        period: for which a command holds, s: its target moves along, its feedback does not.
     """
 
     gains: ChainGains
@@ -37,6 +38,7 @@ class LinearSettings:
     heading: InnerResponse
     max_horizontal: float
     thrust_lag: float
+    period: float = 0.0
 
 
 class Situation(NamedTuple):
@@ -59,6 +61,20 @@ class Situation(NamedTuple):
     thrust_limits: tuple[float, float]
 
 
+class LinearCommand(NamedTuple):
+    """What linear guidance asks for.
+
+    Attributes:
+        target: the planner's, now.
+        later: the same a period later; between the two it moves on a straight line.
+        down: wanted acceleration downwards, m/s².
+    """
+
+    target: Target
+    later: Target
+    down: float
+
+
 class LinearGuidance:
     """Acceleration = the reference's + feedback of the chain position – velocity – acceleration.
 
@@ -71,38 +87,40 @@ class LinearGuidance:
 
     @property
     def acts_after(self) -> float:
-        """How long after it is made a command acts, s."""
-        return self._settings.tilt.dead_time
+        """How long after it is made the feedback of a command acts, on average, s."""
+        return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(
         self, reference_at: ReferenceAt, time: float, situation: Situation
-    ) -> tuple[Target, float]:
+    ) -> LinearCommand:
         """One step.
 
         Args:
             reference_at: the reference; asked for a little ahead of `time` too.
             time: now, s.
             situation: the vehicle.
-
-        Returns:
-            The planner's target, and the wanted acceleration downwards in m/s².
         """
         reference = reference_at(time)
         lifted = reference_at(time + self._settings.thrust_lag).acceleration_ned
         down = acceleration_down(
             self._settings.height, reference._replace(acceleration_ned=lifted), situation.now
         )
-        heading, heading_rate = self._heading(reference_at, time)
+        ends = time, time + self._settings.period
         if reference.coefficients is not None:
-            north, east = reference.coefficients
-            return Target(north, east, heading, heading_rate), down
+            target, later = (
+                Target(*reference.coefficients, *self._heading(reference_at, at)) for at in ends
+            )
+            return LinearCommand(target, later, down)
         feedback = self._feedback(reference, reference_at(time + self.acts_after), situation)
 
         def path(at: float) -> Coefficients:
             return self._coefficients(reference_at(at), feedback, down, situation)
 
-        north, east = self._settings.tilt.target(path, time)
-        return Target(north, east, heading, heading_rate), down
+        target, later = (
+            Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
+            for at in ends
+        )
+        return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, situation: Situation) -> Horizontal:
         """Horizontal acceleration against the errors and the disturbance, m/s², limited."""

@@ -14,11 +14,14 @@ class ObserverSettings:
     Attributes:
         bandwidth: of the disturbance, rad/s: both poles of the observer.
         position_time: with which the position follows the measured one, s.
+        position_pull: speed by which the measured velocity is believed to be off, 1/s per metre
+            of the measured position.
         largest: bound on the disturbance, m/s².
     """
 
     bandwidth: float
     position_time: float
+    position_pull: float
     largest: float
 
 
@@ -69,8 +72,9 @@ class MotionObserver:
                 motion.velocity_ned[axis] + 0.5 * dt * acceleration
             )
             v = motion.velocity_ned[axis] + dt * acceleration
-            position[axis] = p + near * (position[axis] - p)
-            off = velocity[axis] - v
+            away = position[axis] - p
+            off = velocity[axis] - v + settings.position_pull * away
+            position[axis] = p + near * away
             velocity[axis] = v + believed * off
             found[axis] = disturbance[axis] + learned * off
         self._motion = VehicleMotion(_vector(position), _vector(velocity))

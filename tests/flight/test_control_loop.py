@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
-from companion.flight.control_loop import Command, ControlLoop, Deadlines
+from companion.flight.command import Command
+from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder

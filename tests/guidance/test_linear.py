@@ -75,7 +75,7 @@ def flown(settings, reference_at, seconds, wind=REST, start=None):
         situation = Situation(
             motion, acts, tuple(thrust), tuple(DRAG.linear * wind[:2]), DRAG, THRUST
         )
-        target, down = guidance.command(reference_at, t, situation)
+        target, _, down = guidance.command(reference_at, t, situation)
         asked.append((target.north, target.east))
         wanted = np.array(asked[max(0, len(asked) - 1 - late)])
         speed = speed + DT * (response.gain * (wanted - c) - speed) / response.lag
@@ -107,7 +107,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
     motion = VehicleMotion((4.0, -3.0, -5.0), REST)
     for _ in range(3000):
         situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
-        target, down = guidance.command(lambda _: goal, 0.0, situation)
+        target, _, down = guidance.command(lambda _: goal, 0.0, situation)
         speed = motion.velocity_ned[2] + 0.01 * down
         motion = VehicleMotion(
             (4.0, -3.0, motion.position_ned[2] + 0.01 * speed), (0.0, 0.0, speed)
@@ -126,7 +126,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
 def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
     motion = VehicleMotion(position, velocity)
     situation = Situation(motion, motion, thrust, disturbance, DRAG, THRUST)
-    target, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
+    target, _, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
     a = acceleration(target, down)
     assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
     assert abs(down) <= 0.5 * GRAVITY
@@ -138,7 +138,7 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
     reference = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
     motion = VehicleMotion((7.0, 7.0, -4.0), (3.0, 3.0, 0.0))
     situation = Situation(motion, motion, (0.0, 0.0), (1.0, 1.0), DRAG, THRUST)
-    target, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
+    target, _, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
     assert (target.north, target.east) == (0.2, -0.1)
     assert down < 0.0
 
@@ -146,5 +146,5 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
 def test_the_heading_is_asked_for_ahead_of_its_response():
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
-    target, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
+    target, _, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))

@@ -6,7 +6,7 @@ import pytest
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import VehicleMotion
 
-SETTINGS = ObserverSettings(bandwidth=4.0, position_time=0.1, largest=6.0)
+SETTINGS = ObserverSettings(bandwidth=4.0, position_time=0.1, position_pull=4.0, largest=6.0)
 
 
 def flown(wind, seconds=4.0, dt=1.0 / 30.0, noise=0.0, drag=1.0, seed=1, settings=SETTINGS):
@@ -70,7 +70,8 @@ def test_a_gap_and_a_reset_begin_anew():
     observer = MotionObserver(SETTINGS)
     assert observer.at(0.0, (0.0, 0.0)) is None
     for n in range(60):
-        observer.observe(n / 30, VehicleMotion((0.0, 0.0, 0.0), (n / 10, 0.0, 0.0)), (0.0, 0.0))
+        position, velocity = (1.5 * (n / 30) ** 2, 0.0, 0.0), (n / 10, 0.0, 0.0)
+        observer.observe(n / 30, VehicleMotion(position, velocity), (0.0, 0.0))
     assert observer.disturbance[0] == pytest.approx(3.0, abs=0.1)
     after = VehicleMotion((9.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     observer.observe(10.0, after, (0.0, 0.0))

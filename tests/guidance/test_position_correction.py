@@ -1,0 +1,100 @@
+"""The correction against an estimator that follows its GPS too slowly, integrated independently."""
+
+from math import cos, hypot, isfinite, sin
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
+from companion.guidance.reference import VehicleMotion
+
+SETTINGS = CorrectionSettings(ahead=0.7, window=0.1, largest=0.2, lateness=0.0)
+DT = 0.02
+RATE = 0.4
+"""Of how the estimator's velocity wanders, rad/s."""
+metres = st.floats(-1e4, 1e4)
+pairs = st.tuples(metres, metres)
+
+
+def wandering(seconds, lateness=0.0):
+    """(time, true north, measured motion) at 5 m/s north, with a velocity that is off by 6 cm/s.
+
+    The filter pulls its position to GPS, which comes `lateness` s too late, with a gain of
+    1/ahead.
+    """
+    north, rows = -lateness * 5.0, []
+    for n in range(round(seconds / DT)):
+        time = n * DT
+        velocity = 5.0 + 0.06 * cos(RATE * time)
+        rows.append((time, 5.0 * time, VehicleMotion((north, 3.0, -5.0), (velocity, 0.0, 0.0))))
+        gps = 5.0 * (time - lateness)
+        north += DT * (velocity + (gps - north) / SETTINGS.ahead)
+    return rows
+
+
+def errors(settings, lateness=0.0):
+    """The largest errors of a position after 5 s: as measured, and corrected; m."""
+    correction, measured_off, off = PositionCorrection(settings), 0.0, 0.0
+    for time, truth, measured in wandering(40.0, lateness):
+        found = correction.corrected(time, measured)
+        assert found.position_ned[1:] == pytest.approx((3.0, -5.0))
+        assert found.velocity_ned == measured.velocity_ned
+        if time > 5.0:
+            measured_off = max(measured_off, abs(measured.position_ned[0] - truth))
+            off = max(off, abs(found.position_ned[0] - truth))
+    return measured_off, off
+
+
+def test_what_the_estimator_has_still_to_correct_is_taken_ahead():
+    before, after = errors(SETTINGS)
+    assert before >= 0.035
+    assert after <= 0.25 * before
+
+
+def test_a_known_lateness_is_made_up_for():
+    late = CorrectionSettings(0.7, 0.1, 0.2, lateness=0.02)
+    before, after = errors(late, lateness=0.02)
+    assert before >= 0.12
+    assert after <= 0.015
+
+
+def test_at_rest_nothing_changes():
+    correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, lateness=0.05))
+    rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))
+    for n in range(100):
+        assert correction.corrected(n * DT, rest) == rest
+
+
+def test_a_gap_and_a_reset_begin_anew():
+    correction = PositionCorrection(SETTINGS)
+    away = VehicleMotion((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    correction.corrected(0.0, VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    assert correction.corrected(DT, away).position_ned[0] > 1.05
+    assert correction.corrected(5.0, away) == away
+    correction.corrected(5.0 + DT, VehicleMotion((2.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    correction.reset()
+    assert correction.corrected(5.0 + 2.0 * DT, away) == away
+
+
+@given(st.lists(st.tuples(st.floats(-1.0, 1.0), pairs, pairs), min_size=1, max_size=30))
+def test_it_is_bounded_whatever_comes(rows):
+    correction, time = PositionCorrection(SETTINGS), 0.0
+    for dt, place, speed in rows:
+        time += dt
+        measured = VehicleMotion((*place, 0.0), (*speed, 0.0))
+        north, east, _ = correction.corrected(time, measured).position_ned
+        assert isfinite(north + east)
+        assert hypot(north - place[0], east - place[1]) <= 0.2 * (1.0 + 1e-9) + 1e-9
+
+
+def test_a_turning_vehicle_without_errors_is_left_alone():
+    correction, most = PositionCorrection(SETTINGS), 0.0
+    for n in range(1000):
+        a = n * DT
+        place = (5.0 * cos(a), 5.0 * sin(a), 0.0)
+        speed = (-5.0 * sin(a), 5.0 * cos(a), 0.0)
+        found = correction.corrected(a, VehicleMotion(place, speed))
+        off = hypot(found.position_ned[0] - place[0], found.position_ned[1] - place[1])
+        most = max(most, off)
+    assert most <= 1e-3
