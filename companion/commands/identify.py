@@ -4,19 +4,21 @@ import argparse
 import json
 import os
 from contextlib import suppress
-from math import isnan
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from companion.commands import flying
 from companion.commands.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.config_file import load
+from companion.config_sections import AxisKeys
 from companion.guidance.reference import GRAVITY
 from companion.identification import (
-    KEEP_FRAME_LEAD,
     BadFitError,
     IdentifiedVehicle,
+    RateResponse,
     identify_vehicle,
+    kept_axes,
     vehicle_fragment,
     vehicle_table,
 )
@@ -30,7 +32,7 @@ SHIPPED = Path()
 _PROGRAMME = "identify"
 _PLANNER = "first-order"
 """It needs no knowledge of the vehicle: that is what is looked for."""
-_LOG, _FRAGMENT = "flight.tlog", "vehicle.yaml"
+_LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
 
 
 def identify(options: argparse.Namespace) -> int:
@@ -94,8 +96,9 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
         console.print("fitting…")
     rows = read_flight_log(log)
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
+    known = _known(log)
     try:
-        text = vehicle_fragment(vehicle, GRAVITY)
+        text = vehicle_fragment(vehicle, GRAVITY, known)
     except BadFitError as error:
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))
@@ -105,11 +108,26 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
         _tell(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FLIGHT
     _replace(out, text)
+    kept = {
+        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
+        for axis, keys in kept_axes(vehicle, known).items()
+    }
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
-        console.print(_how_to_include(out, options.config, vehicle), soft_wrap=True)
-    _tell(options, {"result": "ok", "log": str(log), "file": str(out), **_figures(vehicle)})
+        for axis, words in kept.items():
+            console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
+        console.print(_how_to_include(out, options.config), soft_wrap=True)
+    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
+    _tell(options, {**result, **_figures(vehicle)})
     return EXIT_OK
+
+
+def _known(log: Path) -> dict[str, AxisKeys]:
+    """What the configuration of that flight, beside its log, says of each axis; perhaps nothing."""
+    try:
+        return load(log.with_name(_CONFIG)).vehicle.axes
+    except ConfigError:  # another program's log, or another version's configuration
+        return {}
 
 
 def _replace(out: Path, text: str) -> None:
@@ -132,18 +150,17 @@ def _replace(out: Path, text: str) -> None:
             part.unlink()
 
 
-def _how_to_include(out: Path, config: Path | None, vehicle: IdentifiedVehicle) -> str:
+def _how_to_include(out: Path, config: Path | None) -> str:
     place = out.resolve()
     if config is not None:
         place = Path(os.path.relpath(place, config.resolve().parent))
-    lines = [
-        f"Written to {out}. Let your configuration say",
-        f"  include: {place}",
-        "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win.",
-    ]
-    if vehicle.slews:
-        lines.append(KEEP_FRAME_LEAD)
-    return "\n".join(lines)
+    return "\n".join(
+        (
+            f"Written to {out}. Let your configuration say",
+            f"  include: {place}",
+            "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win.",
+        )
+    )
 
 
 def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
@@ -153,14 +170,35 @@ def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
             "lag_ms": _in_ms(response.lag),
             "dead_time_ms": _in_ms(response.dead_time),
             "slew_rad_s2": response.slew,
+            "gain": _rounded(response.gain, 3),
             "explained": round(response.fit.explained, 4),
+            "misfit": round(response.fit.misfit, 4),
+            "lag_error_ms": _in_ms(response.fit.lag_error),
+            "dead_time_error_ms": _in_ms(response.fit.dead_time_error),
+            "second_order": _second_order(response),
         }
         for name, response in vehicle.axes.items()
     }
 
 
+def _second_order(response: RateResponse) -> dict[str, float] | None:
+    nearer = response.second_order
+    if nearer is None:
+        return None
+    return {
+        "frequency_rad_s": round(nearer.frequency, 2),
+        "damping": round(nearer.damping, 3),
+        "dead_time_ms": round(1e3 * nearer.dead_time, 1),
+        "explained": round(nearer.explained, 4),
+    }
+
+
 def _in_ms(seconds: float) -> float | None:
-    return None if isnan(seconds) else round(1e3 * seconds, 1)
+    return _rounded(1e3 * seconds, 1)
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(value, digits) if isfinite(value) else None
 
 
 def _tell(options: argparse.Namespace, result: dict[str, Any]) -> None:

@@ -25,14 +25,13 @@ class Solution(NamedTuple):
         unknown: (k,), the unknowns that are not linear.
         weights: (c,), the linear ones.
         residual: (m,), measured − modelled.
-        errors: (k,), standard errors of `unknown`. Neighbouring residuals that resemble each other
-            count as fewer samples, as for a first-order autoregressive noise.
+        slopes: (m, k), how the residual changes with each of `unknown`, the weights at their best.
     """
 
     unknown: Floats
     weights: Floats
     residual: Floats
-    errors: Floats
+    slopes: Floats
 
     @property
     def squares(self) -> float:
@@ -78,8 +77,7 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
             damping *= 5.0
         if moved < 1e-7 or 0.0 < gained < _ENOUGH * float(residual @ residual):
             break
-    slopes = _slopes(projection, unknown)
-    return Solution(unknown, weights, residual, _errors(slopes, residual, weights.size))
+    return Solution(unknown, weights, residual, _slopes(projection, unknown))
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:
@@ -92,17 +90,3 @@ def _slopes(projection: Projection, unknown: Floats) -> Floats:
         ],
         axis=1,
     )
-
-
-def _errors(slopes: Floats, residual: Floats, weights: int) -> Floats:
-    """The linear unknowns are projected out of `slopes`, so that their doubt is in it too."""
-    freedom = max(residual.size - weights - slopes.shape[1], 1)
-    squares = float(residual @ residual)
-    alike = float(residual[1:] @ residual[:-1]) / squares if squares > 0.0 else 0.0
-    alike = min(max(alike, 0.0), 0.99)
-    variance = squares / freedom * (1.0 + alike) / (1.0 - alike)
-    # Slopes near the smallest number there is have no inverse: nothing is determined by them.
-    with np.errstate(over="ignore", invalid="ignore"):
-        covariance = np.linalg.pinv(slopes.T @ slopes) * variance
-    errors: Floats = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    return np.where(np.isnan(errors), np.inf, errors)

@@ -5,7 +5,8 @@ from a sample to the first effect of its answer: what `vehicle.dead_time_ms` mea
 """
 
 from companion.identification.correlation import dead_time_by_correlation
-from companion.identification.fragment import KEEP_FRAME_LEAD, vehicle_fragment
+from companion.identification.fit import SecondOrderFit
+from companion.identification.fragment import kept_axes, vehicle_fragment
 from companion.identification.response import (
     BadFitError,
     FitNeeds,
@@ -18,17 +19,18 @@ from companion.identification.thrust_map import ThrustMap, fit_thrust_map
 from companion.identification.vehicle import IdentifiedVehicle, identify_vehicle
 
 __all__ = [
-    "KEEP_FRAME_LEAD",
     "BadFitError",
     "FitNeeds",
     "FitQuality",
     "IdentifiedVehicle",
     "RateResponse",
+    "SecondOrderFit",
     "ThrustMap",
     "dead_time_by_correlation",
     "fit_rate_response",
     "fit_thrust_map",
     "identify_vehicle",
+    "kept_axes",
     "vehicle_fragment",
     "vehicle_table",
 ]

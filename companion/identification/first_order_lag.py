@@ -4,13 +4,14 @@ Between two knots the lag's input is a straight line v + m·(t − t_i), and the
 τ·ẋ = v + m·(t − t_i) − x:  x(t) = v + m·(t − t_i − τ) + (x_i − v + m·τ)·exp(−(t − t_i)/τ).
 """
 
-from math import exp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Numbers = NDArray[Any]
+"""Real or complex."""
 
 _LONGEST_PART = 500.0
 """e to this power still is a number."""
@@ -81,6 +82,11 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 
     No time in `at` may lie before the first knot.
     """
+    return np.asarray(lagged_by(commands, lag, at), dtype=np.float64)
+
+
+def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
+    """`lagged` for a lag that may be complex: one of a pair that is an oscillation."""
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
@@ -88,24 +94,25 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
     piece = np.searchsorted(commands.time, at, side="right") - 1
     since = at - commands.time[piece]
     straight = steady[piece] + commands.slope[piece] * since
-    response: Floats = straight + excess[piece] * np.exp(-since / lag)
+    response: Numbers = straight + excess[piece] * np.exp(-since / lag)
     return response
 
 
-def _decaying(ages: Floats, jumps: Floats) -> Floats:
+def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
     """(n,), at each age (n,) the sum of the jumps (n,) so far, each decayed since its own age.
 
     As running sums, in as long parts as exponentials allow.
     """
-    sums = np.empty(jumps.size)
-    start, before, begun = 0, 0.0, float(ages[0])
+    sums = np.empty_like(jumps)
+    real = np.real(ages)
+    start, before = 0, 0.0 * jumps[0]
     while start < jumps.size:
-        end = int(np.searchsorted(ages, begun + _LONGEST_PART, side="right"))
-        growth = np.exp(ages[start:end] - begun)
+        end = int(np.searchsorted(real, real[start] + _LONGEST_PART, side="right"))
+        growth = np.exp(ages[start:end] - ages[start])
         sums[start:end] = (before + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
-            step = min(float(ages[end] - ages[end - 1]), _LONGEST_PART)
-            before, begun = float(sums[end - 1]) * exp(-step), float(ages[end])
+            step = ages[end] - ages[end - 1]
+            before = sums[end - 1] * np.exp(-step)
         start = end
     return sums
 

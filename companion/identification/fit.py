@@ -1,38 +1,40 @@
 """A first-order lag with dead time, fitted to stretches of commands and measurements of any unit.
 
-y(t) = gain·x(t − dead time) + offset + what is left of the start, with x the lag's exact response
-(`first_order_lag`). Gain, offset and starts are linear: only lag, dead time and slew are searched.
+Gain, offset and starts are linear: only lag, dead time and slew are searched (`DelayedModel`).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import exp, log, nan
-from typing import NamedTuple
+from math import exp, log
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.fitting import Solution, minimise, project
-from companion.identification.first_order_lag import Knots, held, lagged, slewed, value_at
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch, most_excited
+from companion.fitting import Solution
+from companion.identification.delayed_model import DelayedModel
+from companion.identification.models import FirstOrder, Model, SecondOrder, frequency_damping
+from companion.identification.record import Stretch, most_excited
+from companion.identification.residual_analysis import Residuals, analyse
 
 Floats = NDArray[np.float64]
 
+LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
+"""Between what the lag is searched, s."""
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
-_RAMPS = (0.01, 0.5)
-"""Shortest and longest time the largest change of command may take at the slew limit, s."""
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Of `_RAMPS`, those from which the search may begin, s."""
+"""Times of the largest change of command at the slew limit, from which the search may begin, s."""
 _LEFT_OF_LAG = (0.15, 0.4, 1.0)
 _LEFT_OF_DEAD_TIME = (0.6, 1.0)
 """Of what was found without a slew limit, the shares from which the search with one may begin."""
 _CLEARLY = 0.6
-"""A slew limit is believed if it leaves less than this share of the squared residuals."""
+"""More unknowns are believed if they leave less than this share of the squared residuals."""
+_TRIED_DAMPINGS = (0.4, 0.7, 1.0)
+_TRIED_SHARES = (0.0, 0.3, 0.6)
+"""Of the whole delay, those that may be the dead time of the second order."""
 _ON_ITS_WAY = 0.02
 """Excited: further from the command than this share of the commands' range."""
-_ALIKE = 0.005
-"""Commands that differ by less than this share of their range count as one."""
+_MEMORY = 4.0
+"""So many times the whole delay a vehicle remembers its commands, and its noise itself."""
 _COARSE = 500
 """About so many samples find where to begin."""
 _FINE = 4000
@@ -41,14 +43,34 @@ _FEWEST = 10
 _NEIGHBOUR = 0.005  # s
 
 
-class Ranges(NamedTuple):
-    """Between what is searched, s."""
+@dataclass(frozen=True, slots=True)
+class SecondOrderFit:
+    """ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
 
-    lag: tuple[float, float] = (0.001, 1.0)
-    dead_time: tuple[float, float] = (0.0, LONGEST_DEAD_TIME - 0.01)
+    Attributes:
+        frequency: ω, rad/s.
+        damping: ζ.
+        dead_time: s.
+        gain: measured per commanded.
+        slew: of the command, per second; None where there is no sign of a limit.
+        explained: R².
+    """
 
+    frequency: float
+    damping: float
+    dead_time: float
+    gain: float
+    slew: float | None
+    explained: float
 
-SEARCHED = Ranges()
+    @property
+    def described(self) -> str:
+        """In one line."""
+        return (
+            f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
+            f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
+            f"{self.explained:.1%}"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +84,13 @@ class LagFit:
         offset: measured at a command of zero.
         slew: of the command, per second; None where there is no sign of a limit.
         explained: R².
-        dead_time_error: standard error, s.
-        lag_error: standard error, s.
+        misfit: root mean square of what the commands explain of the residual, as a share of the
+            measurements' standard deviation.
+        dead_time_error: standard error, s, by what the commands do not explain of the residual.
+        lag_error: likewise, s.
         span: from the smallest to the largest command.
         excited: samples further from the command than 2 % of the span.
+        second_order: where it is clearly nearer; None elsewhere.
     """
 
     dead_time: float
@@ -74,10 +99,12 @@ class LagFit:
     offset: float
     slew: float | None
     explained: float
+    misfit: float
     dead_time_error: float
     lag_error: float
     span: float
     excited: int
+    second_order: SecondOrderFit | None = None
 
 
 def fit_lag(
@@ -94,19 +121,22 @@ def fit_lag(
     samples = sum(part.measured.size for part in record)
     if samples < _FEWEST or all(np.ptp(part.commanded) == 0.0 for part in record):
         return None
-    data = _Data(record, gain, thinning=1 + samples // _FINE)
-    coarse = _Data(record, gain, thinning=1 + samples // _COARSE)
-    best = _settled(data, _start(coarse))
+    fine, coarse = 1 + samples // _FINE, 1 + samples // _COARSE
+    data = DelayedModel(record, FirstOrder(), gain, fine)
+    first_look = DelayedModel(record, FirstOrder(), gain, coarse)
+    best = _settled(data, _start(first_look))
     if may_slew:
-        best = _slewed_if_clearly(best, data, coarse)
-    found = data.described(best)
+        best = _slewed_if_clearly(best, data, first_look)
+    found = _described(data, best)
+    freely = data
     if gain is not None:
-        freely = _Data(record, None, thinning=data.thinning).search(best.unknown)
-        found = replace(found, gain=float(freely.weights[0]))
-    return found
+        freely = DelayedModel(record, FirstOrder(), None, fine)
+        best = freely.search(best.unknown)
+        found = replace(found, gain=float(best.weights[0]))
+    return replace(found, second_order=_second_order(record, freely, best, coarse))
 
 
-def _slewed_if_clearly(best: Solution, data: "_Data", coarse: "_Data") -> Solution:
+def _slewed_if_clearly(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit behind a slew limit, if it is clearly better than the one without."""
     promising = coarse.search(_slewed_start(best, coarse))
     if promising.squares > _CLEARLY * coarse.search(best.unknown).squares:
@@ -115,7 +145,7 @@ def _slewed_if_clearly(best: Solution, data: "_Data", coarse: "_Data") -> Soluti
     return best_limited if best_limited.squares < _CLEARLY * best.squares else best
 
 
-def _slewed_start(best: Solution, coarse: "_Data") -> Floats:
+def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
     """(3,), the best of a coarse grid: what a ramp delays is taken from lag and dead time."""
     lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
     return coarse.best_of(
@@ -128,93 +158,74 @@ def _slewed_start(best: Solution, coarse: "_Data") -> Floats:
     )
 
 
-class _Data:
-    """A record, every `thinning`-th sample of it, and what a lag makes of its commands."""
-
-    def __init__(self, record: list[Stretch], gain: float | None, thinning: int = 1) -> None:
-        self.gain, self.thinning = gain, thinning
-        span = max(float(np.ptp(part.commanded)) for part in record)
-        self.commands = [held(part.time, part.commanded, _ALIKE * span) for part in record]
-        self.times = [part.measured_time[::thinning] for part in record]
-        self.measured = np.concatenate([part.measured[::thinning] for part in record])
-        changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
-        self.largest_change = float(max(changes))
-        self._slewed: tuple[float, list[Knots]] = (nan, [])
-
-    def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Weights (gain, offset, starts), and what they leave of the measurements (m,)."""
-        moved = self.lagged(unknown)
-        if self.gain is None:
-            columns = np.column_stack((moved, self._drift(unknown)))
-            return project(columns, self.measured)
-        weights, residual = project(self._drift(unknown), self.measured - self.gain * moved)
-        return np.concatenate(([self.gain], weights)), residual
-
-    def lagged(self, unknown: Floats) -> Floats:
-        """(m,), the delayed and lagged commands."""
-        lag = exp(unknown[0])
-        return self._each(unknown, lambda knots, at: lagged(knots, lag, at))
-
-    def _drift(self, unknown: Floats) -> Floats:
-        """(m, 1 + stretches): ones, and how the rate at each stretch's start dies away."""
-        columns = np.zeros((self.measured.size, 1 + len(self.times)))
-        columns[:, 0] = 1.0
-        row = 0
-        for number, (knots, times) in enumerate(zip(self.commands, self.times, strict=True)):
-            since = times - unknown[1] - knots.time[0]
-            columns[row : row + times.size, 1 + number] = np.exp(-since / exp(unknown[0]))
-            row += times.size
-        return columns
-
-    def search(self, start: Floats) -> Solution:
-        """The best fit near a start (log lag, dead time, and perhaps log slew)."""
-        limits = [
-            (log(SEARCHED.lag[0]), log(SEARCHED.lag[1])),
-            SEARCHED.dead_time,
-            (log(self.largest_change / _RAMPS[1]), log(self.largest_change / _RAMPS[0])),
+def _second_order(
+    record: list[Stretch], first: DelayedModel, found: Solution, coarse: int
+) -> SecondOrderFit | None:
+    """The best second order of free gain, if it is clearly nearer than that first order."""
+    lag, dead_time, *slew = found.unknown.tolist()
+    whole = exp(lag) + dead_time
+    model: Model = SecondOrder()
+    start = DelayedModel(record, model, None, coarse).best_of(
+        [
+            np.array([log((1.0 - share) * whole), log(damping), share * whole, *slew])
+            for damping in _TRIED_DAMPINGS
+            for share in _TRIED_SHARES
         ]
-        lowest, highest = np.array(limits[: start.size]).T
-        return minimise(self.projection, start, lowest, highest)
-
-    def best_of(self, points: list[Floats]) -> Floats:
-        """The point of a grid that leaves the smallest squares."""
-        residuals = [self.projection(point)[1] for point in points]
-        return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
-
-    def described(self, found: Solution) -> LagFit:
-        """The fit in its own units."""
-        lag = exp(found.unknown[0])
-        spread = self.measured - self.measured.mean()
-        asked = self._each(found.unknown[:2], value_at)
-        span = float(np.ptp(asked))
-        way = np.abs(self.lagged(found.unknown) - asked)
-        return LagFit(
-            dead_time=float(found.unknown[1]),
-            lag=lag,
-            gain=float(found.weights[0]),
-            offset=float(found.weights[1]),
-            slew=exp(found.unknown[2]) if found.unknown.size > 2 else None,
-            explained=1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0,
-            dead_time_error=float(found.errors[1]),
-            lag_error=lag * float(found.errors[0]),
-            span=span,
-            excited=int((way > _ON_ITS_WAY * span).sum()),
-        )
-
-    def _each(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), of each stretch's commands (slewed, if that is in the unknowns), delayed."""
-        commands = self._limited(unknown[2]) if unknown.size > 2 else self.commands
-        each = zip(commands, self.times, strict=True)
-        return np.concatenate([of(knots, times - unknown[1]) for knots, times in each])
-
-    def _limited(self, log_slew: float) -> list[Knots]:
-        """The slewed commands, kept until another slew is asked for: steps of the rest need it."""
-        if log_slew != self._slewed[0]:
-            self._slewed = log_slew, [slewed(knots, exp(log_slew)) for knots in self.commands]
-        return self._slewed[1]
+    )
+    data = DelayedModel(record, model, None, first.thinning)
+    best = data.search(start)
+    if best.squares > _CLEARLY * found.squares:
+        return None
+    frequency, damping = frequency_damping(best.unknown)
+    return SecondOrderFit(
+        frequency=frequency,
+        damping=damping,
+        dead_time=data.dead_time(best.unknown),
+        gain=float(best.weights[0]),
+        slew=data.slew(best.unknown),
+        explained=data.explained(best),
+    )
 
 
-def _settled(data: _Data, start: Floats) -> Solution:
+def _described(data: DelayedModel, found: Solution) -> LagFit:
+    """The fit in its own units."""
+    lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
+    asked = data.asked(found.unknown)
+    span = float(np.ptp(asked))
+    excited = int((np.abs(data.response(found.unknown) - asked) > _ON_ITS_WAY * span).sum())
+    parted = _parted(data, found, excited)
+    moved = float(np.std(data.measured))
+    return LagFit(
+        dead_time=dead_time,
+        lag=lag,
+        gain=float(found.weights[0]),
+        offset=float(found.weights[1]),
+        slew=data.slew(found.unknown),
+        explained=data.explained(found),
+        misfit=parted.misfit / moved if moved > 0.0 else 0.0,
+        dead_time_error=float(parted.errors[1]),
+        lag_error=lag * float(parted.errors[0]),
+        span=span,
+        excited=excited,
+    )
+
+
+def _parted(data: DelayedModel, found: Solution, excited: int) -> Residuals:
+    unknown = found.unknown
+    memory = _MEMORY * (exp(unknown[0]) + data.dead_time(unknown))
+    step = float(np.median(np.diff(np.concatenate(data.times))))
+    correlated = 1 + int(memory / max(step, 1e-4))
+    return analyse(
+        found.residual,
+        found.slopes,
+        lambda later: data.asked(unknown, later),
+        memory,
+        excited,
+        correlated,
+    )
+
+
+def _settled(data: DelayedModel, start: Floats) -> Solution:
     """The best fit without a slew limit.
 
     Where commands and samples come at few distinct distances from each other, there is a shallow
@@ -230,7 +241,7 @@ def _settled(data: _Data, start: Floats) -> Solution:
     return min(found, *neighbours, key=lambda each: each.squares)
 
 
-def _start(data: _Data) -> Floats:
+def _start(data: DelayedModel) -> Floats:
     """(2,), the best of a coarse grid: (log lag, dead time)."""
     return data.best_of(
         [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]

@@ -1,66 +1,149 @@
 """What the configuration includes of an identified vehicle, written from fits that may be used."""
 
+from collections.abc import Mapping, Sequence
 from math import degrees
+from typing import NamedTuple
 
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
-KEEP_FRAME_LEAD = (
-    "Acceleration is limited, as by ArduPilot: keep `vehicle.yaw_frame_lead_ms` of "
-    "vehicle-ardupilot.yaml, which is not identified."
-)
-"""For whoever includes a vehicle with a slew limit."""
+Known = Mapping[str, Sequence[float | None]]
+"""Lag (ms), dead time (ms) and acceleration limit (°/s²) by the axis's name, as configured."""
+
+_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
+_UNLIMITED = 100_000.0
+"""Written where roll has a slew limit and this axis has none: null would mean that of roll."""
+_ALIKE_MS = 3.0
+_ALIKE_SLEW = 0.1
+"""Roll and pitch that differ by less, as a share, have one slew limit."""
 
 
-def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float) -> str:
+class AxisValues(NamedTuple):
+    """What the configuration says of one axis.
+
+    Attributes:
+        lag: ms.
+        dead_time: ms.
+        slew: °/s²; None without a limit.
+    """
+
+    lag: float
+    dead_time: float
+    slew: float | None
+
+    def described(self) -> str:
+        """In one line."""
+        slew = "" if self.slew is None else f", slew {self.slew:.0f} °/s²"
+        return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}"
+
+
+def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
     """YAML that the configuration includes, a comment on how good each fit is above it.
 
-    The configuration has one value for roll and pitch: the mean of the two. A slew limit stands in
-    it where one was found, the hover thrust where the thrust map is good.
+    Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
+    a comment says so. Pitch is written where it differs from roll, a slew limit where one was
+    found, the lead of ArduPilot's frame with it, the hover thrust where the thrust map is good.
 
     Args:
         vehicle: as identified.
         gravity: m/s², at which it hovers.
+        known: of each axis, from the configuration in force; may lack axes and values.
 
     Raises:
-        BadFitError: a response must not be used; it says why, one sentence an axis.
+        BadFitError: no response may be used, or one may not and nothing else is known of its axis;
+            it says why, one sentence an axis.
     """
-    faults = vehicle.faults()
-    if faults:
-        raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults.items()))
-    lines = [f"# {name}: {_described(response)}" for name, response in vehicle.axes.items()]
+    kept = kept_axes(vehicle, known)
+    lines = [_comment(name, response, kept) for name, response in vehicle.axes.items()]
     thrust = vehicle.thrust
     if thrust is not None and thrust.is_good(gravity):
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
+    axes = {name: kept.get(name) or _found(each) for name, each in vehicle.axes.items()}
+    lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
+    lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     if vehicle.slews:
-        lines.append(f"# {KEEP_FRAME_LEAD}")
-    lines.append("vehicle:")
-    lines += _response_keys("", (vehicle.roll, vehicle.pitch))
-    lines += _response_keys("yaw_", (vehicle.yaw,))
+        lines += _frame_lead(axes)
     return "\n".join(lines) + "\n"
 
 
-def _response_keys(prefix: str, axes: tuple[RateResponse, ...]) -> list[str]:
-    lines = [
-        f"  {prefix}lag_ms: {1e3 * _mean([axis.lag for axis in axes]):.1f}",
-        f"  {prefix}dead_time_ms: {1e3 * _mean([axis.dead_time for axis in axes]):.1f}",
-    ]
-    slews = [axis.slew for axis in axes if axis.slew is not None]
-    if slews:
-        lines.append(f"  {prefix}acceleration_limit_deg_s2: {degrees(_mean(slews)):.0f}")
+def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]:
+    """What the configuration keeps saying of the axes whose fits are bad.
+
+    Raises:
+        BadFitError: no fit is good, or nothing is known of an axis whose fit is bad.
+    """
+    faults = vehicle.faults()
+    kept = {}
+    for name in faults:
+        lag, dead_time, slew = known.get(name, (None, None, None))
+        if lag is not None and dead_time is not None:
+            kept[name] = AxisValues(lag, dead_time, slew)
+    if len(faults) == len(vehicle.axes) or len(kept) < len(faults):
+        raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults.items()))
+    return kept
+
+
+def _found(response: RateResponse) -> AxisValues:
+    slew = None if response.slew is None else degrees(response.slew)
+    return AxisValues(1e3 * response.lag, 1e3 * response.dead_time, slew)
+
+
+def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
+    """The keys of both: their mean where they hardly differ."""
+    if _alike(roll, pitch):
+        slews = [axis.slew for axis in (roll, pitch) if axis.slew is not None]
+        slew = sum(slews) / len(slews) if slews else None
+        mean = AxisValues(
+            0.5 * (roll.lag + pitch.lag), 0.5 * (roll.dead_time + pitch.dead_time), slew
+        )
+        return _axis_keys("roll", mean)
+    return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
+
+
+def _alike(one: AxisValues, other: AxisValues) -> bool:
+    if one.slew is not None and other.slew is not None:
+        if abs(one.slew - other.slew) > _ALIKE_SLEW * max(one.slew, other.slew):
+            return False
+    elif one.slew != other.slew:
+        return False
+    apart = max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
+    return apart <= _ALIKE_MS
+
+
+def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
+    """Lines of one axis; `inherited` is the slew limit that it would have without its own."""
+    prefix = _PREFIX[name]
+    lines = [f"  {prefix}lag_ms: {axis.lag:.1f}", f"  {prefix}dead_time_ms: {axis.dead_time:.1f}"]
+    slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED
+    if slew is not None:
+        lines.append(f"  {prefix}acceleration_limit_deg_s2: {slew:.0f}")
     return lines
 
 
-def _mean(values: list[float]) -> float:
-    return sum(values) / len(values)
+def _frame_lead(axes: Mapping[str, AxisValues]) -> list[str]:
+    """By how long the attitude target, which does not wait for the body, turns before it in yaw."""
+    tilt = 0.5 * (axes["roll"].dead_time + axes["pitch"].dead_time)
+    lead = max(axes["yaw"].lag + axes["yaw"].dead_time - tilt, 0.0)
+    return [
+        "  # Yaw's lag and dead time, less the dead time of roll and pitch: as acceleration is",
+        "  # limited, rates turn an attitude target (ArduPilot), which does not wait for the body.",
+        f"  yaw_frame_lead_ms: {lead:.1f}",
+    ]
 
 
-def _described(response: RateResponse) -> str:
+def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
+    if name in kept:
+        return (
+            f"# {name}: kept from the configuration: {kept[name].described()}; the fit is bad: "
+            f"{response.reason()}"
+        )
     fit = response.fit
     slew = "" if response.slew is None else f", slew {response.slew:.1f} rad/s²"
+    nearer = "" if response.second_order is None else f"; nearer: {response.second_order.described}"
     return (
-        f"lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead time "
+        f"# {name}: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead time "
         f"{1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
-        f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, {fit.excited} samples"
+        f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
+        f"{fit.excited} samples{nearer}"
     )

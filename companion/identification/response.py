@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from companion.identification.fit import SEARCHED, fit_lag
+from companion.identification.delayed_model import DEAD_TIMES
+from companion.identification.fit import LAGS, SecondOrderFit, fit_lag
 from companion.identification.record import stretches
 
 
@@ -18,14 +19,17 @@ class FitQuality:
 
     Attributes:
         explained: R², share of the measurements' variance that the model explains; 1 is all.
-        dead_time_error: standard error of the dead time, s.
-        lag_error: standard error of the lag, s.
+        misfit: how far the model is off, as a share of the movement: the root mean square of what
+            commands explain of the residual. The same in each flight.
+        dead_time_error: standard error of the dead time, s, by noise: how far flights differ.
+        lag_error: standard error of the lag, s, likewise.
         span: from the smallest to the largest command, rad/s.
         excited: samples at which the model was still on its way to the command (by 2 % of the span
             or more): only these tell of lag and dead time.
     """
 
     explained: float
+    misfit: float
     dead_time_error: float
     lag_error: float
     span: float
@@ -37,7 +41,7 @@ class FitNeeds:
     """What a fit must reach to be used.
 
     Attributes:
-        explained: least R².
+        misfit: largest misfit, as a share of the movement.
         error: largest standard error of lag and dead time, s, or
         relative_error: as a share of lag + dead time, whichever is larger.
         span: smallest span of the commands, rad/s.
@@ -45,7 +49,7 @@ class FitNeeds:
         gain: smallest and largest gain; a rate loop that follows has about 1.
     """
 
-    explained: float = 0.9
+    misfit: float = 0.3
     error: float = 0.003
     relative_error: float = 0.1
     span: float = 0.2
@@ -68,6 +72,7 @@ class RateResponse:
         slew: largest change of the rate that the autopilot asks of itself, rad/s², in front of the
             lag; None where the response shows none.
         fit: how good it is.
+        second_order: the model that is clearly nearer, where one is; the planner has no use for it.
     """
 
     dead_time: float
@@ -75,6 +80,7 @@ class RateResponse:
     gain: float
     slew: float | None
     fit: FitQuality
+    second_order: SecondOrderFit | None = None
 
     def reason(self, needs: FitNeeds = NEEDS) -> str | None:
         """Why this must not be used, as a sentence without its stop; None if it may be."""
@@ -87,11 +93,11 @@ class RateResponse:
                 f"{needs.span:.2f} are needed",
             ),
             (
-                _at_edge(self.dead_time, SEARCHED.dead_time),
+                _at_edge(self.dead_time, DEAD_TIMES),
                 f"dead time stands at the edge of what was searched, {1e3 * self.dead_time:.0f} ms",
             ),
             (
-                _at_edge(self.lag, SEARCHED.lag),
+                _at_edge(self.lag, LAGS),
                 f"lag stands at the edge of what was searched, {1e3 * self.lag:.0f} ms",
             ),
             (
@@ -100,9 +106,9 @@ class RateResponse:
                 f"{needs.excited} are needed",
             ),
             (
-                fit.explained < needs.explained,
-                f"poor fit: the model explains {fit.explained:.0%} of the movement, "
-                f"{needs.explained:.0%} are needed",
+                fit.misfit > needs.misfit,
+                f"poor fit: the model is off by {fit.misfit:.0%} of the movement, "
+                f"at most {needs.misfit:.0%} may be",
             ),
             (
                 not low <= self.gain <= high,
@@ -125,7 +131,7 @@ def _at_edge(value: float, searched: tuple[float, float]) -> bool:
 
 
 _NOT_FOUND = RateResponse(
-    *(3 * (float("nan"),)), slew=None, fit=FitQuality(0.0, float("inf"), float("inf"), 0.0, 0)
+    *(3 * (float("nan"),)), slew=None, fit=FitQuality(0.0, 0.0, float("inf"), float("inf"), 0.0, 0)
 )
 
 
@@ -163,6 +169,13 @@ def fit_rate_response(
     if found is None:
         return _NOT_FOUND
     quality = FitQuality(
-        found.explained, found.dead_time_error, found.lag_error, found.span, found.excited
+        found.explained,
+        found.misfit,
+        found.dead_time_error,
+        found.lag_error,
+        found.span,
+        found.excited,
     )
-    return RateResponse(found.dead_time, found.lag, found.gain, found.slew, quality)
+    nearer = found.second_order
+    gain_found = found.gain if nearer is None else nearer.gain
+    return RateResponse(found.dead_time, found.lag, gain_found, found.slew, quality, nearer)

@@ -12,7 +12,7 @@ from companion.identification.vehicle import IdentifiedVehicle
 
 
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
-    """A row an axis, a line of the thrust; at most 80 columns wide.
+    """A row an axis, what is nearer to it, a line of the thrust; at most 80 columns wide.
 
     Args:
         vehicle: as identified.
@@ -20,11 +20,16 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
     """
     table = Table(title="Response to body rates", title_justify="left", title_style="bold")
     table.add_column("")
-    for column in ("lag, ms", "dead time, ms", "gain", "slew, °/s²", "explained", ""):
+    for column in ("lag, ms", "dead time, ms", "gain", "slew, °/s²", "misfit", ""):
         table.add_column(column, justify="right")
     for name, response in vehicle.axes.items():
         table.add_row(name, *_cells(response))
-    return Group(table, Text(_thrust(vehicle.thrust, gravity)))
+    nearer = [
+        Text(f"{name}: nearer is a {response.second_order.described}")
+        for name, response in vehicle.axes.items()
+        if response.second_order is not None
+    ]
+    return Group(table, *nearer, Text(_thrust(vehicle.thrust, gravity)))
 
 
 def _cells(response: RateResponse) -> tuple[str, ...]:
@@ -37,7 +42,7 @@ def _cells(response: RateResponse) -> tuple[str, ...]:
         f"{1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f}",
         f"{response.gain:.2f}",
         "–" if response.slew is None else f"{degrees(response.slew):.0f}",
-        f"{fit.explained:.1%}",
+        f"{fit.misfit:.0%}",
         verdict,
     )
 

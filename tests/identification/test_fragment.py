@@ -13,6 +13,7 @@ from companion.identification import (
     FitQuality,
     IdentifiedVehicle,
     RateResponse,
+    SecondOrderFit,
     ThrustMap,
     fit_thrust_map,
     identify_vehicle,
@@ -23,24 +24,45 @@ from companion.identification import (
 from .vehicles import Doublets, lag_with_dead_time, regular
 
 GRAVITY = 9.80665
-GOOD = FitQuality(0.99, 0.001, 0.002, 2.0, 200)
+GOOD = FitQuality(
+    explained=0.99,
+    misfit=0.08,
+    dead_time_error=0.001,
+    lag_error=0.002,
+    span=2.0,
+    excited=200,
+)
 ROLL = RateResponse(0.040, 0.046, 1.05, None, GOOD)
-PITCH = RateResponse(0.042, 0.050, 1.02, None, GOOD)
+PITCH = RateResponse(0.042, 0.049, 1.02, None, GOOD)
 YAW = RateResponse(0.102, 0.370, 0.92, None, GOOD)
 MAP = ThrustMap(19.55, 0.22, 0.05, 0.01, 0.99)
 POOR_MAP = ThrustMap(6.0, 7.0, 0.0, 0.0, 0.47)
 VEHICLE = IdentifiedVehicle(ROLL, PITCH, YAW, MAP)
 
 
-def configured(vehicle):
-    return Config.model_validate(yaml.safe_load(vehicle_fragment(vehicle, GRAVITY)))
+IN_FORCE = {
+    "roll": (18.0, 19.0, 1100.0),
+    "pitch": (17.0, 19.0, 1000.0),
+    "yaw": (60.0, 158.0, 270.0),
+}
+
+
+def configured(vehicle, known=None):
+    text = vehicle_fragment(vehicle, GRAVITY, known or {})
+    return Config.model_validate(yaml.safe_load(text))
+
+
+def bad(response):
+    return replace(response, fit=replace(GOOD, misfit=0.4))
 
 
 def test_the_configuration_takes_it():
     config = configured(VEHICLE)
     vehicle = config.vehicle
-    assert (vehicle.lag_ms, vehicle.dead_time_ms) == (48.0, 41.0)
+    assert (vehicle.lag_ms, vehicle.dead_time_ms) == (47.5, 41.0)
     assert (vehicle.yaw_lag_ms, vehicle.yaw_dead_time_ms) == (370.0, 102.0)
+    assert (vehicle.pitch_lag_ms, vehicle.pitch_dead_time_ms) == (None, None)  # as roll
+    assert vehicle.yaw_frame_lead_ms == 0.0
     assert vehicle.acceleration_limit_deg_s2 is None
     assert vehicle.yaw_acceleration_limit_deg_s2 is None
     assert config.thrust.hover_thrust == pytest.approx((GRAVITY - 0.22) / 19.55, abs=5e-4)
@@ -56,29 +78,76 @@ def test_a_slew_limit_is_taken_where_one_was_found():
     vehicle = configured(limited).vehicle
     assert vehicle.acceleration_limit_deg_s2 == pytest.approx(np.degrees(19.2), abs=0.5)
     assert vehicle.yaw_acceleration_limit_deg_s2 == pytest.approx(np.degrees(4.7), abs=0.5)
-    on_one_axis = configured(replace(VEHICLE, pitch=replace(PITCH, slew=19.4))).vehicle
-    assert on_one_axis.acceleration_limit_deg_s2 == pytest.approx(np.degrees(19.4), abs=0.5)
+    # Yaw's 370 + 102 ms less the 41 ms of roll and pitch: the attitude target waits for neither.
+    assert vehicle.yaw_frame_lead_ms == pytest.approx(431.0, abs=0.1)
+
+
+def test_an_axis_without_a_slew_limit_does_not_inherit_that_of_roll():
+    vehicle = configured(replace(VEHICLE, roll=replace(ROLL, slew=19.4)))
+    limits = {name: axis.acceleration_limit_deg_s2 for name, axis in vehicle.vehicle.axes.items()}
+    assert limits == {
+        "roll": pytest.approx(np.degrees(19.4), abs=0.5),
+        "pitch": 100_000.0,
+        "yaw": 100_000.0,
+    }
+
+
+def test_pitch_is_written_where_it_differs_from_roll():
+    vehicle = configured(replace(VEHICLE, pitch=replace(PITCH, dead_time=0.044))).vehicle
+    assert (vehicle.lag_ms, vehicle.dead_time_ms) == (46.0, 40.0)
+    assert (vehicle.pitch_lag_ms, vehicle.pitch_dead_time_ms) == (49.0, 44.0)
+    slower = replace(VEHICLE, roll=replace(ROLL, slew=19.0), pitch=replace(PITCH, slew=16.0))
+    axes = configured(slower).vehicle.axes
+    assert axes["roll"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(19.0), abs=0.5)
+    assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
+
+
+def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():
+    vehicle = replace(VEHICLE, yaw=bad(YAW))
+    axes = configured(vehicle, IN_FORCE).vehicle.axes
+    assert axes["yaw"] == (60.0, 158.0, 270.0)
+    assert axes["roll"][:2] == (47.5, 41.0)
+    assert (
+        "# yaw: kept from the configuration: lag 60.0 ms, dead time 158.0 ms, slew 270 °/s²; "
+        "the fit is bad: poor fit: the model is off by 40% of the movement, at most 30% may be"
+    ) in vehicle_fragment(vehicle, GRAVITY, IN_FORCE)
+    axes = configured(replace(VEHICLE, pitch=bad(PITCH)), IN_FORCE).vehicle.axes
+    assert axes["pitch"] == (17.0, 19.0, 1000.0)
+    assert axes["roll"][:2] == (46.0, 40.0)
+
+
+@pytest.mark.parametrize("known", [{}, {"yaw": (None, None, None)}, {"yaw": (370.0, None, None)}])
+def test_an_axis_of_which_nothing_is_known_is_not_left_to_roll(known):
+    with pytest.raises(BadFitError, match=r"^yaw: poor fit"):
+        vehicle_fragment(replace(VEHICLE, yaw=bad(YAW)), GRAVITY, known)
 
 
 def test_each_axis_says_how_good_it_is():
-    text = vehicle_fragment(replace(VEHICLE, pitch=replace(PITCH, slew=19.2)), GRAVITY)
-    assert "# roll: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, explains 99.0%" in text
+    nearer = SecondOrderFit(19.4, 0.72, 0.008, 1.02, None, 0.998)
+    text = vehicle_fragment(
+        replace(VEHICLE, pitch=replace(PITCH, slew=19.2, second_order=nearer)), GRAVITY, {}
+    )
+    assert (
+        "# roll: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, explains 99.0%, misfit 8%"
+    ) in text
     assert "slew 19.2 rad/s²" in text
-    assert "# Acceleration is limited, as by ArduPilot: keep `vehicle.yaw_frame_lead_ms`" in text
-    assert "yaw_frame_lead_ms" not in vehicle_fragment(VEHICLE, GRAVITY)
+    assert (
+        "nearer: second order, natural frequency 19.4 rad/s, damping ratio 0.72, dead time 8 ms, "
+        "explains 99.8%"
+    ) in text
     assert "# thrust: T/m = 19.55·u +0.22 m/s²" in text
 
 
 @pytest.mark.parametrize("thrust", [None, POOR_MAP, replace(MAP, slope=9.0), replace(MAP, lag=0.6)])
 def test_a_thrust_map_that_is_missing_or_poor_is_left_out(thrust):
-    assert "thrust" not in vehicle_fragment(replace(VEHICLE, thrust=thrust), GRAVITY)
+    assert "thrust" not in vehicle_fragment(replace(VEHICLE, thrust=thrust), GRAVITY, {})
 
 
-def test_bad_fits_are_refused_with_every_reason():
-    poor = RateResponse(0.04, 0.05, 1.0, None, FitQuality(0.4, 0.001, 0.002, 2.0, 200))
-    still = RateResponse(0.04, 0.05, 1.0, None, FitQuality(0.99, 0.001, 0.002, 0.01, 200))
+def test_bad_fits_of_all_axes_are_refused_with_every_reason():
+    still = replace(YAW, fit=replace(GOOD, span=0.01))
+    nothing_good = IdentifiedVehicle(bad(ROLL), bad(PITCH), still, MAP)
     with pytest.raises(BadFitError, match=r"^roll: poor fit.*; yaw: too little excitation"):
-        vehicle_fragment(IdentifiedVehicle(poor, PITCH, still, MAP), GRAVITY)
+        vehicle_fragment(nothing_good, GRAVITY, IN_FORCE)
 
 
 def shown(vehicle):
@@ -88,17 +157,19 @@ def shown(vehicle):
 
 
 def test_the_table_tells_every_axis_within_80_columns():
-    text = shown(replace(VEHICLE, yaw=replace(YAW, slew=4.71239)))
+    nearer = SecondOrderFit(5.6, 0.94, 0.045, 0.92, 4.8, 0.9991)
+    text = shown(replace(VEHICLE, yaw=replace(YAW, slew=4.71239, second_order=nearer)))
     rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
     assert [cell.strip() for cell in rows["roll"].split("│")[2:8]] == [
         "46.0 ± 2.0",
         "40.0 ± 1.0",
         "1.05",
         "–",
-        "99.0%",
+        "8%",
         "good",
     ]
     assert " 270 " in rows["yaw"]
+    assert "yaw: nearer is a second order, natural frequency 5.6 rad/s" in text
     assert "T/m = 19.55·u +0.22" in text
     assert "hovers at 0.490" in " ".join(text.split())
     assert max(map(len, text.splitlines())) <= 80

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.identification import fit, fit_rate_response
+from companion.identification import fit_rate_response, models
 from companion.identification.record import most_excited, stretches
 
 from .vehicles import RATE_NOISE, Doublets, lag_with_dead_time, regular
@@ -30,12 +30,15 @@ def work(monkeypatch):
     """Sizes of what each step of a fit went through: pieces of commands, and samples."""
     sizes = []
 
-    def counted(commands, lag, at):
-        sizes.append(commands.time.size + at.size)
-        return lagged(commands, lag, at)
+    def counted(response):
+        def count(commands, *shape_and_times):
+            sizes.append(commands.time.size + shape_and_times[-1].size)
+            return response(commands, *shape_and_times)
 
-    lagged = fit.lagged
-    monkeypatch.setattr(fit, "lagged", counted)
+        return count
+
+    for name in ("lagged", "second_order"):
+        monkeypatch.setattr(models, name, counted(getattr(models, name)))
     return sizes
 
 

@@ -133,12 +133,12 @@ def test_small_commands_are_too_little():
     assert found.is_good(FitNeeds(span=0.1 - 1e-9))
 
 
-def test_rates_that_do_not_follow_are_a_poor_fit():
+def test_rates_that_do_not_follow_or_are_lost_in_noise_are_refused():
     times, commanded, _, rates = fly(QUICK, 0.03, 0.04)
     noise = np.random.default_rng(2).normal(0.0, 0.5, rates.size)
     assert not fit_rate_response(times, commanded, times, noise).is_good()
-    poor = fit_rate_response(times, commanded, times, rates + noise)
-    assert poor.reason().startswith("poor fit")
+    lost = fit_rate_response(times, commanded, times, rates + noise)
+    assert lost.reason().startswith("lag and dead time are uncertain by")
 
 
 def test_half_the_gain_is_refused():

@@ -64,6 +64,21 @@ def lag_with_dead_time(times, commanded, lag, dead_time, *, gain=1.0, slew=np.in
     return gain * np.interp(times, fine, rates)
 
 
+def loop_with_dead_time(times, commanded, *, frequency, damping, dead_time, gain=1.0, slew=np.inf):
+    """Rates at `times`, by steps of 0.2 ms through ẍ = ω²·(v − x) − 2ζω·ẋ, |dv/dt| ≤ slew."""
+    step = 2e-4
+    fine = np.arange(times[0], times[-1] + step, step)
+    held = np.searchsorted(times, fine + 0.5 * step - dead_time, side="right") - 1
+    asked = rate = float(commanded[0])
+    change, rates = 0.0, []
+    for target in commanded[np.maximum(held, 0)].tolist():
+        rates.append(rate)
+        asked += min(max(target - asked, -slew * step), slew * step)
+        change += step * (frequency**2 * (asked - rate) - 2.0 * damping * frequency * change)
+        rate += step * change
+    return gain * np.interp(times, fine, rates)
+
+
 def mock_axis(axis, doublets, *, rate_hz=100, seed=1, delay=0.002):
     """Doublets about one axis of the mock in a hover: (time, commanded, time, measured).
 

@@ -1,0 +1,125 @@
+"""A model behind a dead time and perhaps a slew limit, against one record."""
+
+from collections.abc import Callable
+from math import exp, log, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.fitting import Solution, minimise, project
+from companion.identification.first_order_lag import Knots, held, slewed, value_at
+from companion.identification.models import Model
+from companion.identification.record import LONGEST_DEAD_TIME, Stretch
+
+Floats = NDArray[np.float64]
+
+DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
+"""Between what the dead time is searched, s."""
+_RAMPS = 0.01, 0.5
+"""Shortest and longest time the largest change of command may take at the slew limit, s."""
+_ALIKE = 0.005
+"""Commands that differ by less than this share of their range count as one."""
+
+
+class DelayedModel:
+    """A record, every `thinning`-th sample of it, and what a model makes of its commands.
+
+    y(t) = gain·x(t − dead time) + offset + what is left of each stretch's start, x the model's
+    exact response. Gain, offset and starts are linear: they are eliminated. The unknowns are the
+    model's shape, the dead time (s), and perhaps the logarithm of the slew limit.
+
+    Attributes:
+        thinning: of the samples.
+        commands: each stretch's, unlimited.
+        times: (m,), each stretch's samples, s.
+        measured: (m,), those of all stretches.
+        largest_change: of a command.
+    """
+
+    def __init__(
+        self, record: list[Stretch], model: Model, gain: float | None, thinning: int = 1
+    ) -> None:
+        self.model, self.gain, self.thinning = model, gain, thinning
+        self._delay = model.lowest.size
+        span = max(float(np.ptp(part.commanded)) for part in record)
+        self.commands = [held(part.time, part.commanded, _ALIKE * span) for part in record]
+        self.times = [part.measured_time[::thinning] for part in record]
+        self.measured = np.concatenate([part.measured[::thinning] for part in record])
+        changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
+        self.largest_change = float(max(changes))
+        self._slewed: tuple[float, list[Knots]] = (nan, [])
+
+    def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Weights (gain, offset, starts), and what they leave of the measurements (m,)."""
+        moved = self.response(unknown)
+        if self.gain is None:
+            columns = np.column_stack((moved, self._rest(unknown)))
+            return project(columns, self.measured)
+        weights, residual = project(self._rest(unknown), self.measured - self.gain * moved)
+        return np.concatenate(([self.gain], weights)), residual
+
+    def response(self, unknown: Floats) -> Floats:
+        """(m,), what the model makes of the delayed commands."""
+        shape = unknown[: self._delay]
+        return self._each(unknown, lambda knots, at: self.model.response(shape, knots, at))
+
+    def asked(self, unknown: Floats, later: float = 0.0) -> Floats:
+        """(m,), the commands themselves behind the slew limit, delayed by `later` seconds more."""
+        return self._each(
+            unknown, lambda knots, at: value_at(knots, np.maximum(at - later, knots.time[0]))
+        )
+
+    def dead_time(self, unknown: Floats) -> float:
+        """Of these unknowns, s."""
+        return float(unknown[self._delay])
+
+    def slew(self, unknown: Floats) -> float | None:
+        """The limit of these unknowns, per second; None where they have none."""
+        return exp(unknown[-1]) if unknown.size > self._delay + 1 else None
+
+    def search(self, start: Floats) -> Solution:
+        """The best fit near a start."""
+        ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMPS)]
+        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIMES, ramps]
+        lowest, highest = np.array(limits[: start.size]).T
+        return minimise(self.projection, start, lowest, highest)
+
+    def best_of(self, points: list[Floats]) -> Floats:
+        """The point of a grid that leaves the smallest squares."""
+        residuals = [self.projection(point)[1] for point in points]
+        return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
+
+    def explained(self, found: Solution) -> float:
+        """R²."""
+        spread = self.measured - self.measured.mean()
+        return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
+
+    def _rest(self, unknown: Floats) -> Floats:
+        """(m, 1 + starts): ones, and how what each stretch began with dies away.
+
+        Counted from its first sample: from its first command on, it would have died away to next
+        to nothing, which weights without bound could still make use of.
+        """
+        shape = unknown[: self._delay]
+        decays = [self.model.decay(shape, times - times[0]) for times in self.times]
+        columns = np.zeros((self.measured.size, 1 + sum(each.shape[1] for each in decays)))
+        columns[:, 0] = 1.0
+        row, column = 0, 1
+        for each in decays:
+            rows, width = each.shape
+            columns[row : row + rows, column : column + width] = each
+            row, column = row + rows, column + width
+        return columns
+
+    def _each(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
+        """(m,), of each stretch's commands (slewed, if that is in the unknowns), delayed."""
+        slew, delay = self.slew(unknown), self.dead_time(unknown)
+        commands = self.commands if slew is None else self._limited(slew)
+        each = zip(commands, self.times, strict=True)
+        return np.concatenate([of(knots, times - delay) for knots, times in each])
+
+    def _limited(self, slew: float) -> list[Knots]:
+        """The slewed commands, kept until another slew is asked for: steps of the rest need it."""
+        if slew != self._slewed[0]:
+            self._slewed = slew, [slewed(knots, slew) for knots in self.commands]
+        return self._slewed[1]
