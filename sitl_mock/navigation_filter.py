@@ -44,9 +44,6 @@ class _Track(NamedTuple):
     """Of the latest fix's position and velocity."""
 
 
-_EXACT = _Track((0j, 0j, 0j), (0j, 0j), (0j, 0j))
-
-
 class NavigationFilter:
     """The errors, from fix to fix.
 
@@ -84,7 +81,17 @@ class NavigationFilter:
         self._at = 0.0
         self._fixed = start
         self._corrected = 0.0
-        self._level = self._upright = _EXACT
+        self._level, self._upright = self._begun(1.0), self._begun(config.vertical_share)
+
+    def _begun(self, share: float) -> _Track:
+        """The first fix is believed as it comes."""
+        config, gauss = self._config, self._random.gauss
+        place, speed = share * config.position_noise_m, share * config.velocity_noise_m_s
+        noise = (
+            complex(gauss(0.0, place), gauss(0.0, place)),
+            complex(gauss(0.0, speed), gauss(0.0, speed)),
+        )
+        return _Track((*noise, 0j), (0j, 0j), noise)
 
     def advance(self, delayed: Snapshot, at: float, now: float) -> None:
         """Correct the filter if a fix is due: the motion at its horizon, and both times, s."""

@@ -69,7 +69,7 @@ class PositionRelay:
             end = _OVERHEAD + data[1]
             frame, data = data[:end], data[end:]
             message = int.from_bytes(frame[7:10], "little")
-            stamp = int.from_bytes(frame[10:14], "little")
+            stamp = int.from_bytes(frame[10:-2][:4], "little")  # zeros at the end are left out
             if message == _LOCAL_POSITION_NED:
                 sent += self._position(stamp, frame)
                 continue
