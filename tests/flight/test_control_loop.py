@@ -373,3 +373,22 @@ def test_the_step_after_a_gap_is_as_long_as_the_one_before_it():
     bench.run(2)
     assert planner.resets == 2
     assert planner.periods[1:] == pytest.approx(11 * [0.004])
+
+
+def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
+    """By the time of the sample itself, not by when it came: it came 10 ms late."""
+    asked = []
+    planner = SimpleNamespace(
+        rates=lambda q, target, dt, rates: asked.append(target.north) or BodyRates(0.0, 0.0, 0.0),
+        reset=lambda *_: None,
+    )
+    bench = Bench(planner)
+    bench.run(20)  # the quickest of these tells the vehicle's clock
+    asked.clear()
+    bench.refresh(target=Target(0.0, 0.0, 0.0), later=Target(0.2, 0.0, 0.0), period=0.02)
+    begun = bench.time
+    for elapsed in (0.005, 0.010, 0.020, 0.040):
+        bench.time = begun + elapsed
+        bench.sample(late=0.010)
+    # The clock's rate is uncertain: by some 0.1 ms here.
+    assert asked == pytest.approx([0.05, 0.1, 0.2, 0.2], abs=0.006)

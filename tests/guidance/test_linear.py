@@ -24,6 +24,7 @@ from companion.guidance import (
     chain_gains,
     specific_thrust,
 )
+from companion.guidance.lqr import ChainGains
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²
@@ -148,3 +149,25 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
     situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     target, _, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))
+
+
+def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
+    settings = replace(SETTINGS, period=0.02, gains=ChainGains(0.0, 0.0, 0.0))
+    motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
+    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
+    guidance = LinearGuidance(settings)
+    before, later, _ = guidance.command(circling, 2.0, situation)
+    then = guidance.command(circling, 2.02, situation).target
+    assert later == pytest.approx(then, abs=1e-3)
+    assert math.hypot(later.north - before.north, later.east - before.east) >= 0.008
+
+
+def test_an_open_loop_step_does_not_move():
+    step = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
+    situation = Situation(
+        VehicleMotion(REST, REST), VehicleMotion(REST, REST), (0.0, 0.0), (0.0, 0.0), DRAG, THRUST
+    )
+    target, later, _ = LinearGuidance(replace(SETTINGS, period=0.02)).command(
+        lambda _: step, 0.0, situation
+    )
+    assert target == later
