@@ -1,6 +1,7 @@
 """One flight: flown, and measured from what it recorded and from the truth beside it."""
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from companion.mavlink.tlog_file import messages
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
 from tests.real.measures import straightness, tracking_errors
+from tests.real.stamps import stamp_offset
 from tests.real.truth import Floats, NoTruthError
 from tests.real.vehicle import merged
 
@@ -31,10 +33,12 @@ class Flying:
         self._base = [shipped(vehicle.autopilot), *base]
         self._identified: Path | None = None
 
-    def __call__(self, flight: str, folder: Path) -> list[dict]:
+    def __call__(self, flight: str, folder: Path) -> Iterator[dict]:
         """Fly it; a row for it, or for each of a series."""
         if flight == "ten":
-            return [{"flight": "ten", "planner": "", **row} for row in ten(self._vehicle, folder)]
+            for row in ten(self._vehicle, folder):
+                yield {"flight": "ten", "planner": "", **row}
+            return
         folder.mkdir(parents=True)
         try:
             if flight == "identify":
@@ -47,7 +51,7 @@ class Flying:
         except (AssertionError, NoTruthError, OSError) as error:
             row = {"error": str(error)}
             self._vehicle.bring_down()
-        return [{"flight": flight, "planner": "", "load": self._vehicle.load(), **row}]
+        yield {"flight": flight, "planner": "", "load": self._vehicle.load(), **row}
 
     def _identify(self, folder: Path) -> dict:
         config = merged(configuration("hover", self._base, folder, self._changes), _ALONE)
@@ -70,6 +74,7 @@ class Flying:
         self._vehicle.blow(asked.variant == "wind")
         arrival = time.monotonic()
         flight = self._vehicle.launch(config, folder=folder / "flight")
+        self._vehicle.face_north(flight)
         result = flight.finish(_LONGEST_S)
         self._vehicle.bring_down()
         if "log" not in result or result["log"] is None:
@@ -95,10 +100,14 @@ class Flying:
         log = Path(result["log"])
         tracking = _rows(log / "tracking.csv")
         assert len(tracking) > 2, "hardly anything was flown under control"
+        offset = stamp_offset(_rows(log / "rates.csv"), log / "flight.tlog")
+        tracking[:, 0] += offset
         truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
         out: dict = {"reported": result["tracking"]}
         if (log / "response.csv").exists():
-            found = straightness(_rows(log / "response.csv"), truth, result["gain_per_s"])
+            response = _rows(log / "response.csv")
+            response[:, 0] += offset
+            found = straightness(response, truth, result["gain_per_s"])
             if found is not None:
                 told = result["response"]
                 out["cross_axis"] = {"reported": told["cross_axis_max"], **found}

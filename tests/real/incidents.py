@@ -2,6 +2,7 @@
 
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from tests.real.flights import configuration, shipped
@@ -63,21 +64,20 @@ TEN = (
 """Two flights begin after a kill, three after a takeover, two after a landing by the ladder."""
 
 
-def ten(vehicle: Vehicle, folder: Path) -> list[dict]:
+def ten(vehicle: Vehicle, folder: Path) -> Iterator[dict]:
     """Ten flights without a restart of the autopilot; of each, how it began."""
-    rows, before = [], None
+    before = None
     for number, name in enumerate(TEN, 1):
         began = len(vehicle.flown)
         try:
             out = INCIDENTS[name](vehicle, folder / f"{number:02}-{name}")
         except AssertionError as error:
             out = {"error": str(error)}
-        flight = vehicle.flown[began]
-        rows.append({"number": number, "after": before, "ends_by": name, **began_by(flight), **out})
+        row = {"number": number, "after": before, "ends_by": name, **out}
+        row |= began_by(vehicle.flown[began])
         vehicle.bring_down()
-        rows[-1]["left_in"] = vehicle.station.mode
+        yield row | {"left_in": vehicle.station.mode, "load": vehicle.load()}
         before = name
-    return rows
 
 
 def began_by(flight: Flight) -> dict:

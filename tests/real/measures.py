@@ -56,6 +56,7 @@ def straightness(response: Floats, truth: Truth | None, gain: float) -> dict[str
     return {
         "telemetry": told.cross_axis_max,
         "truth": true.cross_axis_max,
+        "heading_deg": degrees(heading(tuple(response[0, 1:5]))),
         "heading_off_deg": degrees(turn),
         "attitude_late_ms": 1e3 * attitude_lateness(response, truth),
     }

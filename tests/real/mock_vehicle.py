@@ -56,6 +56,9 @@ class MockVehicle:
         if self._mock is not None:
             self._mock.close()
 
+    def face_north(self, flight: Flight) -> None:
+        """It does already."""
+
     def blow(self, on: bool) -> None:
         """Wind in the next flight, or none."""
         self._wind = {"wind": _WIND} if on else {}

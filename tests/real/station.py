@@ -50,6 +50,7 @@ class Station:
     Attributes:
         told: each change of mode, arming or status.
         hil: PX4's truth.
+        up: height above home that ArduPilot tells, m.
         texts: what it said, with the time.
     """
 
@@ -61,7 +62,7 @@ class Station:
         self.acks: list[tuple[float, int, int]] = []
         self.landed = 0
         self._kinds: dict[str, int] = {}
-        self._up = 0.0
+        self.up = 0.0
         self._origin: tuple[float, float] | None = None
         self._base = 0
         self._status = 0
@@ -222,10 +223,10 @@ class Station:
         elif kind == "EXTENDED_SYS_STATE":
             self.landed = message.landed_state
         elif kind == "GLOBAL_POSITION_INT":
-            self._up = message.relative_alt / 1e3
+            self.up = message.relative_alt / 1e3
         elif kind == "SIMSTATE":
             level = cos(message.roll) * cos(message.pitch)
-            self._see(now, message.lat, message.lng, self._up, _tilt(level))
+            self._see(now, message.lat, message.lng, self.up, _tilt(level))
 
     def _tell(self, told: Told) -> None:
         if not self.told or self.told[-1][1:] != told[1:]:
