@@ -220,13 +220,16 @@ class GuidanceConfig(Section):
     its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """How often guidance makes a new target."""
-    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] = 40.0
+    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
-    makes a stiffer hold. The gains follow from it (LQR)."""
-    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] = 8.0
-    """Weight of the horizontal velocity error; a larger one makes a calmer hold."""
-    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] = 5.0
-    """How quickly wind is found, from how the vehicle moves against what its tilt gives."""
+    makes a stiffer hold. The gains follow from it (LQR). null: 1/T⁴, T the delay of the attitude
+    by planner.gain_per_s, `vehicle` (0.12 s where it is not known) and half a period of
+    guidance."""
+    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
+    """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
+    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
+    """How quickly wind is found, from how the vehicle moves against what its tilt gives.
+    null: 1.5/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """By how much the autopilot's position is late where its GPS is later than its estimator
     believes; measured against another measurement of the position."""

@@ -24,6 +24,7 @@ from companion.flight.programmes import unbegun
 from companion.flight.rig import Rig
 from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
+from companion.flight.vehicle_memory import VehicleMemory
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, Sequence, ThrustSettings
 from companion.known_drag import drag_prior
@@ -179,6 +180,7 @@ class Assembled:
     rig: Rig
     trace: FlightTrace
     dead_time_watch: DeadTimeWatch
+    memory: VehicleMemory
 
     def close(self) -> None:
         """End what runs beside the flight."""
@@ -264,6 +266,9 @@ def assemble(
     flight = Flight(rig, watch, observer, ask_landing)
     ladder.note = rig.note = preflight.note = flight.note
     link.clock.on_event = asking_again.note = flight.note
+    drag_is_told = config.guidance.drag is not None
+    memory = VehicleMemory(folder.parent, guide.estimate.drag, drag_is_told, flight.note)
+    preflight.meet = memory.meet
     for part in rig.programme.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:
@@ -271,4 +276,4 @@ def assemble(
             if config.guidance.kind == "nmpc":
                 guide.predictive = predictive(config, part, flight.note)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
-    return Assembled(flight, rig, trace, dead_time_watch)
+    return Assembled(flight, rig, trace, dead_time_watch, memory)

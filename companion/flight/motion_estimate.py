@@ -25,6 +25,7 @@ class MotionEstimate:
 
     Attributes:
         vertical: upward part of the specific thrust that is asked for, m/s².
+        drag: its estimate.
 
     Args:
         observer: of position, velocity and disturbance.
@@ -44,7 +45,7 @@ class MotionEstimate:
         self.vertical = GRAVITY
         self._observer = observer
         self._correction = correction
-        self._drag = drag
+        self.drag = drag
         self._offset = offset
         self._slopes = SlopeHistory()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -106,7 +107,7 @@ class MotionEstimate:
         later = self._observer.at(time + ahead, self._known(slope, motion)) or still
         north, east = self._slopes.newest
         thrust = self.vertical * north, self.vertical * east
-        disturbance, drag = self._observer.disturbance, self._drag.drag
+        disturbance, drag = self._observer.disturbance, self.drag.drag
         return Situation(motion, later, thrust, disturbance, drag, thrust_limits)
 
     def vehicle(self, now: float, situation: Situation) -> Vehicle:
@@ -128,9 +129,9 @@ class MotionEstimate:
 
     def surprise(self) -> str | None:
         """In words, where the drag is another than the configuration says."""
-        told, learned, speed = self._drag.first, self._drag.drag, self._drag.top_speed
+        told, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
         off = learned.per_velocity(speed) - told.per_velocity(speed)
-        if not self._drag.certain or abs(off) <= _WORTH_TELLING:
+        if not self.drag.certain or abs(off) <= _WORTH_TELLING:
             return None
         return (
             f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, and "
@@ -146,7 +147,7 @@ class MotionEstimate:
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
         # Of the thrust that there was, not of the one asked for.
         vertical = GRAVITY - down
-        self._drag.observe(
+        self.drag.observe(
             dt,
             (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
             (north - vertical * slope[0], east - vertical * slope[1]),
@@ -154,5 +155,5 @@ class MotionEstimate:
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration by thrust and drag, m/s²."""
-        slowed = self._drag.drag.deceleration(motion.velocity_ned)
+        slowed = self.drag.drag.deceleration(motion.velocity_ned)
         return self.vertical * slope[0] - slowed[0], self.vertical * slope[1] - slowed[1]

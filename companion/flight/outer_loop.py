@@ -33,6 +33,8 @@ _LOCKSTEP_DEADLINE = 1.0
 """The vehicle waits for the answer, s of wall time."""
 _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
+_USUAL_RATE_LOOP = 0.12
+"""Lag and dead time of a rate loop that nobody identified, s: a heavy vehicle's."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
 _POSITION_PULL = 4.0
@@ -79,21 +81,48 @@ def heading_response(config: Config) -> InnerResponse:
     )
 
 
+def hold_weights(config: Config) -> Weights:
+    """The weights of the hold; those that are not told follow from the attitude's delay T.
+
+    With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
+    own. `tests/flight/test_margins.py` shows what may be wrong with T and with the thrust then.
+    """
+    guidance, delay = config.guidance, _delay(config)
+    position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
+    return Weights(
+        1.0 / delay**4 if position is None else position,
+        1.0 / delay**2 if velocity is None else velocity,
+    )
+
+
+def disturbance_bandwidth(config: Config) -> float:
+    """How quickly wind is found, rad/s: as is told, or half as quick again as the hold."""
+    told = config.guidance.disturbance_bandwidth_rad_s
+    return 1.5 / _delay(config) if told is None else told
+
+
+def _delay(config: Config) -> float:
+    """T, s: with a usual rate loop where the vehicle's is not known."""
+    delay = _feedback_delay(config)
+    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+
+
+def _feedback_delay(config: Config) -> float:
+    """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
+    return tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
+
+
 def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
-    # The feedback is held for a period: on average it acts half of one late.
-    slowness = tilt.slowness + 0.5 * period
     drag = drag_prior(config).drag.linear
-    weights = Weights(guidance.position_weight_per_s4, guidance.velocity_weight_per_s2)
-    if _identifies(config):
-        weights = _CALM
+    weights = _CALM if _identifies(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, slowness, drag),
+            gains=chain_gains(weights, _feedback_delay(config), drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
@@ -119,7 +148,7 @@ def motion_estimate(
         offset: the vehicle's clock minus ours, s, if it is known.
     """
     guidance = config.guidance
-    bandwidth = _CALM_BANDWIDTH if _identifies(config) else guidance.disturbance_bandwidth_rad_s
+    bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
     settings = ObserverSettings(
         bandwidth, _POSITION_TIME, _POSITION_PULL, guidance.max_disturbance_m_s2
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import inf
 
 from companion.config import Config
-from companion.doctor.evidence import Evidence, Stage
+from companion.doctor.evidence import Evidence, Identity, Stage
 from companion.doctor.examination import examine, forbidding, unsafe
 from companion.doctor.finding import Finding
 from companion.doctor.gathering import gather, wanted_rates
@@ -33,6 +33,7 @@ class Preflight:
 
     Attributes:
         note: takes what is amiss without forbidding a flight, once each.
+        meet: is told who the vehicle is, as soon as it tells.
 
     Args:
         config: what the vehicle is to be flown with.
@@ -45,6 +46,7 @@ class Preflight:
         self, config: Config, link: Link, same_vehicle: SameVehicle, programme: Sequence
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
+        self.meet: Callable[[Identity], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
         self._programme = programme
         self._clock = asyncio.get_running_loop().time
@@ -87,6 +89,7 @@ class Preflight:
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
+        self.meet(evidence.identity)
         evidence = replace(evidence, stage=stage, programme=self._programme)
         self._heed(examine(self._config, evidence, again=before is not None))
         return evidence

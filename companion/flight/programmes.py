@@ -26,7 +26,7 @@ from companion.guidance import (
 )
 from companion.guidance.fence import Place
 from companion.guidance.predicted import predicted
-from companion.known_drag import least_drag, most_drag
+from companion.known_drag import assumption, least_drag, most_drag
 from companion.trajectory import (
     Envelope,
     Motion,
@@ -86,7 +86,7 @@ def _part(config: Config, name: str) -> Programme:
     if isinstance(part, Circle):
         (motion,) = _motions(part, least_drag(config))
         for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
-            _refuse(part.name, broken)
+            _refuse(part.name, broken, assumption(config))
     return part
 
 
@@ -122,12 +122,12 @@ def _motions(part: Programme, drag: Drag) -> Iterator[Motion]:
         yield Motion(times, offset, velocity, acceleration, jerk, turning)
 
 
-def _refuse(name: str, broken: Violation | None) -> None:
+def _refuse(name: str, broken: Violation | None, drag: str = "") -> None:
     if broken is None:
         return
     # Only a trajectory is slowed down by us.
     remedy = _SLOWER if broken.slowing_helps else broken.remedy
-    raise ConfigError(f"{name}: {broken}; {remedy}")
+    raise ConfigError(f"{name}: {broken}; {remedy}{drag}")
 
 
 def _doublets(identify: IdentifyConfig) -> Doublets:
@@ -156,7 +156,7 @@ def _follow(config: Config) -> Follow:
             raise ConfigError(f"{path}: {error}") from error
     elif broken := violations(trajectory, envelope):
         first = min(broken, key=lambda one: one.slowing_helps)
-        raise ConfigError(f"{path}: {first}; {first.remedy}")
+        raise ConfigError(f"{path}: {first}; {first.remedy}{assumption(config)}")
     return Follow(trajectory, radians(config.limits.max_yaw_rate_deg_s), factor)
 
 

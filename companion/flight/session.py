@@ -163,6 +163,7 @@ class Session:
         ):
             if surprise is not None:
                 flight.note(surprise)
+        assembled.memory.keep()
         summary = Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,

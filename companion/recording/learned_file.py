@@ -1,0 +1,103 @@
+"""What flights learned of a vehicle, kept for its next flight: one small file for each vehicle."""
+
+import json
+import os
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from companion.bounded_file import FileRefusedError, read_text
+from companion.drag import Drag
+
+_MOST_BYTES = 10_000
+_MOST_FILES = 1000
+"""Of vehicles in one directory; more are not looked at."""
+_MOST_LINEAR, _MOST_QUADRATIC = 10.0, 1.0
+"""As `guidance.drag_per_s` and `guidance.quadratic_drag_per_m` allow, 1/s and 1/m."""
+
+
+class Learned(NamedTuple):
+    """What is kept of a vehicle.
+
+    Attributes:
+        drag: of the vehicle.
+        top_speed: up to which it was learned, m/s.
+        path: of the file.
+    """
+
+    drag: Drag
+    top_speed: float
+    path: Path
+
+
+class LearnedFile:
+    """`learned-UID.json` in the directory of the flights.
+
+    Args:
+        directory: `recording.directory`.
+        uid: hardware id of the vehicle's autopilot (AUTOPILOT_VERSION), hexadecimal.
+    """
+
+    def __init__(self, directory: Path, uid: str) -> None:
+        self.path = directory / f"learned-{uid}.json"
+
+    def load(self) -> tuple[Learned | None, str | None]:
+        """What is kept, and what is to be told if that cannot be read. Never raises."""
+        if not self.path.exists():
+            return None, None
+        try:
+            return _parsed(self.path), None
+        except (FileRefusedError, ValueError, TypeError, KeyError, RecursionError) as error:
+            reason = error if isinstance(error, FileRefusedError) else "it is damaged"
+            return None, (
+                f"{self.path}: what earlier flights learned cannot be used ({reason}); "
+                "the drag is learned anew"
+            )
+
+    def save(self, drag: Drag, top_speed: float) -> None:
+        """Replace the file as a whole.
+
+        Raises:
+            OSError: it cannot be written; the old one is as it was.
+        """
+        text = json.dumps(
+            {
+                "drag_per_s": round(drag.linear, 4),
+                "quadratic_drag_per_m": round(drag.quadratic, 5),
+                "top_speed_m_s": round(top_speed, 2),
+            }
+        )
+        beside = self.path.with_suffix(f".{os.getpid()}")
+        try:
+            beside.write_text(text + "\n", encoding="utf-8")
+            beside.replace(self.path)
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise
+
+
+def newest(directory: Path) -> Learned | None:
+    """Of the vehicle that flew last; None where nothing of use is kept. Never raises."""
+    try:
+        paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)
+        return _parsed(paths[0]) if 0 < len(paths) <= _MOST_FILES else None
+    except (OSError, FileRefusedError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+
+
+def _parsed(path: Path) -> Learned:
+    told = json.loads(read_text(path, _MOST_BYTES))
+    return Learned(
+        Drag(
+            _number(told["drag_per_s"], _MOST_LINEAR),
+            _number(told["quadratic_drag_per_m"], _MOST_QUADRATIC),
+        ),
+        _number(told["top_speed_m_s"], 1000.0),
+        path,
+    )
+
+
+def _number(value: Any, most: float) -> float:
+    if type(value) not in (int, float) or not isfinite(value) or not 0.0 <= value <= most:
+        raise ValueError(value)
+    return float(value)

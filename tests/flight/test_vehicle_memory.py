@@ -1,0 +1,120 @@
+"""The drag that a flight learned is what the vehicle's next flight begins with."""
+
+import pytest
+
+from companion import bounded_yaml
+from companion.config import Config
+from companion.doctor.evidence import Identity
+from companion.drag import Drag
+from companion.flight.programmes import programme
+from companion.flight.vehicle_memory import VehicleMemory
+from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
+from companion.recording.learned_file import LearnedFile
+from companion.yaml_file import ConfigError, parse
+from tests.flight.fly import fly, mock_vehicle
+
+BUNDLED = f"{5283920058631409231:016x}"
+"""Hardware id of the bundled vehicles."""
+CIRCLE = {
+    "flight": {"programme": ["circle"]},
+    "circle": {"radius_m": 4.0, "speed_m_s": 3.0, "laps": 0.6},
+    "limits": {"max_tilt_deg": 40.0},
+}
+
+
+def remembered(folder, told=False):
+    notes = []
+    estimate = DragEstimate(ANY_VEHICLE)
+    return VehicleMemory(folder, estimate, told, notes.append), estimate, notes
+
+
+def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_path):
+    with mock_vehicle(tmp_path, seed=3) as mock:
+        LearnedFile(tmp_path, BUNDLED).save(Drag(0.7), 3.0)
+        flown = fly(mock, tmp_path / "log", **CIRCLE, guidance={"drag_per_s": None})
+    assert flown.result == "ok", flown.events
+    (told,) = [text for _, text in flown.events if "earlier flight" in text]
+    assert "0.70 1/s + 0.000 1/m" in told
+    assert f"learned-{BUNDLED}.json" in told
+    kept, _ = LearnedFile(tmp_path, BUNDLED).load()
+    assert kept.drag.per_velocity(3.0) == pytest.approx(1.0, abs=0.08)
+
+
+def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
+    steep = {
+        "flight": {"programme": ["circle"]},
+        "circle": {"radius_m": 5.0, "speed_m_s": 5.0},
+        "limits": {"max_tilt_deg": 34.0},
+        "recording": {"directory": str(tmp_path)},
+    }
+    config = parse(bounded_yaml.dump(steep), "test", Config)
+    programme(config)  # 32° with 0.7 1/s
+    LearnedFile(tmp_path, "aa").save(Drag(1.0), 5.0)
+    with pytest.raises(ConfigError, match=r"needs 3[56].*tilt.*earlier flight learned: .*aa"):
+        programme(config)
+    told = config.model_copy(
+        update={"guidance": config.guidance.model_copy(update={"drag_per_s": 0.2})}
+    )
+    programme(told)
+    with pytest.raises(ConfigError, match=r"not known: up to 0.7 1/s is reckoned with"):
+        programme(
+            parse(
+                bounded_yaml.dump(
+                    {
+                        **steep,
+                        "limits": {"max_tilt_deg": 30.0},
+                        "recording": {"directory": str(tmp_path / "absent")},
+                    }
+                ),
+                "test",
+                Config,
+            )
+        )
+
+
+def test_it_is_the_vehicles_own(tmp_path):
+    LearnedFile(tmp_path, "aa").save(Drag(0.8, 0.02), 5.0)
+    memory, estimate, notes = remembered(tmp_path)
+    memory.meet(Identity(uid=None))
+    memory.meet(Identity(uid="bb"))
+    assert estimate.drag == ANY_VEHICLE.drag
+    assert notes == []
+    memory.meet(Identity(uid="aa"))
+    assert estimate.drag == Drag(0.8, 0.02)
+    memory.meet(Identity(uid="aa"))
+    assert len(notes) == 1
+    memory.meet(Identity(uid="bb"))  # another vehicle in its place
+    assert estimate.drag == ANY_VEHICLE.drag
+
+
+def test_what_the_configuration_tells_wins(tmp_path):
+    LearnedFile(tmp_path, "aa").save(Drag(0.8), 5.0)
+    memory, estimate, notes = remembered(tmp_path, told=True)
+    memory.meet(Identity(uid="aa"))
+    assert estimate.drag == ANY_VEHICLE.drag
+    assert notes == []
+
+
+def test_nothing_is_kept_of_a_flight_that_hardly_moved_or_of_nobody(tmp_path):
+    memory, estimate, _ = remembered(tmp_path)
+    memory.meet(Identity(uid="aa"))
+    memory.keep()
+    moved, estimate, _ = remembered(tmp_path)
+    for n in range(600):
+        fast = 4.0 if n % 200 < 100 else -4.0
+        estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
+    assert estimate.certain
+    moved.meet(Identity(uid=None))
+    moved.keep()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_directory_that_cannot_be_written_costs_a_sentence(tmp_path):
+    memory, estimate, notes = remembered(tmp_path / "absent")
+    memory.meet(Identity(uid="aa"))
+    for n in range(600):
+        fast = 4.0 if n % 200 < 100 else -4.0
+        estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
+    memory.keep()
+    assert len(notes) == 1
+    assert "cannot keep the learned drag" in notes[0]
