@@ -88,37 +88,45 @@ class PlannerConfig(Section):
 
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
+Damping = Annotated[float, Field(ge=0.3, le=10.0)]
 AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
 class AxisKeys(NamedTuple):
-    """How one axis of the rate loop answers; None: not known, of the limit: there is none."""
+    """How one axis of the rate loop answers; None: not known, or no limit, or of first order."""
 
     lag_ms: float | None
     dead_time_ms: float | None
     acceleration_limit_deg_s2: float | None
+    damping: float | None
 
     def but(self, *keys: float | None) -> "AxisKeys":
-        """These, but for the `keys` that are not None."""
-        return AxisKeys(*(a if b is None else b for a, b in zip(self, keys, strict=True)))
+        """These, but for the `keys` that are not None; an axis with a lag has its own damping."""
+        mine = self if keys[0] is None else self._replace(damping=None)
+        return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
 
 
 class VehicleConfig(Section):
     """How the vehicle's own rate loop answers; `model-following` plans with it."""
 
     lag_ms: Milliseconds | None = None
-    """Time constant of the roll rate after its dead time."""
+    """Time constant of the roll rate after its dead time; of a second order, 2·damping/frequency:
+    in either, how late the rate is on average."""
     dead_time_ms: Milliseconds | None = None
     """From an attitude sample to the first effect of its answer on the roll rate."""
     acceleration_limit_deg_s2: AccelerationLimit | None = None
     """The autopilot changes the roll rate it aims at no faster (ArduPilot); null: it does not limit
     this (PX4)."""
+    damping: Damping | None = None
+    """Damping ratio of the roll rate where its response is of second order; null: first order."""
     pitch_lag_ms: Milliseconds | None = None
     """The same time constant for pitch; null: that of roll."""
     pitch_dead_time_ms: Milliseconds | None = None
     """The same dead time for pitch; null: that of roll."""
     pitch_acceleration_limit_deg_s2: AccelerationLimit | None = None
     """The same limit for pitch; null: that of roll."""
+    pitch_damping: Damping | None = None
+    """The same damping ratio for pitch; null: first order, or that of roll with roll's lag."""
     yaw_lag_ms: Milliseconds | None = None
     """The same time constant for yaw; null: that of roll."""
     yaw_dead_time_ms: Milliseconds | None = None
@@ -137,14 +145,18 @@ class VehicleConfig(Section):
     @property
     def axes(self) -> "dict[str, AxisKeys]":
         """What is known of roll, pitch and yaw, by name; what is null of the last two is roll's."""
-        roll = AxisKeys(self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2)
+        roll = AxisKeys(
+            self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
+        )
         pitch = (
             self.pitch_lag_ms,
             self.pitch_dead_time_ms,
             self.pitch_acceleration_limit_deg_s2,
+            self.pitch_damping,
         )
-        yaw = self.yaw_lag_ms, self.yaw_dead_time_ms, self.yaw_acceleration_limit_deg_s2
-        return {"roll": roll, "pitch": roll.but(*pitch), "yaw": roll.but(*yaw)}
+        yaw = self.yaw_lag_ms, self.yaw_dead_time_ms, self.yaw_acceleration_limit_deg_s2, None
+        first_order = roll._replace(damping=None)
+        return {"roll": roll, "pitch": roll.but(*pitch), "yaw": first_order.but(*yaw)}
 
 
 class LimitsConfig(Section):

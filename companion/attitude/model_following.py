@@ -1,16 +1,16 @@
 """`model-following`: past the paper, a response that stays linear behind a real rate loop."""
 
 from dataclasses import replace
-from math import cos, sin, sqrt
+from math import sqrt
 
+from companion.attitude.axis_lead import PITCH, ROLL, AxisLead, Turn
 from companion.attitude.constants import Constants
 from companion.attitude.errors import InvalidBodyRatesError
 from companion.attitude.first_order import first_order
 from companion.attitude.heading_model import HeadingModel
-from companion.attitude.history import History, Planned
+from companion.attitude.history import History, PlannedTilt, PlannedYaw
 from companion.attitude.kinematics import (
     heading_of,
-    into_body,
     rates_to_speed,
     speed_to_rates,
     tilt_products,
@@ -36,14 +36,15 @@ _QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample r
 class ModelFollowingPlanner:
     """Two degrees of freedom: a planned motion is fed forward, what differs from it is fed back.
 
-    The plan is a `ReferenceModel`: second order, straight, within the limits. Fed forward are the
-    body rates that move the attitude along it in the middle of the coming sample, led by the lag of
-    the rate loop (ω + τ·ω̇). They take effect one dead time later, so fed back is the difference of
-    the measured coefficients from the plan as it stood one dead time ago, by the paper's law; that
-    way the loop does not fight its own delay. The gain of the feedback is p, but at most a quarter
-    of what is stable for dead time and lag (`margin.largest_gain`): it stays stable as long as the
-    real largest gain is more than a quarter of the one believed. Heading is treated likewise. A
-    larger gain would be stable too, and worse where the dead time is known wrongly.
+    The plan is a `ReferenceModel`: smooth, straight, within the limits. Fed forward are the body
+    rates that move the attitude along it in the middle of the coming sample, each led by the lag of
+    its own axis (`AxisLead`). They take effect one dead time later, on both axes at once, for the
+    quicker one waits. So fed back is the difference of the measured coefficients from the plan as
+    it stood one dead time ago, by the paper's law; that way the loop does not fight its own delay.
+    The gain of the feedback is p, but at most a quarter of what is stable for dead time and lag of
+    the slower axis (`margin.largest_gain`): it stays stable as long as the real largest gain is
+    more than a quarter of the one believed. Heading is treated likewise. A larger gain would be
+    stable too, and worse where the dead time is known wrongly.
 
     Yaw answers slowly, so while the vehicle tilts its heading moves although it is asked to stand
     still. It is foreseen from the yaw rates that were sent (`YawModel`), and the tilt rates are
@@ -57,20 +58,30 @@ class ModelFollowingPlanner:
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
-        tilt, yaw = _no_quicker(response.tilt), _no_quicker(response.yaw)
+        roll, pitch, yaw = (_no_quicker(axis) for axis in response.axes)
+        tilt = roll, pitch
         self._constants = constants
-        self._tilt, self._yaw = tilt, yaw
+        self._yaw = yaw
+        self._lag = max(axis.lag for axis in tilt)
+        self._dead_time = dead_time = max(axis.dead_time for axis in tilt)
         self._frame_lead = response.frame_lead
         self._hold = SampleHold()
-        self._gain = _fed_back(constants.gain, tilt)
+        self._gain = min(_fed_back(constants.gain, axis) for axis in tilt)
         self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
-            constants, model_lag(constants.gain, tilt.lag), tilt.acceleration
+            constants,
+            model_lag(constants.gain, self._lag),
+            min(axis.acceleration for axis in tilt),
+            max(axis.square for axis in tilt),
         )
         self._heading = HeadingModel(constants, yaw)
         self._body = YawModel(yaw)
-        self._past = History(max(tilt.dead_time, yaw.dead_time) + LONGEST_SAMPLE)
-        self._planned = (0.0, 0.0, 0.0)
+        span = max(dead_time, yaw.dead_time) + LONGEST_SAMPLE
+        self._past: History[PlannedTilt] = History(span)
+        self._past_yaw: History[PlannedYaw] = History(span)
+        self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self._past)
+        self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self._past)
+        self._still = 0.0
         self._time = 0.0
         self._started = False
 
@@ -104,18 +115,25 @@ class ModelFollowingPlanner:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
         # What is answered now takes effect one dead time later: the plan begins there.
-        ahead, yaw_ahead = self._tilt.dead_time, self._yaw.dead_time
+        ahead, yaw_ahead = self._dead_time, self._yaw.dead_time
         c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
         heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
         model = self._model
         model.place(c, Coefficients(north, east))
         self._heading.place(heading, turn_rate)
         self._body.start(yaw_rate)
-        self._planned = model.rates()
+        x, y, self._still = model.rates()
         self._time = 0.0
-        here = Planned(model.north, model.east, heading, 0.0, 0.0, yaw_rate)
-        motion = Planned(north, east, turn_rate, yaw_rate - turn_rate, yaw_rate, 0.0)
-        self._past.start(0.0, here, motion)
+        self._past.start(
+            0.0,
+            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still),
+            PlannedTilt(north, east, self._still, 0.0, 0.0, 0.0, 0.0, 0.0),
+        )
+        self._past_yaw.start(
+            0.0, PlannedYaw(heading, 0.0, yaw_rate), PlannedYaw(turn_rate, yaw_rate, 0.0)
+        )
+        self._roll.advance(0.0, self._turn_when)
+        self._pitch.advance(0.0, self._turn_when)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -143,15 +161,15 @@ class ModelFollowingPlanner:
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         now, dt = self._time + self._hold.late, self._hold.step
-        by_tilt = self._past.at(now - self._tilt.dead_time)
-        by_yaw = self._past.at(now - self._yaw.dead_time)
+        by_tilt = self._past.at(now - self._dead_time)
+        by_yaw = self._past_yaw.at(now - self._yaw.dead_time)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
         if believed is not None:  # what turns beyond what was foreseen does so until this acts
             unforeseen = believed.yaw - by_yaw.turning
-            heading += (self._tilt.dead_time + self._tilt.lag) * unforeseen
+            heading += (self._dead_time + self._lag) * unforeseen
         heading += by_tilt.still - by_yaw.turned
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
         roll, pitch = self._hold.rates(roll, pitch)
@@ -166,7 +184,7 @@ class ModelFollowingPlanner:
         )
 
     def _feedback(
-        self, by_tilt: Planned, by_yaw: Planned, north: float, east: float, heading: float
+        self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
     ) -> tuple[float, float, float]:
         """Speed of the coefficients (1/s) and of the heading (rad/s), back towards the plan.
 
@@ -174,7 +192,7 @@ class ModelFollowingPlanner:
         planned has had an effect yet.
         """
         speed_north = speed_east = turn = 0.0
-        if self._time >= self._tilt.dead_time:
+        if self._time >= self._dead_time:
             speed_north = self._gain * (by_tilt.north - north)
             speed_east = self._gain * (by_tilt.east - east)
         if self._time >= self._yaw.dead_time:
@@ -192,56 +210,46 @@ class ModelFollowingPlanner:
             yaw_feedback: what is added to the yaw rate, rad/s.
             dt: s.
         """
-        first = heading + self._to_turn()
-        x_before, y_before, still_before = self._planned
-        turn_before = self._heading.turn_rate
+        still_before, turn_before = self._still, self._heading.turn_rate
         self._model.advance(target, dt)
         self._heading.advance(target, dt)
-        x_after, y_after, still_after = self._planned = self._model.rates()
+        x, y, still_after = self._model.rates()
         turn_after = self._heading.turn_rate
-        lead, yaw_lead = self._tilt.lag / dt, self._yaw.lag / dt
         yaw = (
             0.5 * (still_before + still_after + turn_before + turn_after)
-            + yaw_lead * (still_after - still_before + turn_after - turn_before)
+            + self._yaw.lag / dt * (still_after - still_before + turn_after - turn_before)
             + yaw_feedback
         )
         yaw = within(yaw, self._constants.max_yaw_rate)
         self._body.advance(yaw, dt)
-        self._remember(0.5 * (still_before + still_after) * dt, dt)
-        last = heading + self._to_turn()
-        # At each end of the sample seen from the heading that the body is expected to have there,
-        # so that what turns with the body is led with it.
-        x_before, y_before = into_body(cos(first), sin(first), x_before, y_before)
-        x_after, y_after = into_body(cos(last), sin(last), x_after, y_after)
+        self._still = still_after
+        self._remember(x, y, 0.5 * (still_before + still_after) * dt, dt)
+
         return (
-            0.5 * (x_before + x_after) + lead * (x_after - x_before),
-            0.5 * (y_before + y_after) + lead * (y_after - y_before),
+            self._roll.command(self._time, dt, heading, self._turn_when),
+            self._pitch.command(self._time, dt, heading, self._turn_when),
             yaw,
         )
 
-    def _to_turn(self) -> float:
-        """How far the body will have turned by its yaw rate, less what keeps the heading, rad.
+    def _turn_when(self, planned_for: float, plan: PlannedTilt) -> Turn:
+        """How the body will have turned by its yaw rate, less what keeps the heading, when it acts.
 
-        When what is planned for now acts: one dead time of the tilt from now.
+        What is planned for a time acts one dead time of the tilt later.
         """
-        acts = self._time + self._tilt.dead_time + self._frame_lead
-        return self._past.turned_at(acts - self._yaw.dead_time) - self._past.newest.still
+        acts = planned_for + self._dead_time + self._frame_lead
+        body = self._past_yaw.at(acts - self._yaw.dead_time)
+        return Turn(body.turned - plan.still, body.turning - plan.z)
 
-    def _remember(self, stilled: float, dt: float) -> None:
+    def _remember(self, x: float, y: float, stilled: float, dt: float) -> None:
         """Note the plan as it stands `dt` later; `stilled` rad of yaw keep its heading still."""
-        model, body, before = self._model, self._body, self._past.newest
+        model, body = self._model, self._body
+        still = self._past.newest.still + stilled
+        slopes = model.rate_slopes()
         self._time += dt
         self._past.add(
-            self._time,
-            Planned(
-                model.north,
-                model.east,
-                self._heading.heading,
-                before.still + stilled,
-                body.turned,
-                body.rate,
-            ),
+            self._time, PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still)
         )
+        self._past_yaw.add(self._time, PlannedYaw(self._heading.heading, body.turned, body.rate))
 
 
 def _believable(body_rates: BodyRates | None) -> BodyRates | None:
@@ -266,5 +274,5 @@ def _no_quicker(axis: AxisResponse) -> AxisResponse:
 
 
 def _fed_back(gain: float, axis: AxisResponse) -> float:
-    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time)
+    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.square)
     return min(gain, stable)

@@ -128,9 +128,11 @@ def _model_following(
     *,
     lag: float = 0.0,
     dead_time: float = 0.0,
+    damping: float | None = None,
     acceleration: float | None = None,
     pitch_lag: float | None = None,
     pitch_dead_time: float | None = None,
+    pitch_damping: float | None = None,
     pitch_acceleration: float | None = None,
     yaw_lag: float | None = None,
     yaw_dead_time: float | None = None,
@@ -138,22 +140,35 @@ def _model_following(
     frame_lead: float = 0.0,
     **options: Any,
 ) -> Planner:
-    roll = AxisResponse(lag, dead_time, inf if acceleration is None else acceleration)
+    first_order = inf
+    roll = AxisResponse(
+        lag,
+        dead_time,
+        inf if acceleration is None else acceleration,
+        first_order if damping is None else damping,
+    )
+    if pitch_damping is None:
+        pitch_damping = roll.damping if pitch_lag is None else first_order
     response = RateResponse(
         roll,
-        _or_as(roll, pitch_lag, pitch_dead_time, pitch_acceleration),
-        _or_as(roll, yaw_lag, yaw_dead_time, yaw_acceleration),
+        _or_as(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
+        _or_as(roll, yaw_lag, yaw_dead_time, yaw_acceleration, first_order),
         frame_lead,
     )
     return ModelFollowingPlanner(make_constants(gain, yaw_gain, limits, **options), response)
 
 
 def _or_as(
-    roll: AxisResponse, lag: float | None, dead_time: float | None, acceleration: float | None
+    roll: AxisResponse,
+    lag: float | None,
+    dead_time: float | None,
+    acceleration: float | None,
+    damping: float,
 ) -> AxisResponse:
     """An axis of which these are known; what is None is as roll's."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,
         roll.acceleration if acceleration is None else acceleration,
+        damping,
     )

@@ -8,17 +8,25 @@ _LONGEST = 1.0  # s, of a lag, a dead time or a lead
 
 @dataclass(frozen=True, slots=True)
 class AxisResponse:
-    """Dead time, then a limit of acceleration, then a first-order lag with a gain of 1.
+    """Dead time, then a limit of acceleration, then a lag with a gain of 1.
 
     Attributes:
-        lag: τ, s.
+        lag: τ, s. In second order 2ζ/ω: in either, by how long it is late on average.
         dead_time: from a sample's time to the beginning of the effect of its answer, s.
         acceleration: the autopilot changes the rate it aims at no faster, rad/s².
+        damping: ζ of a lag of second order; infinite in first order.
     """
 
     lag: float = 0.0
     dead_time: float = 0.0
     acceleration: float = inf
+    damping: float = inf
+
+    @property
+    def square(self) -> float:
+        """1/ω², s²: the lag is square·ω̈ + lag·ω̇ + ω = what was commanded."""
+        half = 0.5 * self.lag / self.damping
+        return half * half
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +56,11 @@ class RateResponse:
             _check_time(f"{prefix}dead_time", axis.dead_time)
             if not axis.acceleration > 0.0:
                 raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
+
+    @property
+    def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
+        """Roll, pitch, yaw."""
+        return self.roll, self.pitch, self.yaw
 
     @property
     def tilt(self) -> AxisResponse:

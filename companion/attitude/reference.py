@@ -68,7 +68,7 @@ class SecondOrderReference:
         self, c: Coefficients, speed: Coefficients, target: Coefficients, dt: float
     ) -> tuple[Coefficients, Coefficients]:
         """Coefficients and their speed (1/s) `dt` seconds later."""
-        still, moved, slope, kept = self._transition(dt)
+        still, moved, slope, kept = self.transition(dt)
         north, east = c.north - target.north, c.east - target.east
         return (
             Coefficients(
@@ -81,7 +81,7 @@ class SecondOrderReference:
             ),
         )
 
-    def _transition(self, dt: float) -> tuple[float, float, float, float]:
+    def transition(self, dt: float) -> tuple[float, float, float, float]:
         """The matrix exponential over `dt`: (c, ċ) from (c − c_d, ċ), row by row."""
         decay = self.damping * self.frequency
         square = self.frequency * self.frequency * (1.0 - self.damping * self.damping)

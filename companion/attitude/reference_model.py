@@ -1,15 +1,19 @@
-"""How `model-following` plans the tilt: second order, on straight lines, within the limits."""
+"""How `model-following` plans the tilt: smooth, on straight lines, within the limits."""
 
-from math import hypot, inf, sin, sqrt
+from math import ceil, hypot, inf, sin, sqrt
 
 from companion.attitude.constants import Constants
 from companion.attitude.kinematics import speed_to_rates
-from companion.attitude.lag import behind
-from companion.attitude.reference import SecondOrderReference
+from companion.attitude.lag import Lag
 from companion.attitude.types import Coefficients, Target
 
 _FURTHEST = sin(1.4)
 """No reference is longer: an attitude has to have it, and its rates have to be finite."""
+_DAMPED = 2.7
+"""4·ζ² of the model, at least."""
+_LONGEST_STEP = 0.1
+"""Of the model, times p; a longer sample takes several steps."""
+_MOMENT = 1e-4  # s
 
 
 def rates_along(
@@ -38,19 +42,34 @@ def model_lag(gain: float, lag: float) -> float:
     return max(0.25 / gain, lag)
 
 
+def braking(gain: float, lag: float) -> float:
+    """κ of the model, s: by how long it brakes ahead, so that a slow rate loop overshoots by 1 %.
+
+    Of τ·c̈ + (1 + p·κ)·ċ + p·c the damping is 0.82 then, or more where κ is 0.
+    """
+    return max(0.0, sqrt(_DAMPED * lag / gain) - 1.0 / gain)
+
+
+def model_response(gain: float, lag: float) -> tuple[float, float]:
+    """The model as c̈ = (p'·(c_d − c) − ċ)/τ': p' in 1/s, and τ' in s, of this p and τ."""
+    slowed = 1.0 + gain * braking(gain, lag)
+    return gain / slowed, lag / slowed
+
+
 class ReferenceModel:
-    """c̈ = (v − ċ)/τ with v = p·(c_d − c), limited.
+    """σ·c⃛ + τ·c̈ + ċ = v with v = p·(c_d − c − κ·ċ), limited.
 
     v is scaled as a whole, so a step moves on a straight line. It is limited such that the body
-    rates that go with it stay within the limits; and since ċ + τ·c̈ = v, so does what is commanded,
-    led by the lag, where τ is at least the vehicle's. Where the autopilot limits the acceleration
-    of the rates it aims at, v changes no faster than that, and is never more than can be slowed
-    down in time: so the autopilot's limit is never felt.
+    rates that go with it stay within the limits; and so does what is commanded, led by the lag of
+    the vehicle (τ and σ), which is no slower. Where the autopilot limits the acceleration of the
+    rates it aims at, v changes no faster than that, and is never more than can be slowed down in
+    time: so the autopilot's limit is never felt.
 
     Args:
         constants: gains and limits.
         lag: τ, s.
         acceleration: the autopilot's limit, rad/s².
+        square: σ, s²; 0 for a vehicle whose lag is of first order.
 
     Attributes:
         north, east: coefficients of the reference.
@@ -59,9 +78,11 @@ class ReferenceModel:
 
     __slots__ = (
         "_acceleration",
+        "_braking",
         "_constants",
-        "_free",
         "_lag",
+        "_slope_east",
+        "_slope_north",
         "_tilt_rate_weight",
         "_v_east",
         "_v_north",
@@ -71,10 +92,16 @@ class ReferenceModel:
         "speed_north",
     )
 
-    def __init__(self, constants: Constants, lag: float, acceleration: float = inf) -> None:
+    def __init__(
+        self,
+        constants: Constants,
+        lag: float,
+        acceleration: float = inf,
+        square: float = 0.0,
+    ) -> None:
         self._constants = constants
-        self._free = SecondOrderReference.with_lag(constants.gain, lag)
-        self._lag = lag
+        self._braking = braking(constants.gain, lag)
+        self._lag = Lag(lag, square)
         self._acceleration = acceleration
         # Near the target v falls by p·v a second.
         slowed_in_time = acceleration / constants.gain
@@ -87,35 +114,55 @@ class ReferenceModel:
         scale = _FURTHEST / length if length > _FURTHEST else 1.0
         self.north, self.east = scale * c.north, scale * c.east
         self.speed_north, self.speed_east = self._v_north, self._v_east = speed
+        self._slope_north = self._slope_east = 0.0
 
     def rates(self) -> tuple[float, float, float]:
         """Body rates that go with the reference as it stands, at heading 0, rad/s."""
         return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
+    def rate_slopes(self) -> tuple[float, float]:
+        """How roll and pitch rate of `rates` change, rad/s², by their difference over `_MOMENT`."""
+        roll, pitch, _ = self.rates()
+        later_roll, later_pitch, _ = rates_along(
+            self.north + _MOMENT * self.speed_north,
+            self.east + _MOMENT * self.speed_east,
+            self.speed_north + _MOMENT * self._slope_north,
+            self.speed_east + _MOMENT * self._slope_east,
+        )
+        return (later_roll - roll) / _MOMENT, (later_pitch - pitch) / _MOMENT
+
     def advance(self, target: Target, dt: float) -> None:
         """Move on by `dt` seconds towards an admissible target."""
+        parts = ceil(dt * self._constants.gain / _LONGEST_STEP)
+        for _ in range(parts):
+            self._step(target, dt / parts)
+
+    def _step(self, target: Target, dt: float) -> None:
         north, east = self.north, self.east
-        if self._aim(target, dt):
-            self._follow(dt)
-        else:
-            (self.north, self.east), (self.speed_north, self.speed_east) = self._free.after(
-                Coefficients(north, east),
-                Coefficients(self.speed_north, self.speed_east),
-                Coefficients(target.north, target.east),
-                dt,
-            )
+        self._aim(target, dt)
+        lag = self._lag
+        moved, self.speed_north, self._slope_north = lag.after(
+            self.speed_north, self._slope_north, self._v_north, dt
+        )
+        self.north += moved
+        moved, self.speed_east, self._slope_east = lag.after(
+            self.speed_east, self._slope_east, self._v_east, dt
+        )
+        self.east += moved
         self._stay_inside(north, east, dt)
 
-    def _aim(self, target: Target, dt: float) -> bool:
-        """Choose v for the coming sample; whether a limit shaped it."""
+    def _aim(self, target: Target, dt: float) -> None:
+        """Choose v for the coming step, by where the reference will stand in its middle."""
         constants = self._constants
-        v_north = constants.gain * (target.north - self.north)
-        v_east = constants.gain * (target.east - self.east)
+        ahead, half = 0.5 * dt + self._braking, 0.5 * dt * self._braking
+        north = self.north + ahead * self.speed_north + half * self._slope_north
+        east = self.east + ahead * self.speed_east + half * self._slope_east
+        v_north = constants.gain * (target.north - north)
+        v_east = constants.gain * (target.east - east)
         roll, pitch, _ = rates_along(self.north, self.east, v_north, v_east)
         excess = self._tilt_rate_weight * (roll * roll + pitch * pitch)
         excess = max(excess, constants.speed_weight * (v_north * v_north + v_east * v_east))
-        limited = excess > 1.0
-        if limited:
+        if excess > 1.0:
             scale = 1.0 / sqrt(excess)
             v_north *= scale
             v_east *= scale
@@ -124,18 +171,9 @@ class ReferenceModel:
             roll, pitch, _ = rates_along(self.north, self.east, more_north, more_east)
             share = self._acceleration * dt / max(hypot(roll, pitch), 1e-12)
             if share < 1.0:
-                limited = True
                 v_north = self._v_north + share * more_north
                 v_east = self._v_east + share * more_east
         self._v_north, self._v_east = v_north, v_east
-        return limited
-
-    def _follow(self, dt: float) -> None:
-        """Exact over the sample with v held."""
-        moved, self.speed_north = behind(self.speed_north, self._v_north, self._lag, dt)
-        self.north += moved
-        moved, self.speed_east = behind(self.speed_east, self._v_east, self._lag, dt)
-        self.east += moved
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
         """Not beyond the largest tilt, or no further beyond it than (north, east) was."""
@@ -148,3 +186,4 @@ class ReferenceModel:
             self.east *= longest / length
             self.speed_north = (self.north - north) / dt
             self.speed_east = (self.east - east) / dt
+            self._slope_north = self._slope_east = 0.0

@@ -118,12 +118,14 @@ def vehicle_response(config: Config) -> dict[str, float]:
         "yaw_dead_time": vehicle.yaw_dead_time_ms,
         "frame_lead": vehicle.yaw_frame_lead_ms,
     }
+    plain = {"damping": vehicle.damping, "pitch_damping": vehicle.pitch_damping}
     limits = {
         "acceleration": vehicle.acceleration_limit_deg_s2,
         "pitch_acceleration": vehicle.pitch_acceleration_limit_deg_s2,
         "yaw_acceleration": vehicle.yaw_acceleration_limit_deg_s2,
     }
     response = {key: _MS * value for key, value in times.items() if value is not None}
+    response |= {key: value for key, value in plain.items() if value is not None}
     return response | {key: radians(value) for key, value in limits.items() if value is not None}
 
 
@@ -134,11 +136,12 @@ def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
 
 
 def _rate_loop(axis: AxisKeys) -> RateLoop:
-    lag, dead_time, limit = axis
+    lag, dead_time, limit, damping = axis
     return RateLoop(
         None if lag is None else _MS * lag,
         None if dead_time is None else _MS * dead_time,
         None if limit is None else radians(limit),
+        damping,
     )
 
 

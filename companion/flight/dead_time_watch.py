@@ -33,11 +33,13 @@ class RateLoop(NamedTuple):
         lag: s.
         dead_time: s.
         acceleration_limit: rad/s².
+        damping: of a lag of second order; None: first order.
     """
 
     lag: float | None = None
     dead_time: float | None = None
     acceleration_limit: float | None = None
+    damping: float | None = None
 
 
 class DeadTimeWatch:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import radians, tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
-from companion.attitude.reference_model import model_lag
+from companion.attitude.reference_model import model_lag, model_response
 from companion.config import Config
 from companion.flight.follow import Follow
 from companion.flight.motion_estimate import MotionEstimate
@@ -53,7 +53,7 @@ def tilt_response(config: Config) -> InnerResponse:
     gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
-        lag = model_lag(gain, lag)
+        gain, lag = model_response(gain, model_lag(gain, lag))
     return InnerResponse(gain, lag, dead_time, follows)
 
 
@@ -195,12 +195,13 @@ def predictive_settings(config: Config) -> Settings:
         ConfigError: the planner's response is too quick for the horizon's steps.
     """
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
+    response = tilt_response(config)
     period = 1.0 / config.guidance.rate_hz
     try:
         return Settings(
-            gain=config.planner.gain_per_s,
+            gain=response.gain,
             yaw_gain=config.planner.yaw_gain_per_s,
-            lag=tilt_response(config).lag or model_lag(config.planner.gain_per_s, 0.0),
+            lag=response.lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=slower_tilt(config)[1],
             max_tilt=radians(limits.max_tilt_deg),
             max_tilt_rate=radians(limits.max_tilt_rate_deg_s),

@@ -2,44 +2,43 @@
 
 import pytest
 
-from companion.attitude.history import History, Planned
+from companion.attitude.history import History, PlannedTilt, PlannedYaw
 
-MOTION = Planned(1.0, 2.0, -1.0, 0.5, 4.0, 0.0)
+MOTION = PlannedYaw(-1.0, 4.0, 0.5)
 
 
 def test_before_its_start_and_beyond_its_end_it_moves_evenly():
     past = History(0.1)
-    past.start(0.0, Planned(0.0, 1.0, 2.0, 3.0, 0.0, 4.0), MOTION)
-    assert past.at(-0.05) == pytest.approx((-0.05, 0.9, 2.05, 2.975, -0.2, 4.0))
-    assert past.at(-0.2) == pytest.approx((-0.2, 0.6, 2.2, 2.9, -0.8, 4.0))
-    assert past.at(0.02) == pytest.approx((0.02, 1.04, 1.98, 3.01, 0.08, 4.0))
+    past.start(0.0, PlannedYaw(2.0, 0.0, 3.0), MOTION)
+    assert past.at(-0.05) == pytest.approx((2.05, -0.2, 2.975))
+    assert past.at(-0.2) == pytest.approx((2.2, -0.8, 2.9))
+    assert past.at(0.02) == pytest.approx((1.98, 0.08, 3.01))
 
 
 def test_it_is_linear_between_its_rows_and_beyond_the_newest():
     past = History(0.1)
-    past.start(0.0, Planned(0.0, 1.0, 2.0, 3.0, 0.0, 4.0), MOTION)
+    past.start(0.0, PlannedYaw(0.0, 1.0, 2.0), MOTION)
     for n in range(1, 301):
-        past.add(0.01 * n, Planned(1.0 + n, 2.0 - n, 3.0 + n * n, 7.0, 5.0 * n, 0.1 * n))
+        past.add(0.01 * n, PlannedYaw(1.0 + n, 2.0 - n, 3.0 + n * n))
     square = 0.5 * (295**2 + 296**2)
-    assert past.at(2.955) == pytest.approx((296.5, -293.5, 3.0 + square, 7.0, 1477.5, 29.55))
-    assert past.at(2.9) == pytest.approx((291.0, -288.0, 3.0 + 290**2, 7.0, 1450.0, 29.0))
+    assert past.at(2.955) == pytest.approx((296.5, -293.5, 3.0 + square))
+    assert past.at(2.9) == pytest.approx((291.0, -288.0, 3.0 + 290**2))
     assert past.at(3.005)[:2] == pytest.approx((301.5, -298.5))
-    assert past.turned_at(2.955) == pytest.approx(1477.5)
     assert past.newest == past.at(3.0)
 
 
 def test_it_remembers_its_span_and_not_much_more():
     past = History(0.1)
-    past.start(0.0, Planned(*[0.0] * 6), MOTION)
+    past.start(0.0, PlannedTilt(*[0.0] * 8), PlannedTilt(*[1.0] * 8))
     for n in range(1, 10_001):
-        past.add(0.001 * n, Planned(n, n, n, n, n, n))
+        past.add(0.001 * n, PlannedTilt(*[float(n)] * 8))
     assert past.at(10.0 - 0.1).north == pytest.approx(9900.0)
     assert len(past._rows) == len(past._times) < 300
 
 
 def test_starting_again_forgets():
     past = History(0.1)
-    past.start(0.0, Planned(*[9.0] * 6), MOTION)
-    past.add(0.01, Planned(*[9.0] * 6))
-    past.start(0.0, Planned(*[1.0] * 6), Planned(*[0.0] * 6))
-    assert past.at(-0.07) == past.at(0.0) == past.at(0.01) == Planned(*[1.0] * 6)
+    past.start(0.0, PlannedYaw(*[9.0] * 3), MOTION)
+    past.add(0.01, PlannedYaw(*[9.0] * 3))
+    past.start(0.0, PlannedYaw(*[1.0] * 3), PlannedYaw(*[0.0] * 3))
+    assert past.at(-0.07) == past.at(0.0) == past.at(0.01) == PlannedYaw(*[1.0] * 3)

@@ -15,8 +15,8 @@ START, GOAL = (-0.4, -0.5), (0.4, -0.5)
 AT_REST = Coefficients(0.0, 0.0)
 
 
-def placed(start, limits=Limits(), lag=0.05, speed=AT_REST, gain=5.0, acceleration=np.inf):  # noqa: B008
-    model = ReferenceModel(make_constants(gain, 2.0, limits), lag, acceleration)
+def placed(start, limits=Limits(), lag=0.05, speed=AT_REST, gain=5.0, **response):  # noqa: B008
+    model = ReferenceModel(make_constants(gain, 2.0, limits), lag, **response)
     model.place(Coefficients(*start), Coefficients(*speed))
     return model
 
@@ -34,20 +34,58 @@ def moved(model, target, seconds, dt):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("dt", [0.004, 0.01, 0.02, 0.2])
-@pytest.mark.parametrize("lag", [0.01, 0.05, 0.09])
-def test_unlimited_it_is_the_differential_equation(lag, dt):
-    speed = (0.3, -0.4)
-    rows = moved(placed(START, lag=lag, speed=speed), Target(*GOAL, 0.3), 1.6, dt)
+@pytest.mark.parametrize(("dt", "error"), [(0.004, 1e-3), (0.02, 2e-2), (0.2, 2e-2)])
+@pytest.mark.parametrize("square", [0.0, 0.0015, 0.0026])
+@pytest.mark.parametrize("lag", [0.05, 0.0745, 0.12])
+def test_unlimited_it_is_the_differential_equation(lag, square, dt, error):
+    """σ·c⃛ + τ·c̈ + (1 + p·κ)·ċ = p·(c_d − c), up to what v changes within a step."""
+    speed, order = (0.3, -0.4), 2 if square == 0.0 else 3
+    rows = moved(placed(START, lag=lag, speed=speed, square=square), Target(*GOAL, 0.3), 1.6, dt)
+    slowed = max(1.0, (2.7 * 5.0 * lag) ** 0.5)
+
+    def derivative(_, state):
+        c, speed_, bend = state.reshape(3, 2)  # the last one is not a state of second order
+        push = 5.0 * (np.array(GOAL) - c) - slowed * speed_
+        if order == 2:
+            return np.concatenate((speed_, push / lag, (0.0, 0.0)))
+        return np.concatenate((speed_, bend, (push - lag * bend) / square))
+
     solved = solve_ivp(
-        lambda _, s: [*s[2:], *((5.0 * (np.array(GOAL) - s[:2]) - s[2:]) / lag)],
+        derivative,
         (0.0, 1.6),
-        [*START, *speed],
+        [*START, *speed, 0.0, 0.0],
         t_eval=np.linspace(0.0, 1.6, len(rows)),
-        rtol=1e-10,
-        atol=1e-12,
+        rtol=1e-9,
+        atol=1e-11,
     )
-    assert rows == pytest.approx(solved.y.T, abs=1e-8)
+    assert rows[:, :2] == pytest.approx(solved.y.T[:, :2], abs=0.1 * error)
+    assert rows[:, 2:] == pytest.approx(solved.y.T[:, 2:4], abs=error)
+
+
+@pytest.mark.parametrize(("lag", "damping"), [(0.05, 0.7), (0.0745, 0.73), (0.12, 0.7), (0.3, 1.0)])
+def test_a_slow_rate_loop_makes_it_overshoot_by_a_few_percent_at_most(lag, damping):
+    model = placed(START, lag=lag, square=(0.5 * lag / damping) ** 2)
+    rows = moved(model, Target(*GOAL, 0.3), 3.0, 0.004)
+    assert rows[:, 0].max() <= GOAL[0] + 0.05 * (GOAL[0] - START[0])
+    assert rows[-1, 0] == pytest.approx(GOAL[0], abs=0.02)
+
+
+@pytest.mark.parametrize("square", [0.0015, 0.0026])
+def test_what_a_second_order_is_sent_is_smooth_and_moves_it_along(square):
+    """Led by τ and σ its rates keep the limit, and their slopes are what they become."""
+    lag, dt = 0.0745, 0.004
+    model = placed(START, Limits(None, W_M), lag, square=square)
+    rates, slopes = [np.array(model.rates()[:2])], [np.array(model.rate_slopes())]
+    for _ in range(300):
+        model.advance(Target(*GOAL, 0.3), dt)
+        rates.append(np.array(model.rates()[:2]))
+        slopes.append(np.array(model.rate_slopes()))
+    rates, slopes = np.array(rates), np.array(slopes)
+    mean = 0.5 * (slopes[1:] + slopes[:-1])
+    assert np.diff(rates, axis=0) / dt == pytest.approx(mean, abs=0.15)
+    led = 0.5 * (rates[1:] + rates[:-1]) + lag * mean + square * np.diff(slopes, axis=0) / dt
+    assert np.hypot(*led.T).max() <= 1.03 * W_M
+    assert np.hypot(*led.T).max() >= 0.98 * W_M
 
 
 LIMITS = [
