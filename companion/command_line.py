@@ -164,8 +164,8 @@ def _add_identify(commands: Commands) -> None:
         help="find dead time, lag and slew of the body rates and the thrust map",
         description="Fly short doublets of body rates and climb, at most 15° of tilt in calm "
         "air unless the configuration's `identify` says otherwise, fit how the vehicle answered "
-        "them, and write that as a YAML file for the configuration to include. A bad fit is not "
-        "written.",
+        "them, and write that as a YAML file for the configuration to include. An axis with a bad "
+        "fit keeps what the flight's configuration says of it.",
     )
     which = command.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", type=Path, metavar="FILE", help="fly the vehicle it names")

@@ -40,6 +40,8 @@ class AirframeConfig(Section):
     gravity_m_s2: Positive = 9.80665
     drag_n_s_per_m: NonNegative = 1.0
     """Linear drag against the air: force in N per m/s, equal in all directions."""
+    quadratic_drag_n_s2_per_m2: NonNegative = 0.0
+    """The same with the square of the airspeed: force in N per (m/s)^2."""
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""
     thrust_slope_m_s2: Positive = 19.55

@@ -29,14 +29,17 @@ class EkfConfig(Section):
     """Of a fix's horizontal position."""
     velocity_noise_m_s: NonNegative = 0.0238
     """Of a fix's horizontal velocity."""
-    noise_time_s: Positive = 0.3
+    noise_time_s: Positive = 0.25
     """Correlation time of both."""
     tilt_noise_deg: NonNegative = 0.028
     """By this the attitude's roll and pitch wander within a second; the fixes hold them down."""
-    yaw_error_deg: NonNegative = 0.5
+    yaw_error_deg: NonNegative = 0.3
     """Of the heading; it rotates the acceleration that is integrated."""
-    yaw_time_s: Positive = 100.0
-    """Correlation time of the heading's error."""
+    yaw_time_s: Positive = 15.0
+    """Correlation time of the heading's error, and that with which a turn changes it."""
+    turn_yaw_ms: Finite = -4.0
+    """In a turn the heading is learned wrongly, from fixes that are late: by minus the course's
+    turn rate times this."""
     acceleration_lead_ms: Finite = 0.0
     """The acceleration that is integrated leads the true one by this."""
     acceleration_scale: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
@@ -45,6 +48,8 @@ class EkfConfig(Section):
     """Noise of the vertical direction, per noise of a horizontal one."""
     height_offset_m: Finite = 0.0
     """The estimated height is lower than the true one by this."""
+    height_sag_s4_per_m: Finite = 0.0024
+    """And by this times the square of the horizontal acceleration, some seconds later."""
     position_gains: Gains = (0.0774, 0.0494)
     """Of the position, m per m and m per m/s."""
     velocity_gains: Gains = (0.0316, 0.0411)
@@ -68,10 +73,12 @@ EKFS: dict[str, EkfConfig | None] = {
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
-        yaw_error_deg=1.0,
+        yaw_error_deg=0.3,
+        turn_yaw_ms=24.0,
         acceleration_lead_ms=3.1,
         acceleration_scale=0.0019,
         height_offset_m=0.1,
+        height_sag_s4_per_m=0.0004,
         position_gains=(0.0853, 0.1278),
         velocity_gains=(0.0291, 0.1134),
         acceleration_gains=(0.0057, 0.0433),

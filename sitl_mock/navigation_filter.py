@@ -14,6 +14,10 @@ from sitl_mock.physics import Motion
 from sitl_mock.quaternion import Vector
 
 _GRAVITY = 9.80665
+_SAG_S = 2.0
+"""The height's error follows the acceleration with this time constant, s."""
+_SLOW = 0.5
+"""Below this speed, m/s, the course tells nothing of the heading."""
 Errors = tuple[complex, complex, complex]
 """Of position (m), velocity (m/s) and acceleration (m/s^2, by the attitude's roll and pitch)."""
 
@@ -64,6 +68,7 @@ class NavigationFilter:
         "_level",
         "_period",
         "_random",
+        "_sag",
         "_upright",
         "_yaw",
         "_yaw_decay",
@@ -80,7 +85,7 @@ class NavigationFilter:
         self._yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         self._at = 0.0
         self._fixed = start
-        self._corrected = 0.0
+        self._corrected = self._sag = 0.0
         self._level, self._upright = self._begun(1.0), self._begun(config.vertical_share)
 
     def _begun(self, share: float) -> _Track:
@@ -113,8 +118,9 @@ class NavigationFilter:
         noise = self._shaken(self._upright.noise, share)
         still = _moved_on(self._upright.errors, elapsed)
         upright = self._corrected_by(self._upright, still, noise, noise, settled, share * kick)
-        spread = radians(config.yaw_error_deg) * sqrt(1.0 - self._yaw_decay**2)
-        self._yaw = self._yaw_decay * self._yaw + self._random.gauss(0.0, spread)
+        self._turn(speed, pull)
+        sag = config.height_sag_s4_per_m * abs(pull) ** 2
+        self._sag += (1.0 - exp(-elapsed / _SAG_S)) * (sag - self._sag)
         self._level, self._upright = level, upright
         self._at, self._fixed, self._corrected = at, delayed, now
 
@@ -128,13 +134,21 @@ class NavigationFilter:
         speed += self._lead * _plane(truth.acceleration) - settled * pending[1]
         down, sink, _ = _moved_on(self._upright.errors, elapsed)
         pending = self._upright.pending
-        down += self._config.height_offset_m - settled * pending[0]
+        down += self._config.height_offset_m + self._sag - settled * pending[0]
         return NavigationError(
             (place.real, place.imag, down.real),
             (speed.real, speed.imag, (sink - settled * pending[1]).real),
             # Thrust along the wrong axis is what makes the acceleration wrong.
             (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, self._yaw),
         )
+
+    def _turn(self, speed: complex, pull: complex) -> None:
+        """The heading's error wanders, and follows the course's turn rate."""
+        config, decay = self._config, self._yaw_decay
+        spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
+        turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
+        learned = -turn_rate * config.turn_yaw_ms * 1e-3
+        self._yaw = learned + decay * (self._yaw - learned) + self._random.gauss(0.0, spread)
 
     def _carried(self, truth: Snapshot, elapsed: float) -> Errors:
         """The plane's errors so long after the fix: a turned and scaled motion is integrated."""

@@ -4,6 +4,7 @@ World NED, body FRD, quaternion (w, x, y, z) body to world, SI. Nothing here all
 tuples or looks anything up, so the same functions can be compiled for batches.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 from sitl_mock.config import AirframeConfig
@@ -22,6 +23,7 @@ class Body(NamedTuple):
     inertia_y: float  # kg m^2, about body y
     inertia_z: float  # kg m^2, about body z
     drag: float  # linear drag per mass, 1/s
+    quadratic_drag: float  # per mass, 1/m
     rotational_drag: float  # damping torque, N m per rad/s
     gravity: float  # m/s^2
 
@@ -31,6 +33,7 @@ def body_of(airframe: AirframeConfig) -> Body:
     return Body(
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
+        quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
         rotational_drag=airframe.rotational_drag_n_m_s,
         gravity=airframe.gravity_m_s2,
     )
@@ -39,15 +42,19 @@ def body_of(airframe: AirframeConfig) -> Body:
 def derivative(motion: Motion, load: Load, body: Body) -> Motion:
     """Time derivative of the motion (Newton, Euler, quaternion kinematics).
 
-    m v' = m g - T z_body - drag (v - wind); J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
+    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind);
+    J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
     vn, ve, vd, w, x, y, z, p, q, r = motion
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
-    jx, jy, jz, drag, damping, gravity = body
+    jx, jy, jz, drag, quadratic, damping, gravity = body
+    air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
+    if quadratic:
+        drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
     return (
-        drag * (wind_n - vn) - 2.0 * thrust * (x * z + w * y),
-        drag * (wind_e - ve) - 2.0 * thrust * (y * z - w * x),
-        drag * (wind_d - vd) - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
+        drag * air_n - 2.0 * thrust * (x * z + w * y),
+        drag * air_e - 2.0 * thrust * (y * z - w * x),
+        drag * air_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
         -0.5 * (x * p + y * q + z * r),
         0.5 * (w * p + y * r - z * q),
         0.5 * (w * q + z * p - x * r),

@@ -53,7 +53,10 @@ QUICK_FLIGHT = {
     "thrust": {"hover_thrust": 0.49},
 }
 OTHER_VEHICLES = {
-    "ardupilot": {"guidance": {"drag_per_s": 0.36}, "thrust": {"hover_thrust": 0.364}},
+    "ardupilot": {
+        "guidance": {"drag_per_s": 0.25, "quadratic_drag_per_m": 0.033},
+        "thrust": {"hover_thrust": 0.364},
+    },
 }
 
 

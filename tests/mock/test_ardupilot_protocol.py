@@ -107,7 +107,7 @@ def test_what_is_given_of_the_airframe_leaves_the_rest_as_measured():
         {"autopilot": "ardupilot", "airframe": {"drag_n_s_per_m": 0.5}}
     )
     assert settings.airframe.drag_n_s_per_m == 0.5
-    assert settings.airframe.rotor_lag_ms == 28.0
+    assert settings.airframe.rotor_lag_ms == 22.5
     assert settings.prearm_delay_s == pytest.approx(41.6)
     word = MockSettings.model_validate({"autopilot": "ardupilot", "rate_loop": "ardupilot"})
     assert word.rate_loop == settings.rate_loop

@@ -9,9 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from sitl_mock.config import AirframeConfig
 from sitl_mock.physics import Body, advance, body_of, derivative
+from sitl_mock.settings import MockSettings
 
-FREE = Body(0.02, 0.035, 0.05, drag=0.0, rotational_drag=0.0, gravity=9.80665)
-REAL = body_of(AirframeConfig(inertia_kg_m2=(0.02, 0.03, 0.045), drag_n_s_per_m=0.7))
+FREE = Body(0.02, 0.035, 0.05, drag=0.0, quadratic_drag=0.0, rotational_drag=0.0, gravity=9.80665)
+REAL = body_of(
+    AirframeConfig(
+        inertia_kg_m2=(0.02, 0.03, 0.045), drag_n_s_per_m=0.7, quadratic_drag_n_s2_per_m2=0.05
+    )
+)
 NO_LOAD = (0.0,) * 7
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
@@ -37,9 +42,9 @@ def reference(load, body):
     def rate(_, state):
         velocity, q, omega = state[3:6], state[6:10], state[10:]
         matrix = Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
-        acceleration = (
-            [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - body.drag * (velocity - wind)
-        )
+        air = velocity - wind
+        drag = body.drag + body.quadratic_drag * np.linalg.norm(air)
+        acceleration = [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - drag * air
         q_rate = 0.5 * np.concatenate(([-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)))
         moment = torque - body.rotational_drag * omega - np.cross(omega, inertia @ omega)
         return np.concatenate((velocity, acceleration, q_rate, np.linalg.solve(inertia, moment)))
@@ -98,9 +103,19 @@ def test_free_fall_is_the_parabola():
 
 
 def test_fall_with_linear_drag_nears_the_terminal_speed():
-    motion, _ = fly((0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0), NO_LOAD, REAL, 3.0)
-    terminal = REAL.gravity / REAL.drag
-    assert motion[2] == pytest.approx(terminal * (1.0 - exp(-3.0 * REAL.drag)), rel=1e-9)
+    body = REAL._replace(quadratic_drag=0.0)
+    motion, _ = fly((0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0), NO_LOAD, body, 3.0)
+    terminal = body.gravity / body.drag
+    assert motion[2] == pytest.approx(terminal * (1.0 - exp(-3.0 * body.drag)), rel=1e-9)
+
+
+def test_ardupilots_drag_is_that_measured():
+    """0.31 per second at 2 m/s, 0.41 at 5 m/s."""
+    body = body_of(MockSettings.model_validate({"autopilot": "ardupilot"}).airframe)
+    for speed, share in ((2.0, 0.31), (5.0, 0.41)):
+        motion = (speed, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0)
+        slowing = -derivative(motion, (body.gravity, *NO_LOAD[1:]), body)[0]
+        assert slowing / speed == pytest.approx(share, abs=0.01)
 
 
 def test_the_wind_carries_a_body_along():

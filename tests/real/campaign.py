@@ -16,12 +16,20 @@ from tests.real.figures import fly
 
 OTHERS = ("first-order", "quaternion", "so3", "exact", "euler")
 """The planners that model-following is compared with."""
-STRAIGHT = ["steps", "corners400", "corners90"]
+STRAIGHT = ["corners400", "corners90", "steps"]
 NEAR = ["hover", "circle2", "circle5+eight5", "circle8+eight8", "circle10"]
-COMPARED = [f"{flight}:{planner}" for planner in OTHERS for flight in STRAIGHT[1:]]
+COMPARED = [f"{flight}:{planner}" for planner in OTHERS for flight in STRAIGHT[:2]]
 IDENTIFIED = ["corners400@identified", "corners90@identified"]
-MORE = {"px4": ["circle5@nmpc"], "ardupilot": ["circle5@nmpc", "circle5@wind"]}
-"""PX4's own simulator has no turbulence."""
+SETS = {
+    "straight": STRAIGHT,
+    "near": NEAR,
+    "nmpc": ["circle5@nmpc"],
+    "wind": ["circle5@wind"],
+    "identify": ["identify", *IDENTIFIED],
+    "compared": COMPARED,
+    "ends": ["kill", "takeover", "ten"],
+}
+"""What is flown, in this order; `ends` once, and not on the mock."""
 
 
 def main() -> int:
@@ -31,8 +39,12 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("flights") / "real")
     parser.add_argument("--times", type=int, default=1, help="of each flight; 3 for medians")
     parser.add_argument("--fifo", action="store_true", help="before other programs (SCHED_FIFO)")
+    parser.add_argument("--sets", default=",".join(SETS), help=f"only these, of {','.join(SETS)}")
     parser.add_argument("--no-mock", action="store_true", help="no ratio to the mock's figures")
     options = parser.parse_args()
+    unknown = set(options.sets.split(",")) - set(SETS)
+    if unknown:
+        parser.error(f"--sets: no {', '.join(sorted(unknown))}; there are {', '.join(SETS)}")
     try:
         found = builds()
     except ValueError as error:
@@ -55,21 +67,23 @@ def main() -> int:
 
 def _campaign(autopilot: str, options) -> bool:
     """Whether a flight failed."""
-    flights = STRAIGHT + NEAR + MORE[autopilot] + COMPARED
+    sets = [name for name in SETS if name in options.sets.split(",")]
+    flights = [flight for name in sets if name != "ends" for flight in SETS[name]]
+    # The wind of PX4's own simulator has no turbulence.
+    if autopilot == "px4":
+        flights = [flight for flight in flights if flight not in SETS["wind"]]
     repeated = [f"{flight}*{options.times}" for flight in flights]
-    identified = [f"identify*{options.times}", *(f"{each}*{options.times}" for each in IDENTIFIED)]
+    repeated += SETS["ends"] if "ends" in sets else []
     stamp = time.strftime("%Y%m%d-%H%M%S")
-    changes = {"realtime": {"scheduler": "fifo"}} if options.fifo else {}
     rows = fly(
         autopilot,
-        [*repeated, *identified, "kill", "takeover", "ten"],
+        repeated,
         options.out / f"{autopilot}-{stamp}",
-        changes=changes,
+        changes={"realtime": {"scheduler": "fifo"}} if options.fifo else {},
         fifo=options.fifo,
     )
     if not options.no_mock:
-        mock = f"mock-{autopilot}"
-        rows += fly(mock, [*flights, "identify", *IDENTIFIED], options.out / f"{mock}-{stamp}")
+        rows += fly(f"mock-{autopilot}", flights, options.out / f"mock-{autopilot}-{stamp}")
     return any("error" in row for row in rows)
 
 

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import common
 
 from tests.real.dataflash import DataflashLog
 from tests.real.hil_truth import HilTruth
+from tests.real.stamps import stamp_offset
 from tests.real.truth import NoTruthError
 
 
@@ -69,3 +70,28 @@ def test_ardupilots_log_is_read_as_it_grows(tmp_path):
     assert motion.q_time == pytest.approx([1.04])
     with pytest.raises(NoTruthError):
         log.truth(2.0)
+
+
+def recorded(tmp_path, jump=0.0):
+    """A `.tlog` of 100 samples whose stamps jump in the middle, and the answers to them."""
+    sender = common.MAVLink(None, 1, 1)
+    records, rates = b"", []
+    for k in range(100):
+        turning = [0.01 * np.sin(k), 0.02 * np.cos(k), 0.0]
+        stamp = 50.0 + 0.004 * k + (jump if k >= 50 else 0.0)
+        message = common.MAVLink_attitude_quaternion_message(
+            round(1000 * stamp), 1, 0, 0, 0, *turning
+        )
+        records += struct.pack(">Q", k) + message.pack(sender)
+        rates.append([42.0 + 0.004 * k, 0, 0, 0, 0, 0, *np.float32(turning), 0])
+    (tmp_path / "flight.tlog").write_bytes(records)
+    return np.array(rates), tmp_path / "flight.tlog"
+
+
+def test_the_programs_vehicle_time_is_laid_over_the_autopilots_stamps(tmp_path):
+    assert stamp_offset(*recorded(tmp_path)) == pytest.approx(8.0)
+
+
+def test_a_clock_that_jumped_in_control_measures_nothing(tmp_path):
+    with pytest.raises(NoTruthError, match="jumped"):
+        stamp_offset(*recorded(tmp_path, jump=0.5))
