@@ -87,7 +87,7 @@ def hold_weights(config: Config) -> Weights:
     With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
     own. `tests/flight/test_margins.py` shows what may be wrong with T and with the thrust then.
     """
-    guidance, delay = config.guidance, _delay(config)
+    guidance, delay = config.guidance, hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
         1.0 / delay**4 if position is None else position,
@@ -98,18 +98,16 @@ def hold_weights(config: Config) -> Weights:
 def disturbance_bandwidth(config: Config) -> float:
     """How quickly wind is found, rad/s: as is told, or half as quick again as the hold."""
     told = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / _delay(config) if told is None else told
+    return 1.5 / hold_delay(config) if told is None else told
 
 
-def _delay(config: Config) -> float:
-    """T, s: with a usual rate loop where the vehicle's is not known."""
-    delay = _feedback_delay(config)
+def hold_delay(config: Config) -> float:
+    """T, s: with a usual rate loop where the vehicle's is not known.
+
+    A command is held for a period of guidance: on average it acts half of one late.
+    """
+    delay = tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
-
-
-def _feedback_delay(config: Config) -> float:
-    """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
-    return tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
@@ -122,7 +120,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, _feedback_delay(config), drag),
+            gains=chain_gains(weights, hold_delay(config), drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,

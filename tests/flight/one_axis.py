@@ -13,6 +13,7 @@ import numpy as np
 from companion.attitude import BodyRates
 from companion.config import Config
 from companion.flight.assembly import planner
+from companion.flight.command import Command
 from companion.flight.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import GRAVITY, Reference
 from companion.mavlink.records import LocalPosition
@@ -49,7 +50,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
     asked, fade = deque([0.0] * (late + 1), maxlen=late + 1), exp(-DT / vehicle.lag)
     told = deque(maxlen=_POSITION_LATE + 1)
     roll = rate = place = speed = 0.0
-    target, places = None, np.full(round(seconds / DT), np.nan)
+    command, places = None, np.full(round(seconds / DT), np.nan)
     place = off
     for n in range(len(places)):
         time = n * DT
@@ -65,8 +66,9 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
         if n % _GUIDANCE == 0:
             situation = estimate.situation(time, guidance.acts_after, (2.0, 18.0))
             held = Reference((0.0, 0.0, -5.0))
-            target, _ = guidance.command(lambda _, held=held: held, time, situation)
-        asked.append(law.rates(q, target, DT, rates).roll)
+            target, later, down = guidance.command(lambda _, held=held: held, time, situation)
+            command = Command(target, down, time, later=later, period=_GUIDANCE * DT)
+        asked.append(law.rates(q, command.target_at(time), DT, rates).roll)
         rate = asked[0] + fade * (rate - asked[0])
         roll += DT * rate
         if abs(roll) > 1.2:

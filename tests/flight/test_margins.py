@@ -7,7 +7,7 @@ import pytest
 
 from companion import bounded_yaml
 from companion.config import Config
-from companion.flight.outer_loop import disturbance_bandwidth, hold_weights, tilt_response
+from companion.flight.outer_loop import disturbance_bandwidth, hold_delay, hold_weights
 from companion.yaml_file import parse
 from tests.flight.one_axis import Airframe, hold, settled
 
@@ -38,7 +38,7 @@ def real(lag_ms, dead_ms, slower=1.0, strength=1.0):
 
 def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     config = believed(47.0, 40.0)
-    delay = tilt_response(config).slowness
+    delay = hold_delay(config)
     assert delay == pytest.approx(0.25 + 0.0625 + 0.04 + 0.01)  # 1/p, model's lag, dead time, T/2
     weights = hold_weights(config)
     nobody_knows = hold_weights(parse("{}", "test", Config))
