@@ -120,6 +120,7 @@ class DeadTimeWatch:
                 followed[sure],
                 loop.lag,
                 loop.acceleration_limit,
+                inf if loop.damping is None else loop.damping,
             )
         return AxisDeadTime(measured, loop.dead_time)
 

@@ -21,6 +21,8 @@ _PHASE = 0.38
 _FREQUENCIES = 5.0, 9.0
 """these two, rad/s: flights tell enough about them. Found on PX4 (8 rad/s) and ArduPilot (9 rad/s),
 where steps, circles, figure-eights and doublets then tell dead times within 3 ms of each other."""
+_RESEMBLING = 0.63
+"""The lag of first order that resembles PX4's of second order, as a share of that."""
 _REACH = 3.5
 """Of the filter to each side, in its standard deviations."""
 _ALIKE = 0.985
@@ -37,6 +39,7 @@ def dead_time_by_correlation(
     measured: ArrayLike,
     lag: float = 0.0,
     slew: float | None = None,
+    damping: float = np.inf,
 ) -> float | None:
     """The delay at which the movements of commands and measurements correlate most.
 
@@ -50,6 +53,7 @@ def dead_time_by_correlation(
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
         lag: of the rate loop, s.
         slew: its slew limit, rad/s², if it has one.
+        damping: ζ of a lag of second order, which is `lag` = 2ζ/ω late; infinite in first order.
 
     Returns:
         s, at most 0.5; None where the commands moved too little, or something else moved the
@@ -64,7 +68,7 @@ def dead_time_by_correlation(
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
     products, powers, squares, count = np.zeros(_DELAYS + 1), np.zeros(_DELAYS + 1), 0.0, 0
-    band = _band_pass(lag)
+    band = _band_pass(lag, damping)
     for part in stretches(time, commanded, measured_time, measured):
         movements = _movements(part, lag, slew, band)
         if movements is None:
@@ -76,16 +80,32 @@ def dead_time_by_correlation(
         count += answered.size
     if count == 0 or powers.max() < count * _EXCITED**2 or squares == 0.0:
         return None
-    return _peak(products / np.sqrt(np.maximum(powers, count * _EXCITED**2) * squares))
+    found = _peak(products / np.sqrt(np.maximum(powers, count * _EXCITED**2) * squares))
+    return None if found is None else max(0.0, found - _later(lag, damping))
 
 
-def _band_pass(lag: float) -> Floats:
+def _frequency(lag: float, damping: float) -> float:
+    """The frequency that is compared, rad/s."""
+    slowest, quickest = _FREQUENCIES
+    if damping < np.inf:
+        lag *= _RESEMBLING
+    return min(max(_PHASE / max(lag, _GRID), slowest), quickest)
+
+
+def _later(lag: float, damping: float) -> float:
+    """By how much a lag of second order is later than one of first order, s."""
+    frequency = _frequency(lag, damping)
+    turned = frequency * lag
+    phase = np.arctan2(turned, 1.0 - (0.5 * turned / damping) ** 2)
+    return float(phase - np.arctan(turned)) / frequency
+
+
+def _band_pass(lag: float, damping: float) -> Floats:
     """(k,), a filter without phase for samples on the grid: a Gaussian's third derivative.
 
     Its gain ∝ ω³·exp(−1.5·(ω/ω₀)²) is 1 at its greatest, and all but blind to slow turns.
     """
-    slowest, quickest = _FREQUENCIES
-    frequency = min(max(_PHASE / max(lag, _GRID), slowest), quickest)
+    frequency = _frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
     half = int(_REACH * deviation / _GRID)
     time = _GRID * np.arange(-half, half + 1)

@@ -1,4 +1,4 @@
-"""A vehicle whose rate loop answers late: dead time, then a first-order lag, on SciPy rotations.
+"""A vehicle whose rate loop answers late: dead time, then a lag, on SciPy rotations.
 
 The judge of `model-following`, written from that one sentence; nothing of its maths is shared.
 """
@@ -78,6 +78,29 @@ class Flight:
     @property
     def tilt_commands(self):
         return np.hypot(self.commands[..., 0], self.commands[..., 1])
+
+
+class SecondOrderPlant(LagPlant):
+    """As `LagPlant`, but (τ/2ζ)²·ω̈ + τ·ω̇ = u(t − θ) − ω, with `damping` ζ of each axis."""
+
+    def __init__(self, start, lag, dead_time, damping):
+        super().__init__(start, lag, dead_time)
+        square = np.broadcast_to(
+            (self._lag / (2.0 * np.asarray(damping, dtype=float))) ** 2, (1, 3)
+        )
+        root = np.sqrt(self._lag**2 - 4.0 * square + 0j)
+        self._modes = (-self._lag + root) / (2.0 * square), (-self._lag - root) / (2.0 * square)
+        self._slopes = np.zeros_like(self.rates)
+
+    def _answer(self, command, seconds):
+        first, second = self._modes
+        away = self.rates - command
+        a = (self._slopes - second * away) / (first - second)
+        b = away - a
+        a_later, b_later = a * np.exp(first * seconds), b * np.exp(second * seconds)
+        self.rates = command + (a_later + b_later).real
+        self._slopes = (first * a_later + second * b_later).real
+        return command * seconds + ((a_later - a) / first + (b_later - b) / second).real
 
 
 def fly(planners, plant, target_at, samples, dt, push_at=None):

@@ -30,6 +30,7 @@ BODY_RATES = [None, (0.0, 0.0, 0.0), (1.0, -2.0, 3.0), (99.0, -99.0, 99.0), (mat
 RESPONSES = {
     "immediate": {},
     "lag": {"lag": 0.05, "dead_time": 0.03, "yaw_lag": 0.15, "yaw_dead_time": 0.1},
+    "unlike": {"lag": 0.05, "damping": 0.7, "pitch_lag": 0.09, "pitch_dead_time": 0.03},
     "slew": {"lag": 0.05, "acceleration": 20.0, "yaw_acceleration": 5.0, "frame_lead": 0.02},
 }
 PLANNERS = [(name, {}) for name in PLANNER_NAMES if name != "model-following"] + [

@@ -38,6 +38,13 @@ def test_stable_just_below_and_not_just_above(lag, dead_time):
     assert rightmost(1.01 * gain, lag, dead_time) * scale > 1e-6
 
 
+def test_of_second_order_it_is_that_of_its_two_lags_and_of_a_ring_less():
+    """(τ₁s + 1)(τ₂s + 1) behind no dead time bears 1/τ₁ + 1/τ₂ (Hurwitz); so does any ζ, 2ζω."""
+    assert largest_gain(0.05, 0.0, 0.02 * 0.03) == pytest.approx(1.0 / 0.02 + 1.0 / 0.03, rel=1e-9)
+    assert largest_gain(2 * 0.4 / 20.0, 0.0, 1 / 400.0) == pytest.approx(2 * 0.4 * 20.0, rel=1e-9)
+    assert largest_gain(0.05, 0.04, 1e-9) == pytest.approx(largest_gain(0.05, 0.04), rel=1e-5)
+
+
 def test_without_a_lag_it_is_a_quarter_turn_in_the_dead_time():
     assert largest_gain(0.0, 0.045) == pytest.approx(0.5 * math.pi / 0.045, rel=1e-12)
 

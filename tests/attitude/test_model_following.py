@@ -20,7 +20,7 @@ from companion.attitude import (
     make_planner,
 )
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, wrapped
-from tests.attitude.lag_plant import LagPlant, fly
+from tests.attitude.lag_plant import LagPlant, SecondOrderPlant, fly
 from tests.attitude.simulate import quaternion
 
 START, GOAL = np.array([-0.4, -0.5]), np.array([0.4, -0.5])
@@ -118,6 +118,60 @@ def test_the_response_is_the_model_one_dead_time_later(hz, most):
     )
     model = solved.sol(np.maximum(flight.t - DEAD_TIME, 0.0))[0]
     assert np.abs(flight.c[..., 0] - model[:, None]).max() <= most
+
+
+UNLIKE = {
+    "quicker-pitch": ((0.073, 0.054), (0.057, 0.046)),
+    "quicker-roll": ((0.03, 0.02), (0.045, 0.05)),
+    "later-but-quicker": ((0.06, 0.015), (0.02, 0.06)),
+}
+
+
+@pytest.mark.parametrize("axes", UNLIKE.values(), ids=UNLIKE)
+@pytest.mark.parametrize("turn", [0.0, 1.5])
+def test_a_step_is_straight_where_roll_and_pitch_are_unlike(axes, turn):
+    """Led each by its own response; by the mean of the two it is not."""
+    (lag, dead_time), (pitch_lag, pitch_dead_time) = axes
+    own = following(
+        lag, dead_time, pitch_lag=pitch_lag, pitch_dead_time=pitch_dead_time, **SLOW_YAW
+    )
+    mean = following(0.5 * (lag + pitch_lag), 0.5 * (dead_time + pitch_dead_time), **SLOW_YAW)
+    bent = []
+    for planner in (own, mean):
+        plant = LagPlant(
+            attitudes(START, [0.7]),
+            [lag, pitch_lag, SLOW_YAW["yaw_lag"]],
+            [dead_time, pitch_dead_time, SLOW_YAW["yaw_dead_time"]],
+        )
+        flight = fly([planner], plant, lambda _: [Target(*GOAL, 0.7 + turn)], 150, 0.01)
+        bent.append(cross_track(flight))
+        assert flight.c[-1, 0] == pytest.approx(GOAL, abs=8e-3)
+    assert bent[0] <= 0.0025
+    assert bent[1] >= 4.0 * bent[0]
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.5])
+@pytest.mark.parametrize("pitch", [(0.0745, 0.0085, 0.73), (0.055, 0.02, 0.9)])
+def test_a_step_is_straight_behind_a_rate_loop_of_second_order(pitch, turn):
+    """PX4's roll, and pitch as roll or unlike it; told as of first order it bends more."""
+    roll, (lag, dead_time, damping) = (0.0745, 0.0085, 0.73), pitch
+    told = {"pitch_lag": lag, "pitch_dead_time": dead_time, "pitch_damping": damping, **SLOW_YAW}
+    as_first = {"pitch_lag": 0.63 * lag, "pitch_dead_time": dead_time + 0.4 * lag, **SLOW_YAW}
+    bent = []
+    for planner in (
+        following(*roll[:2], damping=roll[2], **told),
+        following(0.047, 0.04, **as_first),
+    ):
+        plant = SecondOrderPlant(
+            attitudes(START, [0.7]),
+            [roll[0], lag, SLOW_YAW["yaw_lag"]],
+            [roll[1], dead_time, SLOW_YAW["yaw_dead_time"]],
+            [roll[2], damping, 10.0],
+        )
+        flight = fly([planner], plant, lambda _: [Target(*GOAL, 0.7 + turn)], 350, 0.004)
+        bent.append(cross_track(flight))
+    assert bent[0] <= 0.0012
+    assert bent[1] >= 2.0 * bent[0]
 
 
 def test_uneven_samples_do_not_bend_the_line():
@@ -249,6 +303,25 @@ def test_a_heading_step_leaves_the_coefficients_alone():
     assert np.abs(flight.c - c).max() <= 1e-6
 
 
+@effort(max_examples=15, deadline=None)
+@given(st.floats(-3.1, 3.1), st.sampled_from([0.0, 0.02]))
+def test_like_axes_answer_alike_at_every_heading(heading, wait):
+    """Turned with the vehicle the answer is the same; of unlike axes, by half a turn."""
+    turn = math.pi if wait else heading
+    told = {"damping": 0.7, "pitch_lag": LAG + wait, "pitch_dead_time": DEAD_TIME + wait}
+    planner, turned = (following(**told, pitch_damping=0.7) for _ in range(2))
+    for c in ((0.0, 0.0), (0.05, 0.1), (0.15, 0.1)):
+        for _ in range(12):
+            answers = []
+            for each, angle in ((planner, 0.0), (turned, turn)):
+                rotate = np.array(
+                    [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+                )
+                q = quaternion(attitudes(rotate @ c, [angle])[0])
+                answers.append(each.rates(q, Target(*(rotate @ (0.3, -0.2)), angle), 0.01))
+            assert answers[0] == pytest.approx(answers[1], abs=1e-9)
+
+
 numbers = st.floats(-1.0, 1.0)
 quaternions = (
     st.tuples(numbers, numbers, numbers, numbers)
@@ -262,15 +335,19 @@ samples_of = st.tuples(
     st.one_of(st.none(), st.builds(BodyRates, *[st.floats(-30, 30)] * 3)),
 )
 delays = st.sampled_from([0.0, 0.004, 0.05, 0.4])
+axes = st.fixed_dictionaries(
+    {"lag": delays, "dead_time": delays, "pitch_lag": delays, "pitch_dead_time": delays},
+    optional={"damping": st.floats(0.3, 10.0), "pitch_damping": st.floats(0.3, 10.0)},
+)
 
 
 @effort(max_examples=60, deadline=None)
-@given(st.lists(samples_of, min_size=1, max_size=25), delays, delays, st.floats(0.1, 20.0))
+@given(st.lists(samples_of, min_size=1, max_size=25), axes, st.floats(0.1, 20.0))
 def test_whatever_comes_the_rates_are_finite_within_the_limits_and_those_of_minus_q(
-    sequence, lag, dead_time, gain
+    sequence, response, gain
 ):
     bounds = Limits(1.0, 2.0, 1.5)
-    planner, opposite = (following(lag, dead_time, gain, limits=bounds) for _ in range(2))
+    planner, opposite = (following(gain=gain, limits=bounds, **response) for _ in range(2))
     for q, target, dt, body_rates in sequence:
         rates = planner.rates(q, target, dt, body_rates)
         assert all(math.isfinite(rate) for rate in rates)

@@ -159,11 +159,12 @@ def test_without_timesync_no_age_is_told():
 def test_the_yaml_gives_each_axis_its_response_in_si(tmp_path):
     path = tmp_path / "vehicle.yaml"
     path.write_text(
-        "vehicle: {lag_ms: 20, dead_time_ms: 15, acceleration_limit_deg_s2: 1100, yaw_lag_ms: 64}\n"
+        "vehicle: {lag_ms: 20, dead_time_ms: 15, acceleration_limit_deg_s2: 1100, yaw_lag_ms: 64,\n"
+        "  damping: 0.7}\n"
     )
     roll, pitch, yaw = assembly.rate_loops(load(path))
-    assert roll == pitch == pytest.approx((0.02, 0.015, math.radians(1100)))
-    assert yaw == pytest.approx((0.064, 0.015, math.radians(1100)))
+    assert roll == pitch == RateLoop(0.02, 0.015, math.radians(1100), 0.7)
+    assert yaw == RateLoop(0.064, 0.015, math.radians(1100))
     path.write_text("flight: {takeoff_height_m: 5}\n")
     assert assembly.rate_loops(load(path)) == (RateLoop(), RateLoop(), RateLoop())
 

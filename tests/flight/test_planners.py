@@ -99,6 +99,14 @@ FIGURE_2 = {
 }
 """The step of the paper's figure 2, at several heights of its rectangle, without its rate limit."""
 
+SMALLER = {
+    "north_coefficient": 0.3,
+    "east_coefficient": 0.35,
+    "duration_s": 1.2,
+    "settle_s": 0.5,
+}
+"""Of a heavier vehicle, which has less thrust to spare."""
+
 
 def shipped_vehicle(loop):
     """What the configuration that ships for it says of this rate loop."""
@@ -127,6 +135,32 @@ def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop,
     assert across["model-following"] < 0.2 * across["first-order"]
     assert across["model-following"] < 0.2 * across["quaternion"]
     assert away["model-following"] < min(away["first-order"], away["quaternion"])
+
+
+def test_model_following_leads_unlike_axes_each_by_its_own(tmp_path):
+    """A heavier vehicle, slower in roll, flies straight; led by the mean of both it does not."""
+    yaw = {"yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}
+    pitch = {"pitch_lag_ms": 58.0, "pitch_dead_time_ms": 46.0}
+    told = {
+        "own": {"lag_ms": 75.0, "dead_time_ms": 51.0, **pitch, **yaw},
+        "mean": {"lag_ms": 66.5, "dead_time_ms": 48.5, **yaw},
+    }
+    across = {}
+    for name, vehicle in told.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        with mock_vehicle(folder, seed=3, sensors=NO_NOISE, airframe="unlike-axes") as mock:
+            summary = fly(
+                mock,
+                folder / "log",
+                vehicle=vehicle,
+                thrust={"hover_thrust": 0.59},
+                **(FIGURE_2 | {"corners": SMALLER}),
+            )
+        assert summary.result == "ok", summary.events
+        across[name] = summary.as_dict()["response"]["cross_axis_max"]
+    assert across["own"] < 0.007
+    assert across["mean"] > 1.8 * across["own"]
 
 
 @pytest.mark.slow

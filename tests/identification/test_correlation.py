@@ -123,6 +123,13 @@ def test_on_real_autopilots_any_flight_tells_the_same(autopilot, axis):
     assert told == pytest.approx([right] * 3, abs=0.0035)
 
 
+@pytest.mark.parametrize("flown", ["circle", "corners", "doublets"])
+def test_px4s_response_of_second_order_tells_a_shorter_dead_time(flown):
+    """Fitted on doublets: ω 19.6 rad/s, ζ 0.73, dead time 8.5 ms."""
+    found = dead_time_by_correlation(*recorded("px4", flown, 0), 2 * 0.73 / 19.6, damping=0.73)
+    assert found == pytest.approx(0.0085, abs=0.005)
+
+
 def test_what_something_else_moves_says_nothing():
     """Gusts as strong as a fifth of what was asked for."""
     times, commanded, _, rates = smooth_flight(0.03, 0.05)
