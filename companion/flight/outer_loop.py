@@ -102,12 +102,14 @@ def disturbance_bandwidth(config: Config) -> float:
 
 
 def hold_delay(config: Config) -> float:
-    """T, s: with a usual rate loop where the vehicle's is not known.
-
-    A command is held for a period of guidance: on average it acts half of one late.
-    """
-    delay = tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
+    """T, s: with a usual rate loop where the vehicle's is not known."""
+    delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+
+
+def _feedback_delay(config: Config) -> float:
+    """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
+    return tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
@@ -120,7 +122,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, hold_delay(config), drag),
+            gains=chain_gains(weights, _feedback_delay(config), drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,
