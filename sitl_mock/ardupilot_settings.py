@@ -7,7 +7,7 @@ from sitl_mock.ardupilot_thrust import specific_thrust
 from sitl_mock.config import AirframeConfig, AxisGains, RateLoopConfig
 
 BURST_MS = 5.6
-"""Wall time from burst to burst of the simulator's telemetry (measured: 5.4 to 5.8)."""
+"""Time from burst to burst of the simulator's telemetry (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
 """Specific thrust answers with this time constant (measured: 5 ms behind a dead time of 15 ms)."""
 

@@ -202,7 +202,9 @@ class Server:
         """
         self._base_wall += self._autopilot.effects.take_slip()
         elapsed_s = self._elapsed_us(self._autopilot.next_us) / 1e6
-        due = self._base_wall + in_burst(elapsed_s, self._settings.burst_ms * 1e-3)
+        due = self._base_wall + in_burst(
+            elapsed_s, self._settings.burst_ms * 1e-3 / self._settings.speed
+        )
         left = due - time.monotonic()
         if left < -MAX_LAG_S:
             self._rebase()

@@ -79,7 +79,7 @@ class MockSettings(Section):
     exact_rates: bool | None = None
     """Never skip a slot at the full rate, as PX4's loop does; null: only in lockstep."""
     burst_ms: NonNegative = 0.0
-    """In paced time the vehicle lives in bursts, one in this wall time, as ArduPilot's simulator
+    """In paced time the vehicle lives in bursts, one in this vehicle time, as ArduPilot's simulator
     does, whose default is 5.6; 0 = it does not."""
     prearm_delay_s: NonNegative = 4.5
     """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""

@@ -8,12 +8,14 @@ from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
 Known = Mapping[str, Sequence[float | None]]
-"""Lag (ms), dead time (ms) and acceleration limit (°/s²) by the axis's name, as configured."""
+"""Lag (ms), dead time (ms), acceleration limit (°/s²) and damping by axis, as configured."""
 
 _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _UNLIMITED = 100_000.0
 """Written where roll has a slew limit and this axis has none: null would mean that of roll."""
 _ALIKE_MS = 3.0
+_MOST_DAMPED = 2.0
+"""Beyond, the second lag is too short to tell."""
 _ALIKE_SLEW = 0.1
 """Roll and pitch that differ by less, as a share, have one slew limit."""
 
@@ -25,24 +27,28 @@ class AxisValues(NamedTuple):
         lag: ms.
         dead_time: ms.
         slew: °/s²; None without a limit.
+        damping: of second order; None in first order.
     """
 
     lag: float
     dead_time: float
     slew: float | None
+    damping: float | None = None
 
     def described(self) -> str:
         """In one line."""
         slew = "" if self.slew is None else f", slew {self.slew:.0f} °/s²"
-        return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}"
+        damping = "" if self.damping is None else f", damping {self.damping:.2f}"
+        return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
 
 
 def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
     """YAML that the configuration includes, a comment on how good each fit is above it.
 
     Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
-    a comment says so. Pitch is written where it differs from roll, a slew limit where one was
-    found, the lead of ArduPilot's frame with it, the hover thrust where the thrust map is good.
+    a comment says so. Pitch is written where it differs from roll, second order of the two where
+    that is nearer and nothing limits their acceleration, a slew limit where one was found, the lead
+    of ArduPilot's frame with it, the hover thrust where the thrust map is good.
 
     Args:
         vehicle: as identified.
@@ -59,7 +65,7 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
     if thrust is not None and thrust.is_good(gravity):
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
-    axes = {name: kept.get(name) or _found(each) for name, each in vehicle.axes.items()}
+    axes = {name: kept.get(name) or _found(name, each) for name, each in vehicle.axes.items()}
     lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     if vehicle.slews:
@@ -76,16 +82,19 @@ def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]
     faults = vehicle.faults()
     kept = {}
     for name in faults:
-        lag, dead_time, slew = known.get(name, (None, None, None))
+        lag, dead_time, slew, damping = known.get(name, (None, None, None, None))
         if lag is not None and dead_time is not None:
-            kept[name] = AxisValues(lag, dead_time, slew)
+            kept[name] = AxisValues(lag, dead_time, slew, damping)
     if len(faults) == len(vehicle.axes) or len(kept) < len(faults):
         raise BadFitError("; ".join(f"{name}: {reason}" for name, reason in faults.items()))
     return kept
 
 
-def _found(response: RateResponse) -> AxisValues:
-    slew = None if response.slew is None else degrees(response.slew)
+def _found(name: str, response: RateResponse) -> AxisValues:
+    slew, nearer = None if response.slew is None else degrees(response.slew), response.second_order
+    if name != "yaw" and nearer is not None and slew is None and nearer.damping <= _MOST_DAMPED:
+        lag = 2.0 * nearer.damping / nearer.frequency
+        return AxisValues(1e3 * lag, 1e3 * nearer.dead_time, None, nearer.damping)
     return AxisValues(1e3 * response.lag, 1e3 * response.dead_time, slew)
 
 
@@ -94,8 +103,12 @@ def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
     if _alike(roll, pitch):
         slews = [axis.slew for axis in (roll, pitch) if axis.slew is not None]
         slew = sum(slews) / len(slews) if slews else None
+        dampings = [axis.damping for axis in (roll, pitch) if axis.damping is not None]
         mean = AxisValues(
-            0.5 * (roll.lag + pitch.lag), 0.5 * (roll.dead_time + pitch.dead_time), slew
+            0.5 * (roll.lag + pitch.lag),
+            0.5 * (roll.dead_time + pitch.dead_time),
+            slew,
+            0.5 * sum(dampings) if dampings else None,
         )
         return _axis_keys("roll", mean)
     return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
@@ -106,6 +119,8 @@ def _alike(one: AxisValues, other: AxisValues) -> bool:
         if abs(one.slew - other.slew) > _ALIKE_SLEW * max(one.slew, other.slew):
             return False
     elif one.slew != other.slew:
+        return False
+    if (one.damping is None) != (other.damping is None):
         return False
     apart = max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
     return apart <= _ALIKE_MS
@@ -118,6 +133,8 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
     slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED
     if slew is not None:
         lines.append(f"  {prefix}acceleration_limit_deg_s2: {slew:.0f}")
+    if axis.damping is not None:
+        lines.append(f"  {prefix}damping: {axis.damping:.2f}")
     return lines
 
 

@@ -72,7 +72,7 @@ class RateResponse:
         slew: largest change of the rate that the autopilot asks of itself, rad/s², in front of the
             lag; None where the response shows none.
         fit: how good it is.
-        second_order: the model that is clearly nearer, where one is; the planner has no use for it.
+        second_order: the model that is clearly nearer, where one is.
     """
 
     dead_time: float

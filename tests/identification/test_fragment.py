@@ -41,9 +41,9 @@ VEHICLE = IdentifiedVehicle(ROLL, PITCH, YAW, MAP)
 
 
 IN_FORCE = {
-    "roll": (18.0, 19.0, 1100.0),
-    "pitch": (17.0, 19.0, 1000.0),
-    "yaw": (60.0, 158.0, 270.0),
+    "roll": (18.0, 19.0, 1100.0, None),
+    "pitch": (17.0, 19.0, 1000.0, None),
+    "yaw": (60.0, 158.0, 270.0, None),
 }
 
 
@@ -102,21 +102,37 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
+def test_roll_and_pitch_are_of_second_order_where_that_is_nearer():
+    roll = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
+    pitch = replace(PITCH, second_order=SecondOrderFit(17.3, 0.76, 0.007, 1.05, None, 0.998))
+    yaw = replace(YAW, second_order=SecondOrderFit(5.6, 0.94, 0.045, 0.92, None, 0.999))
+    vehicle = configured(IdentifiedVehicle(roll, pitch, yaw, MAP)).vehicle
+    assert vehicle.axes["roll"] == (pytest.approx(113.9), 6.0, None, 0.82)
+    assert vehicle.axes["pitch"] == (pytest.approx(87.9), 7.0, None, 0.76)
+    assert vehicle.axes["yaw"] == (370.0, 102.0, None, None)
+    alike = configured(IdentifiedVehicle(roll, roll, yaw, MAP)).vehicle
+    assert (alike.lag_ms, alike.damping, alike.pitch_lag_ms) == (pytest.approx(113.9), 0.82, None)
+    mixed = configured(IdentifiedVehicle(roll, PITCH, yaw, MAP)).vehicle
+    assert mixed.axes["pitch"] == (49.0, 42.0, None, None)  # of first order, unlike roll
+
+
 def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():
     vehicle = replace(VEHICLE, yaw=bad(YAW))
     axes = configured(vehicle, IN_FORCE).vehicle.axes
-    assert axes["yaw"] == (60.0, 158.0, 270.0)
+    assert axes["yaw"] == (60.0, 158.0, 270.0, None)
     assert axes["roll"][:2] == (47.5, 41.0)
     assert (
         "# yaw: kept from the configuration: lag 60.0 ms, dead time 158.0 ms, slew 270 °/s²; "
         "the fit is bad: poor fit: the model is off by 40% of the movement, at most 30% may be"
     ) in vehicle_fragment(vehicle, GRAVITY, IN_FORCE)
     axes = configured(replace(VEHICLE, pitch=bad(PITCH)), IN_FORCE).vehicle.axes
-    assert axes["pitch"] == (17.0, 19.0, 1000.0)
+    assert axes["pitch"] == (17.0, 19.0, 1000.0, None)
     assert axes["roll"][:2] == (46.0, 40.0)
 
 
-@pytest.mark.parametrize("known", [{}, {"yaw": (None, None, None)}, {"yaw": (370.0, None, None)}])
+@pytest.mark.parametrize(
+    "known", [{}, {"yaw": (None, None, None, None)}, {"yaw": (370.0, None, None, None)}]
+)
 def test_an_axis_of_which_nothing_is_known_is_not_left_to_roll(known):
     with pytest.raises(BadFitError, match=r"^yaw: poor fit"):
         vehicle_fragment(replace(VEHICLE, yaw=bad(YAW)), GRAVITY, known)

@@ -68,7 +68,10 @@ class MockVehicle:
         self.close()
         shipped = ROOT / "configs" / f"mock-{self.autopilot}.yaml"
         settings = merged(yaml.safe_load(shipped.read_text())["mock"], self._settings)
-        self._mock = _Mock(merged(settings, self._wind | {"gcs_port": 0}), folder.parent)
+        # As irregular as a real link; and each flight has its own luck, so that medians mean
+        # something.
+        own = {"gcs_port": 0, "exact_rates": False, "seed": 1 + len(self.flown)}
+        self._mock = _Mock(merged(settings, self._wind | own), folder.parent)
         link = {"endpoint": self._mock.endpoint, "lockstep": True}
         self.flown.append(started(self, merged(config, {"link": link}), folder, command, _PATIENT))
         return self.flown[-1]
