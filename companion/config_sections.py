@@ -133,9 +133,11 @@ class VehicleConfig(Section):
     """The same dead time for yaw; null: that of roll."""
     yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
     """The same limit for yaw; null: that of roll."""
-    yaw_frame_lead_ms: Milliseconds = 0.0
+    yaw_frame_lead_ms: Milliseconds | None = None
     """By how long the axes along which the autopilot takes our rates turn before the body does, in
-    yaw more than in tilt: ArduPilot's attitude target. 0: they are the body's own (PX4)."""
+    yaw more than in tilt: ArduPilot's attitude target. Used while ATTITUDE_TARGET does not tell
+    where they stand. null: as the times above say where acceleration is limited (ArduPilot), else
+    0: they are the body's own (PX4)."""
 
     @property
     def known(self) -> bool:

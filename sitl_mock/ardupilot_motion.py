@@ -34,6 +34,15 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
             dialect.MAVLINK_MSG_ID_SCALED_PRESSURE: self.scaled_pressure,
         }
 
+    def attitude_target(self) -> Message:
+        """Return ATTITUDE_TARGET: the attitude that rates turn before the body does, its rates."""
+        shaped = self._vehicle.attitude_target
+        if shaped is None:
+            return super().attitude_target()
+        return dialect.MAVLink_attitude_target_message(
+            self._boot_ms, 0, shaped.target, *shaped.rates, self._state.attitude_target.thrust
+        )
+
     def place_or_nothing(self) -> Message:
         """Return GLOBAL_POSITION_INT; without a position it is sent, too, full of zeros."""
         message = self.global_position_int()

@@ -7,7 +7,7 @@ from sitl_mock.config import AirframeConfig, RateLoopConfig
 from sitl_mock.physics import Load, Motion, advance, body_of, derivative
 from sitl_mock.quaternion import Quaternion, Vector
 from sitl_mock.rate_loop import RateLoop
-from sitl_mock.rate_shaping import RateShaping
+from sitl_mock.rate_shaping import RateShaping, Shaped
 from sitl_mock.rotors import STOPPED, Mix, Rotors, mix
 
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -86,6 +86,11 @@ class Multirotor:
     def body_rates(self) -> Vector:
         """Body rates after the latest step, rad/s, FRD."""
         return self.motion[7:]
+
+    @property
+    def shaped(self) -> Shaped | None:
+        """The attitude target that the body follows; None: it follows rates, or nothing."""
+        return None if self._shaping is None else self._shaping.shaped
 
     def throttle(self, specific_thrust: float) -> float:
         """Collective throttle that settles at a specific thrust (m/s^2), at most 1."""

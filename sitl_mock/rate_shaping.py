@@ -3,7 +3,7 @@
 ArduPilot's way with a body-rate setpoint. What comes out is the setpoint of the rate loop.
 """
 
-from math import atan2, exp, isnan, sqrt
+from math import atan2, copysign, inf, isnan, sqrt
 from typing import NamedTuple
 
 from sitl_mock.config import AxisShaping
@@ -22,15 +22,15 @@ class Shaped(NamedTuple):
     """Attitude target, body to world."""
 
 
-def nearer(goal: float, rate: float, share: float, most: float) -> float:
-    """The rate moved by a share of the way to its goal, by `most` at the farthest.
+def slewed(goal: float, rate: float, most: float) -> float:
+    """The rate moved to its goal, by `most` at the farthest.
 
     A NaN goal holds the rate. An infinite one is never reached: the rate runs away, as ArduPilot
     was measured to do.
     """
     if isnan(goal):
         return rate
-    change = share * (goal - rate)
+    change = goal - rate
     return rate + (most if change > most else -most if change < -most else change)
 
 
@@ -48,6 +48,17 @@ def rotation_vector(q: Quaternion) -> Vector:
     return scale * x, scale * y, scale * z
 
 
+def closing(angle: float, gain: float, acceleration: float) -> float:
+    """Rate that closes an angle: proportional, then so that it can stop at this deceleration.
+
+    ArduPilot's sqrt_controller.
+    """
+    linear = acceleration / (gain * gain) if gain > 0.0 else inf
+    if abs(angle) <= linear:
+        return gain * angle
+    return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear)), angle)
+
+
 class RateShaping:
     """The three axes, their delays before the shaping, and the attitude target they share.
 
@@ -56,18 +67,22 @@ class RateShaping:
         dt: step, s.
     """
 
-    __slots__ = ("_delay", "_dt", "_gains", "_most", "_shaped", "_shares")
+    __slots__ = ("_closing", "_delay", "_dt", "_most", "_shaped")
 
     def __init__(self, axes: tuple[AxisShaping, AxisShaping, AxisShaping], dt: float) -> None:
         self._dt = dt
         self._most = tuple(axis.acceleration_limit_rad_s2 * dt for axis in axes)
-        self._shares = tuple(
-            1.0 - exp(-dt / (axis.lag_ms * 1e-3)) if axis.lag_ms > 0.0 else 1.0 for axis in axes
+        self._closing = tuple(
+            (axis.attitude_gain_1_s, 0.5 * axis.acceleration_limit_rad_s2) for axis in axes
         )
-        self._gains = tuple(axis.attitude_gain_1_s for axis in axes)
         roll, pitch, yaw = axes
         self._delay = SetpointDelay((roll.delay_ms, pitch.delay_ms, yaw.delay_ms), dt)
         self._shaped: Shaped | None = None
+
+    @property
+    def shaped(self) -> Shaped | None:
+        """The attitude target after the latest step; None while nothing is controlled."""
+        return self._shaped
 
     def step(self, setpoint: Vector, q: Quaternion) -> Vector:
         """Body rates for the rate loop, rad/s, FRD.
@@ -78,11 +93,11 @@ class RateShaping:
         """
         goals = self._delay.step(setpoint)
         rates, target = self._shaped or Shaped(AT_REST, q)
-        share, most = self._shares, self._most
+        most = self._most
         rates = (
-            nearer(goals[0], rates[0], share[0], most[0]),
-            nearer(goals[1], rates[1], share[1], most[1]),
-            nearer(goals[2], rates[2], share[2], most[2]),
+            slewed(goals[0], rates[0], most[0]),
+            slewed(goals[1], rates[1], most[1]),
+            slewed(goals[2], rates[2], most[2]),
         )
         target = turned(target, rates, self._dt)
         self._shaped = Shaped(rates, target)
@@ -90,8 +105,12 @@ class RateShaping:
         ahead = multiply((w, -x, -y, -z), q)  # the body as the attitude target sees it
         turn_x, turn_y, turn_z = rotation_vector(ahead)
         roll, pitch, yaw = to_body(ahead, rates)
-        gain_x, gain_y, gain_z = self._gains
-        return roll - gain_x * turn_x, pitch - gain_y * turn_y, yaw - gain_z * turn_z
+        for_roll, for_pitch, for_yaw = self._closing
+        return (
+            roll - closing(turn_x, *for_roll),
+            pitch - closing(turn_y, *for_pitch),
+            yaw - closing(turn_z, *for_yaw),
+        )
 
     def idle(self, setpoint: Vector) -> None:
         """A step without control: the attitude target is forgotten, setpoints are delayed."""

@@ -75,6 +75,10 @@ class Estimator:
         self._offset = (n + position_ned[0], e + position_ned[1], d + position_ned[2])
         self.reset_counter += 1
 
+    def as_estimated(self, q: Quaternion) -> Quaternion:
+        """A true attitude in the world as it is believed to lie."""
+        return multiply(self._yaw, q)
+
     def estimate(self, time: float) -> Estimate:
         """The estimate now, at this time, s; draws fresh noise."""
         config = self._config
@@ -89,7 +93,7 @@ class Estimator:
         turn_x, turn_y, turn_z = self._noise(0.5 * radians(config.attitude_noise_deg))
         roll, pitch, heading = error.rotation
         tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), (w, x, y, z))
-        turned = multiply(multiply(self._yaw, tilted), (1.0, turn_x, turn_y, turn_z))
+        turned = multiply(self.as_estimated(tilted), (1.0, turn_x, turn_y, turn_z))
         gyro = _add((rates[0], rates[1], rates[2]), self._noise(config.rate_noise_rad_s))
         return Estimate(
             normalise(turned),

@@ -16,6 +16,7 @@ from sitl_mock.multirotor import ZERO, Multirotor
 from sitl_mock.navigation_filter import Snapshot
 from sitl_mock.physics import Load
 from sitl_mock.quaternion import Quaternion, Vector, from_yaw
+from sitl_mock.rate_shaping import Shaped
 from sitl_mock.rotors import Four
 from sitl_mock.sensors import Estimate, Estimator
 from sitl_mock.wind import Wind
@@ -154,6 +155,12 @@ class Vehicle:
     def estimate(self) -> Estimate:
         """What the autopilot believes now; every call draws fresh noise."""
         return self._estimator.estimate(self.time)
+
+    @property
+    def attitude_target(self) -> Shaped | None:
+        """The shaped attitude target in the world as estimated, and its rates; None: none."""
+        shaped = self._multirotor.shaped
+        return shaped and shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
         """An estimator reset: the estimate jumps by this yaw (rad) and position (m)."""

@@ -1,7 +1,7 @@
 """`model-following`: past the paper, a response that stays linear behind a real rate loop."""
 
 from dataclasses import replace
-from math import sqrt
+from math import cos, radians, sin, sqrt
 
 from companion.attitude.axis_lead import PITCH, ROLL, AxisLead, Turn
 from companion.attitude.constants import Constants
@@ -11,6 +11,7 @@ from companion.attitude.heading_model import HeadingModel
 from companion.attitude.history import History, PlannedTilt, PlannedYaw
 from companion.attitude.kinematics import (
     heading_of,
+    into_body,
     rates_to_speed,
     speed_to_rates,
     tilt_products,
@@ -18,14 +19,19 @@ from companion.attitude.kinematics import (
 from companion.attitude.margin import largest_gain
 from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.reference_model import ReferenceModel, model_lag
-from companion.attitude.representation import normalised, wrap_angle
+from companion.attitude.representation import is_unit, normalised, wrap_angle
 from companion.attitude.rotation import within, within_limits
+from companion.attitude.sample_hold import SampleHold
 from companion.attitude.target import admissible
+from companion.attitude.target_frame import TargetFrame
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
 from companion.attitude.yaw_model import YawModel
 
 SHARE_OF_LARGEST_GAIN = 0.25
 """Of the largest stable gain, at most this is fed back: a gain margin of 4, and no overshoot."""
+
+FURTHEST_AHEAD = radians(45.0)
+"""ArduPilot does not let its attitude target lead the body in yaw by more."""
 
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
 _FASTEST = 100.0  # rad/s
@@ -49,6 +55,9 @@ class ModelFollowingPlanner:
     still. It is foreseen from the yaw rates that were sent (`YawModel`), and the tilt rates are
     turned into the body as it will stand when they act.
 
+    The rates are those of the body's axes. Where the autopilot takes them along other axes, those
+    of its attitude target (`TargetFrame`), they are turned into these last.
+
     Past the recovery angle it answers as `first-order` does, and starts anew below it.
 
     Args:
@@ -63,7 +72,9 @@ class ModelFollowingPlanner:
         self._yaw = yaw
         self._lag = max(axis.lag for axis in tilt)
         self._dead_time = dead_time = max(axis.dead_time for axis in tilt)
-        self._frame_lead = response.frame_lead
+        self._frame_lead = response.lead
+        self._frame = TargetFrame(response)
+        self._hold = SampleHold()
         self._gain = min(_fed_back(constants.gain, axis) for axis in tilt)
         self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
@@ -105,6 +116,7 @@ class ModelFollowingPlanner:
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         """Begin the plan at `q`, a unit quaternion below the recovery angle."""
+        self._hold.restart()
         w, x, y, z = q
         square, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
@@ -119,6 +131,7 @@ class ModelFollowingPlanner:
         model.place(c, Coefficients(north, east))
         self._heading.place(heading, turn_rate)
         self._body.start(yaw_rate)
+        self._frame.forget()
         x, y, self._still = model.rates()
         self._time = 0.0
         self._past.start(
@@ -131,6 +144,18 @@ class ModelFollowingPlanner:
         )
         self._roll.advance(0.0, self._turn_when)
         self._pitch.advance(0.0, self._turn_when)
+
+    def note_attitude_target(self, q: Quaternion, age: float) -> None:
+        """The autopilot takes the rates along the axes of `q`, which stood so `age` s ago.
+
+        By the time of the newest sample. One that is not usable is passed over.
+        """
+        if not (self._started and is_unit(q)):
+            return
+        w, x, y, z = normalised(q)
+        square, _, _ = tilt_products(w, x, y, z)
+        if 2.0 * square - 1.0 >= self._constants.cos_recovery:
+            self._frame.note(heading_of(sqrt(square), w, z), age)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -156,8 +181,10 @@ class ModelFollowingPlanner:
             self._started = True
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
-        by_tilt = self._past.at(self._time - self._dead_time)
-        by_yaw = self._past_yaw.at(self._time - self._yaw.dead_time)
+        self._hold.take(dt)
+        now, dt = self._time + self._hold.late, self._hold.step
+        by_tilt = self._past.at(now - self._dead_time)
+        by_yaw = self._past_yaw.at(now - self._yaw.dead_time)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
@@ -166,11 +193,15 @@ class ModelFollowingPlanner:
             unforeseen = believed.yaw - by_yaw.turning
             heading += (self._dead_time + self._lag) * unforeseen
         heading += by_tilt.still - by_yaw.turned
+        ahead = self._frame_ahead(heading)
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
+        roll, pitch = self._hold.rates(roll, pitch)
+        ahead = 0.5 * (ahead + self._frame_ahead(heading))
+        roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
         return BodyRates(
             *within_limits(
-                roll + more_roll,
-                pitch + more_pitch,
+                roll,
+                pitch,
                 yaw,
                 constants.max_tilt_rate,
                 constants.max_yaw_rate,
@@ -217,6 +248,7 @@ class ModelFollowingPlanner:
         yaw = within(yaw, self._constants.max_yaw_rate)
         self._body.advance(yaw, dt)
         self._still = still_after
+        self._frame.advance(yaw, 0.5 * (still_before + still_after), dt)
         self._remember(x, y, 0.5 * (still_before + still_after) * dt, dt)
 
         return (
@@ -230,9 +262,30 @@ class ModelFollowingPlanner:
 
         What is planned for a time acts one dead time of the tilt later.
         """
-        acts = planned_for + self._dead_time + self._frame_lead
+        acts = planned_for + self._dead_time
         body = self._past_yaw.at(acts - self._yaw.dead_time)
         return Turn(body.turned - plan.still, body.turning - plan.z)
+
+    def _frame_ahead(self, heading: float) -> float:
+        """By how much the axes along which the rates are taken lead the body in yaw then, rad.
+
+        As they were told, else by their lead in time.
+
+        Args:
+            heading: of the body, but for what `_turn_when` says, rad.
+        """
+        told = self._frame.heading()
+        if told is not None:
+            ahead = wrap_angle(
+                told - heading - self._turn_when(self._time, self._past.newest).angle
+            )
+            if abs(ahead) <= FURTHEST_AHEAD:
+                return ahead
+        if self._frame_lead == 0.0:
+            return 0.0
+        acts = self._time + self._dead_time - self._yaw.dead_time
+        past = self._past_yaw
+        return past.at(acts + self._frame_lead).turned - past.at(acts).turned
 
     def _remember(self, x: float, y: float, stilled: float, dt: float) -> None:
         """Note the plan as it stands `dt` later; `stilled` rad of yaw keep its heading still."""

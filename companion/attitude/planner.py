@@ -30,6 +30,14 @@ class Planner(Protocol):
         """One step: rates in rad/s for attitude `q`; `dt` is the sample period in s."""
         ...
 
+    def note_attitude_target(self, q: Quaternion, age: float) -> None:
+        """The autopilot takes the rates along the axes of `q`, which stood so `age` s ago.
+
+        Told of autopilots that do so only (ArduPilot's attitude target, by ATTITUDE_TARGET); the
+        others take them along the body's.
+        """
+        ...
+
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Forget what was planned: after a gap, a change of mode, a jump of the estimate."""
         ...
@@ -64,6 +72,9 @@ class LawPlanner:
             self._admitted = admissible(target, self.constants.longest_target)
             self._asked = target if isinstance(target, tuple) else None
         return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
+
+    def note_attitude_target(self, q: Quaternion, age: float) -> None:
+        """Which axes the rates are taken along is not looked at."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Nothing is remembered, so there is nothing to forget."""
@@ -137,7 +148,7 @@ def _model_following(
     yaw_lag: float | None = None,
     yaw_dead_time: float | None = None,
     yaw_acceleration: float | None = None,
-    frame_lead: float = 0.0,
+    frame_lead: float | None = None,
     **options: Any,
 ) -> Planner:
     first_order = inf

@@ -36,8 +36,8 @@ class RateResponse:
     Attributes:
         roll, pitch, yaw: of each axis.
         frame_lead: s by which the axes along which the autopilot takes the rates are ahead of the
-            body in yaw: ArduPilot's attitude target turns before the body does. 0 where they are
-            the body's own (PX4).
+            body in yaw: ArduPilot's attitude target turns before the body does. None: what `lead`
+            makes of the rest.
 
     Raises:
         ValueError: a time is negative, longer than 1 s or not finite, or a limit not positive.
@@ -46,10 +46,11 @@ class RateResponse:
     roll: AxisResponse = AxisResponse()
     pitch: AxisResponse = AxisResponse()
     yaw: AxisResponse = AxisResponse()
-    frame_lead: float = 0.0
+    frame_lead: float | None = None
 
     def __post_init__(self) -> None:
-        _check_time("frame_lead", self.frame_lead)
+        if self.frame_lead is not None:
+            _check_time("frame_lead", self.frame_lead)
         axes = {"": self.roll, "pitch_": self.pitch, "yaw_": self.yaw}
         for prefix, axis in axes.items():
             _check_time(f"{prefix}lag", axis.lag)
@@ -61,6 +62,19 @@ class RateResponse:
     def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
         """Roll, pitch, yaw."""
         return self.roll, self.pitch, self.yaw
+
+    @property
+    def lead(self) -> float:
+        """`frame_lead`, or that of an autopilot that limits acceleration as ArduPilot does, s.
+
+        It turns the target as soon as roll and pitch begin to answer, and the body's yaw follows
+        one dead time and lag later. Without limits the axes are the body's own (PX4).
+        """
+        if self.frame_lead is not None:
+            return self.frame_lead
+        if self.yaw.acceleration == inf:
+            return 0.0
+        return max(0.0, self.yaw.dead_time + self.yaw.lag - self.tilt.dead_time)
 
     @property
     def tilt(self) -> AxisResponse:

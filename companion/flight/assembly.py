@@ -260,6 +260,7 @@ def assemble(
     lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
+    loop.attitude_target = lambda: link.state.attitude_target
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)

@@ -22,6 +22,7 @@ from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.mavlink.held_rates import HeldRates
+from companion.mavlink.records import AttitudeTarget
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.vehicle_clock import Misfit
 from companion.recording.trace import FlightTrace
@@ -62,6 +63,8 @@ class ControlLoop:
         resets: jumps of the estimate, which the planner does not see.
         ask_mode: called once a gap, when telemetry is back.
         is_same_vehicle: asked at each sample: whether it is of the vehicle that was checked.
+        attitude_target: asked at each sample: what the autopilot last told of the axes along which
+            it takes our rates, where these are not the body's.
         thrust: as it was last sent, 0..1.
         last_answer, last_sample: when a setpoint last left, and when a sample last came, s on our
             clock.
@@ -92,6 +95,7 @@ class ControlLoop:
         self.thrust = 0.0
         self.ask_mode: Callable[[], None] = lambda: None
         self.is_same_vehicle: Callable[[], bool] = lambda: True
+        self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
         self.last_answer = self.last_sample = -inf
         self.samples = self.setpoints = self.missed_deadlines = 0
         self.held = HeldRates()
@@ -107,6 +111,8 @@ class ControlLoop:
         self._limits = limits
         self._last_time = -inf
         self._planned_at = -inf
+        self._noted: AttitudeTarget | None = None
+        self._turn, self._turned_ms = 0.0, -1
         self._period = 0.0
         self._gap_from = inf
 
@@ -205,7 +211,23 @@ class ControlLoop:
             since = self._period or dt  # a gap says nothing of when the next sample comes
         self._period = since
         self._planned_at = sample.vehicle_time
+        self._note_attitude_target(sample)
         return self._planner.rates(q, target, since, sample.body_rates)
+
+    def _note_attitude_target(self, sample: AttitudeSample) -> None:
+        """Pass a new ATTITUDE_TARGET on to the planner, once a sample is as new as it is.
+
+        One from before a jump of the heading is in a frame that we cannot tell, and passed over.
+        """
+        if self.resets.turn != self._turn:
+            self._turn, self._turned_ms = self.resets.turn, sample.time_boot_ms
+        told = self.attitude_target()
+        if told is None or told is self._noted:
+            return
+        if self._turned_ms < told.time_boot_ms <= sample.time_boot_ms:
+            self._noted = told
+            age = 1e-3 * (sample.time_boot_ms - told.time_boot_ms)
+            self._planner.note_attitude_target(self.resets.attitude(told.q), age)
 
     def _note_arrival(self, sample: AttitudeSample) -> float:
         """Keep what the watch asks for; returns the sample period in s."""

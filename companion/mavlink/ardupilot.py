@@ -60,12 +60,14 @@ class ArduPilot:
             **FLIGHT_RATES,
             # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
             "HEARTBEAT": 10.0,
+            "ATTITUDE_TARGET": 50.0,  # it turns by up to 1 rad/s, as we foresee it but for a little
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
         }
     )
     interval_step_us = 1000
+    rates_along_target = True
     dead_man = DeadMan(
         "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
     )

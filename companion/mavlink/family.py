@@ -57,6 +57,8 @@ class AutopilotFamily(Protocol):
         bytewise_parameters: Whether integer parameters travel as bytes.
         wanted_rates: Messages the flight needs, with the rate to ask for, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL counts in whole multiples of this.
+        rates_along_target: Whether it takes body rates along the axes of ATTITUDE_TARGET, an
+            attitude that they turn before the body follows. Else along the body's own.
         dead_man: What it does when setpoints stop.
         unready_in: What the modes are to a flight in which it stands disarmed and never is ready.
         parameters: Those that matter to a flight by body rates.
@@ -69,6 +71,7 @@ class AutopilotFamily(Protocol):
     bytewise_parameters: bool
     wanted_rates: Mapping[str, float]
     interval_step_us: int
+    rates_along_target: bool
     dead_man: DeadMan
     unready_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]

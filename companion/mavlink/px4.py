@@ -86,6 +86,7 @@ class Px4:
         }
     )
     interval_step_us = 1
+    rates_along_target = False
     dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True)
     unready_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS

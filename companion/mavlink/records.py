@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from companion.attitude.types import Quaternion
+
 Vector = tuple[float, float, float]
 
 _LASTS = 5.0
@@ -119,6 +121,18 @@ class ToldThrust(NamedTuple):
 
     received: float
     thrust: float
+
+
+class AttitudeTarget(NamedTuple):
+    """ATTITUDE_TARGET: the attitude along whose axes the autopilot takes body rates.
+
+    Attributes:
+        time_boot_ms: The vehicle's time stamp as it came, ms since its boot.
+        q: Body FRD -> world NED, of unit length.
+    """
+
+    time_boot_ms: int
+    q: Quaternion
 
 
 class Gps(NamedTuple):

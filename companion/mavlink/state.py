@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from math import inf, isfinite
 
+from companion.attitude import Quaternion, is_unit
 from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.families import MULTIROTORS, family_for
@@ -11,6 +12,7 @@ from companion.mavlink.family import AutopilotFamily
 from companion.mavlink.readiness import Readiness
 from companion.mavlink.records import (
     GPS_FIX_3D,
+    AttitudeTarget,
     Battery,
     CurrentMode,
     Estimator,
@@ -47,6 +49,7 @@ class _Values:
     position: LocalPosition | None = None
     battery: Battery | None = None
     told_thrust: ToldThrust | None = None
+    attitude_target: AttitudeTarget | None = None
     global_position: GlobalPosition | None = None
     gps: Gps | None = None
     home: Home | None = None
@@ -68,6 +71,8 @@ class VehicleState(_Values):
         position: See `LocalPosition`; the newest by its own time stamp.
         battery: See `Battery`.
         told_thrust: See `ToldThrust`.
+        attitude_target: See `AttitudeTarget`; only of a family with `rates_along_target`. One that
+            is no unit quaternion is passed over.
         global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
         gps: See `Gps`.
         home: See `Home`.
@@ -299,6 +304,15 @@ class VehicleState(_Values):
         if 0.0 <= message.thrust <= 1.0:
             self.told_thrust = ToldThrust(self._clock(), message.thrust)
         elif not isfinite(message.thrust):
+            self._stats.non_finite += 1
+        family = self.family
+        if family is not None and family.rates_along_target:
+            self._take_attitude_target(message.time_boot_ms, tuple(message.q))
+
+    def _take_attitude_target(self, time_boot_ms: int, q: Quaternion) -> None:
+        if is_unit(q):
+            self.attitude_target = AttitudeTarget(time_boot_ms, q)
+        elif not all(map(isfinite, q)):
             self._stats.non_finite += 1
 
     def _on_global_position(self, message: Message) -> None:

@@ -201,6 +201,9 @@ class _Constant:
         """The constant rates."""
         return self._rates
 
+    def note_attitude_target(self, q: Quaternion, age: float) -> None:
+        """Whatever the axes."""
+
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Nothing to forget."""
 

@@ -1,51 +1,55 @@
 """`model-following` on an autopilot that takes the rates along an attitude target, as ArduPilot."""
 
+from math import inf, nan
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from companion.attitude import BodyRates, Target, make_planner
+from companion.attitude import BodyRates, Limits, Target, make_planner
+from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.target_frame import OLDEST, TargetFrame
 from tests.attitude.independent import attitudes, coefficients_of
 from tests.attitude.simulate import quaternion
 
 START, GOAL, HEADING = np.array([-0.4, -0.5]), np.array([0.4, -0.5]), 0.7
 LAG, YAW_LAG = 0.02, 0.12
+KP = 4.5
+LAGS = np.array([LAG, LAG, YAW_LAG])
 
 
-class TargetFrame:
-    """The target turns by lagged tilt rates and the yaw rate as commanded; the body lags in yaw.
+class LedByTarget:
+    """The target turns by the rates as commanded; the body follows by the lags of its own axes.
 
-    The body is the target turned back by δ about its z axis, δ̇ = ω_z,commanded − r, where r, the
-    body's own yaw rate, follows the command with the lag of yaw.
+    What the body aims at are the commanded rates, seen from its own axes, and the target.
     """
 
     def __init__(self, start):
-        self._target, self._tilt = start, np.zeros(2)
-        self._behind = self._yaw = 0.0
-
-    @property
-    def body(self):
-        return self._target * Rotation.from_rotvec([0.0, 0.0, -self._behind])
+        self.target = self.body = start
+        self._rates = np.zeros(3)
 
     @property
     def body_rates(self):
-        cosine, sine = np.cos(self._behind), np.sin(self._behind)
-        x, y = self._tilt
-        return BodyRates(cosine * x - sine * y, sine * x + cosine * y, self._yaw)
+        return BodyRates(*self._rates)
 
     def hold(self, command, seconds, steps=8):
         h = seconds / steps
         for _ in range(steps):
-            self._tilt = command[:2] + (self._tilt - command[:2]) * np.exp(-h / LAG)
-            self._yaw = command[2] + (self._yaw - command[2]) * np.exp(-h / YAW_LAG)
-            self._target = self._target * Rotation.from_rotvec([*(self._tilt * h), command[2] * h])
-            self._behind += (command[2] - self._yaw) * h
+            self.target = self.target * Rotation.from_rotvec(command * h)
+            ahead = self.body.inv() * self.target
+            aim = ahead.apply(command) + KP * ahead.as_rotvec()
+            self._rates = aim + (self._rates - aim) * np.exp(-h / LAGS)
+            self.body = self.body * Rotation.from_rotvec(self._rates * h)
 
 
-def cross_track(turn, **options):
-    planner = make_planner("model-following", 5.0, lag=LAG, yaw_lag=YAW_LAG, **options)
-    plant, off = TargetFrame(attitudes(START, HEADING)[0]), []
-    for _ in range(375):
+def cross_track(turn, tell=lambda planner, plant, n: None, **options):
+    limits = Limits(max_yaw_rate=1.0)
+    planner = make_planner(
+        "model-following", 5.0, limits=limits, lag=LAG, yaw_lag=YAW_LAG, **options
+    )
+    plant, off = LedByTarget(attitudes(START, HEADING)[0]), []
+    for n in range(375):
+        tell(planner, plant, n)
         rates = planner.rates(
             quaternion(plant.body), Target(*GOAL, HEADING + turn), 0.004, plant.body_rates
         )
@@ -54,15 +58,93 @@ def cross_track(turn, **options):
     return np.abs(off).max()
 
 
-def test_the_plants_body_turns_as_it_says():
-    plant = TargetFrame(attitudes(START, HEADING)[0])
-    plant.hold(np.array([0.5, -0.8, 0.6]), 0.1, 200)
-    before, rates = plant.body, np.array(plant.body_rates)
-    plant.hold(np.array([0.5, -0.8, 0.6]), 1e-4, 1)
-    assert (before.inv() * plant.body).as_rotvec() / 1e-4 == pytest.approx(rates, abs=2e-2)
+def truly(every, late=0):
+    """Tells the target at every so many samples, by so many samples too late."""
+    seen = []
+
+    def tell(planner, plant, n):
+        seen.append(quaternion(plant.target))
+        if n % every == 0 and n >= late:
+            planner.note_attitude_target(seen[n - late], 0.004 * late)
+
+    return tell
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.5])
 def test_the_lead_of_the_frame_keeps_the_line_straight(turn):
-    assert cross_track(turn, frame_lead=YAW_LAG) <= 3e-4
-    assert cross_track(turn) >= 0.01  # it is worth something
+    untold = cross_track(turn)
+    assert cross_track(turn, frame_lead=0.7 * (YAW_LAG - LAG)) <= 0.003
+    assert untold >= 0.005  # it is worth something
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.5])
+@pytest.mark.parametrize(("every", "late"), [(1, 0), (5, 0), (5, 2)])
+def test_a_target_that_is_told_keeps_it_straight_without_knowing_any_lead(turn, every, late):
+    assert cross_track(turn, truly(every, late)) <= 3e-3
+
+
+def test_what_is_told_counts_for_more_than_what_was_configured():
+    assert cross_track(0.0, truly(5), frame_lead=0.5) <= 6e-3
+
+
+def turned_away(plant, angle):
+    return quaternion(plant.target * Rotation.from_rotvec([0.0, 0.0, angle]))
+
+
+UNUSABLE = {
+    "not a number": lambda plant: ((nan, 0.0, 0.0, 0.0), 0.0),
+    "infinite": lambda plant: ((1.0, inf, 0.0, 0.0), 0.0),
+    "no rotation": lambda plant: ((0.5, 0.0, 0.0, 0.0), 0.0),
+    "zero": lambda plant: ((0.0, 0.0, 0.0, 0.0), 0.0),
+    "upside down": lambda plant: ((0.0, 1.0, 0.0, 0.0), 0.0),
+    "of the future": lambda plant: (turned_away(plant, 0.5), -0.01),
+    "too old": lambda plant: (turned_away(plant, 0.5), OLDEST + 0.01),
+    "of no known age": lambda plant: (turned_away(plant, 0.5), nan),
+    "far ahead of the body": lambda plant: (turned_away(plant, 1.0), 0.0),
+}
+
+
+@pytest.mark.parametrize("what", UNUSABLE)
+def test_a_target_that_is_not_usable_changes_nothing(what):
+    def tell(planner, plant, n):
+        planner.note_attitude_target(*UNUSABLE[what](plant))
+
+    options = {"frame_lead": YAW_LAG - LAG}
+    assert cross_track(0.0, tell, **options) == cross_track(0.0, **options)
+
+
+def test_one_that_is_told_no_more_is_used_no_more():
+    """It goes on by what is sent, for a while; then the lead in time serves."""
+    axis = AxisResponse(LAG, 0.015, inf)
+    frame = TargetFrame(RateResponse(axis, axis, axis))
+    assert frame.heading() is None
+    frame.note(1.0, 0.0)
+    assert frame.heading() == pytest.approx(1.0)
+    for n in range(1, 61):
+        frame.advance(0.5, 0.1, 0.004)
+        assert frame.heading() == pytest.approx(1.0 + 0.4 * 0.004 * n)
+    for _ in range(5):
+        frame.advance(0.5, 0.1, 0.004)
+    assert frame.heading() is None
+    frame.note(2.0, 0.0)
+    assert frame.heading() == pytest.approx(2.0 + 0.4 * 0.007)  # sent within the delay
+    frame.forget()
+    assert frame.heading() is None
+
+
+def test_it_turns_no_faster_than_the_slew_limit():
+    axis = AxisResponse(LAG, 0.0, 2.0)
+    frame = TargetFrame(RateResponse(axis, axis, axis))
+    frame.note(0.0, 0.0)
+    for _ in range(50):
+        frame.advance(0.4, 0.0, 0.004)
+    assert frame.heading() == pytest.approx(0.5 * 2.0 * 0.2**2, rel=0.03)
+
+
+def test_the_lead_is_derived_where_acceleration_is_limited():
+    """Yaw's dead time and lag, less the dead time of roll and pitch; 0 where nothing is limited."""
+    tilt, yaw = AxisResponse(0.02, 0.015, 20.0), AxisResponse(0.056, 0.143, 4.7)
+    assert RateResponse(tilt, tilt, yaw).lead == pytest.approx(0.184)
+    assert RateResponse(tilt, tilt, yaw, 0.04).lead == 0.04
+    assert RateResponse(tilt, tilt, yaw, 0.0).lead == 0.0
+    assert RateResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead == 0.0

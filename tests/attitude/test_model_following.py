@@ -84,7 +84,12 @@ def test_what_it_asks_changes_no_faster_than_the_autopilot_lets_it(acceleration)
     changes = []
     for most in (acceleration, np.inf):
         flight = stepped(
-            lambda most=most: following(limits=Limits(max_tilt_rate=W_M), acceleration=most), 100
+            lambda most=most: following(
+                limits=Limits(max_tilt_rate=W_M),
+                acceleration=most,
+                frame_lead=0.0,  # the plant takes the rates along its own axes
+            ),
+            100,
         )
         asked = np.diff(flight.commands[..., :2], axis=0, prepend=0.0)
         changes.append(np.hypot(*np.moveaxis(asked, 2, 0)).max() * 100)

@@ -12,6 +12,7 @@ from companion.flight.control_loop import ControlLoop, Deadlines
 from companion.flight.unanswered import Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
+from companion.mavlink.records import AttitudeTarget
 from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.vehicle_clock import VehicleClock
 from companion.recording.trace import FlightTrace
@@ -392,3 +393,54 @@ def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
         bench.sample(late=0.010)
     # The clock's rate is uncertain: by some 0.1 ms here.
     assert asked == pytest.approx([0.05, 0.1, 0.2, 0.2], abs=0.006)
+
+
+class NotingPlanner:
+    """What the loop passes on of ATTITUDE_TARGET: heading in rad, age in s."""
+
+    def __init__(self):
+        self.noted = []
+
+    def rates(self, *_):
+        return BodyRates(0.0, 0.0, 0.0)
+
+    def reset(self, *_):
+        pass
+
+    def note_attitude_target(self, q, age):
+        self.noted.append((2.0 * math.atan2(q[3], q[0]), age))
+
+
+def facing(heading):
+    return (math.cos(heading / 2.0), 0.0, 0.0, math.sin(heading / 2.0))
+
+
+def test_the_attitude_target_is_passed_on_once_with_its_age_at_the_sample():
+    bench = Bench(planner := NotingPlanner())
+    told = None
+    bench.loop.attitude_target = lambda: told
+    bench.run(3)
+    assert planner.noted == []
+    told = AttitudeTarget(3000 + 4 * 3 - 10, facing(0.3))
+    bench.run(3)
+    assert planner.noted == [(pytest.approx(0.3), pytest.approx(0.014))]
+    told = AttitudeTarget(3000 + 4 * 6 + 6, facing(0.4))  # newer than the coming sample
+    bench.run(1)
+    assert len(planner.noted) == 1
+    bench.run(2)
+    assert planner.noted[1:] == [(pytest.approx(0.4), pytest.approx(0.002))]
+
+
+def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
+    """What was told before the jump may be in either frame, and is passed over."""
+    bench = Bench(planner := NotingPlanner())
+    told = None
+    bench.loop.attitude_target = lambda: told
+    bench.run(3)
+    told = AttitudeTarget(3000 + 4 * 4, facing(0.3))
+    bench.run(1, q=facing(0.5))
+    assert bench.loop.resets.turn == pytest.approx(0.5)
+    assert planner.noted == []
+    told = AttitudeTarget(3000 + 4 * 5, facing(0.8))
+    bench.run(1, q=facing(0.5))
+    assert planner.noted == [(pytest.approx(0.3), pytest.approx(0.0))]

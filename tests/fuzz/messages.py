@@ -56,7 +56,7 @@ BUILDERS: dict[str, Callable[["Vehicle"], Any]] = {
     ),
     "EXTENDED_SYS_STATE": _landed,
     "ATTITUDE_TARGET": lambda v: dialect.MAVLink_attitude_target_message(
-        _ms(v), 0, [1.0, 0.0, 0.0, 0.0], *_rates(v), v.thrust
+        _ms(v), 0, list(v.q), *_rates(v), v.thrust
     ),
     "ODOMETRY": lambda v: dialect.MAVLink_odometry_message(
         _us(v), 1, 12, *v.position, v.q, *v.velocity, 0, 0, 0, [0.0] * 21, [0.0] * 21

@@ -215,7 +215,7 @@ class Telemetry:
     def _attitude_target(self):
         (p, q, r), thrust = self._vehicle.setpoint
         rates = {"body_roll_rate": p, "body_pitch_rate": q, "body_yaw_rate": r}
-        start = {"time_boot_ms": self.stamp_ms, "type_mask": 128, "q": [1, 0, 0, 0]}
+        start = {"time_boot_ms": self.stamp_ms, "type_mask": 0, "q": list(self._vehicle.body.q)}
         return {**start, **rates, "thrust": thrust}
 
     def _odometry(self):

@@ -44,6 +44,26 @@ def watching(kind):
             yield Scenario(f"{message} {field} is {value} in control", script, (ok,), (kind,))
 
 
+TARGETS = {
+    "is {value}": lambda value: says("ATTITUDE_TARGET", q=[value, 0.0, 0.0, 0.0]),
+    "is zero": lambda _: says("ATTITUDE_TARGET", q=[0.0] * 4),
+    "is of length 1.5": lambda _: says("ATTITUDE_TARGET", q=[1.5, 0.0, 0.0, 0.0]),
+    "is upside down": lambda _: says("ATTITUDE_TARGET", q=[0.0, 1.0, 0.0, 0.0]),
+    "looks backwards": lambda _: says("ATTITUDE_TARGET", q=[0.0, 0.0, 0.0, 1.0]),
+    "leads by 40 degrees": lambda _: says("ATTITUDE_TARGET", q=[0.93969, 0.0, 0.0, 0.34202]),
+    "has the stamp 0": lambda _: says("ATTITUDE_TARGET", time_boot_ms=0),
+    "has the last stamp there is": lambda _: says("ATTITUDE_TARGET", time_boot_ms=2**32 - 1),
+}
+
+
+def axes_of_the_rates():
+    """ArduPilot tells the axes along which it takes the rates; nonsense ends no flight."""
+    for what, lie in TARGETS.items():
+        value = VALUES[ARDUPILOT.name]
+        name = f"the attitude of ATTITUDE_TARGET {what.format(value=value)} in control"
+        yield Scenario(name, (("in control", 0.6, lie(value)),), (ok,), (ARDUPILOT,))
+
+
 def turned(factor):
     """The quaternion of each sample times `factor`, by the number of the sample."""
 
@@ -131,6 +151,6 @@ def test_a_number_is_none(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
 
 
-@flights((*ATTITUDES, *HOMES))
+@flights((*ATTITUDES, *HOMES, *axes_of_the_rates()))
 def test_attitudes_and_homes_that_are_none(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)

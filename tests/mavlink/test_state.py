@@ -56,6 +56,37 @@ def test_heartbeats(bench, base_mode, custom_mode, mode, armed):
     assert not state.failsafe
 
 
+ARDUPILOT_HEARTBEAT = dialect.MAVLink_heartbeat_message(2, 3, 217, 4, 4, 3)
+
+
+def told_target(q, stamp=5000):
+    return dialect.MAVLink_attitude_target_message(stamp, 0, q, 0.1, 0.2, 0.3, 0.4)
+
+
+def test_the_axes_of_the_rates_are_told_by_ardupilot_only(bench):
+    """PX4's message holds an old attitude while it is flown by rates."""
+    tilted = [0.8, 0.0, 0.6, 0.0]
+    assert bench.take(told_target(tilted)).attitude_target is None
+    bench.take(px4_heartbeat(0x00060000))
+    assert bench.take(told_target(tilted)).attitude_target is None
+    ardupilot = Bench()
+    ardupilot.take(ARDUPILOT_HEARTBEAT)
+    told = ardupilot.take(told_target(tilted)).attitude_target
+    assert told.time_boot_ms == 5000
+    assert told.q == pytest.approx(tilted)
+
+
+@pytest.mark.parametrize(
+    "q", [[math.nan] * 4, [math.inf, 0.0, 0.0, 0.0], [0.0] * 4, [1.5, 0.0, 0.0, 0.0]]
+)
+def test_an_attitude_target_that_is_none_is_passed_over(bench, q):
+    bench.take(ARDUPILOT_HEARTBEAT)
+    before = bench.take(told_target([1.0, 0.0, 0.0, 0.0])).attitude_target
+    state = bench.take(told_target(q, 5100))
+    assert state.attitude_target is before
+    assert bench.stats.non_finite == (0 if all(map(math.isfinite, q)) else 1)
+
+
 def px4_heartbeat(custom_mode, base_mode=157):
     return dialect.MAVLink_heartbeat_message(2, 12, base_mode, custom_mode, 4, 3)
 

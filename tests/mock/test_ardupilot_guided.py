@@ -9,6 +9,7 @@ from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.attitude_control import body_z
+from sitl_mock.quaternion import yaw
 from sitl_mock.wire import Framer
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -128,7 +129,7 @@ def test_the_angle_boost_divides_by_the_cosine_of_the_tilt(aloft):
         aloft.autopilot.parameters.set("ATC_ANGLE_BOOST", boost)
         thrust = HOVER / cos(radians(25.0)) if twice else HOVER
         aloft.rates(mask=7, q=tilted(25.0), thrust=thrust)
-        aloft.run(0.8)
+        aloft.run(1.0)
         assert tilt_deg(aloft) == pytest.approx(25.0, abs=1.0)
         felt = aloft.truth.acceleration_ned[2] + DRAG * aloft.truth.velocity_ned[2]
         assert felt == pytest.approx(down, abs=0.25), (boost, twice)
@@ -274,3 +275,25 @@ def test_the_heading_is_aligned_anew_in_each_flight():
         assert [text for text in rig.texts() if text in aligned] == aligned * flight
         assert rig.switch(LAND) == ACCEPTED
         rig.run_until(lambda: not rig.state.armed, 30.0)
+
+
+ATTITUDE_TARGET, SET_MESSAGE_INTERVAL = 83, 511
+
+
+def test_attitude_target_tells_the_axes_along_which_the_rates_are_taken():
+    """At the rate asked for; turned before the body, and along with the estimate when it jumps."""
+    rig = ArduRig(parameters=NO_BOOST)
+    rig.fly(3.0, yaw=0.5)
+    assert rig.command(SET_MESSAGE_INTERVAL, ATTITUDE_TARGET, 5000) == ACCEPTED
+    began = rig.time
+    rig.run(1.0)
+    told = rig.messages("ATTITUDE_TARGET", since=began)
+    assert len(told) == pytest.approx(200, abs=5)
+    assert told[-1].body_yaw_rate == pytest.approx(0.5)
+    lead = yaw(tuple(told[-1].q)) - yaw(rig.truth.q)
+    assert 0.5 * 0.08 < lead < 0.5 * 0.2
+    rig.autopilot.vehicle.shift_estimate(yaw=0.5)
+    rig.run(0.02)
+    assert yaw(tuple(rig.messages("ATTITUDE_TARGET")[-1].q)) - yaw(rig.truth.q) == pytest.approx(
+        lead + 0.5, abs=0.02
+    )

@@ -4,6 +4,7 @@ import multiprocessing
 import selectors
 import socket
 import time
+from contextlib import suppress
 
 SETPOINT = 82
 """SET_ATTITUDE_TARGET."""
@@ -17,6 +18,20 @@ def frames(data: bytes):
         end = at + 12 + data[at + 1] + (13 if data[at + 2] & 1 else 0)
         yield int.from_bytes(data[at + 7 : at + 10], "little"), data[at:end]
         at = data.find(b"\xfd", end)
+
+
+def connected(host: str, port: int, seconds: float) -> socket.socket:
+    """A TCP connection to a simulator that may not listen yet.
+
+    Raises:
+        AssertionError: nobody listens in all that time.
+    """
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        with suppress(OSError):
+            return socket.create_connection((host, port))
+        time.sleep(0.2)
+    raise AssertionError(f"nobody listens on {host}:{port} after {seconds} s")
 
 
 class Relay:
@@ -130,7 +145,7 @@ class _TcpPassing(_Passing):
 
     def __init__(self, vehicle_port: int, port: int, pipe) -> None:
         super().__init__(pipe)
-        self.vehicle = socket.create_connection((_HOST, vehicle_port))
+        self.vehicle = connected(_HOST, vehicle_port, 15.0)
         self.vehicle.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.listener = socket.create_server((_HOST, port))
         self.program: socket.socket | None = None

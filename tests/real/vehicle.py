@@ -3,12 +3,11 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from fcntl import LOCK_EX, flock
 from pathlib import Path
 
@@ -16,7 +15,7 @@ import yaml
 
 from tests.real.build import ROOT, Build, build_of, running
 from tests.real.dataflash import DataflashLog, newest_log
-from tests.real.relay import Relay
+from tests.real.relay import Relay, connected
 from tests.real.station import Station
 from tests.real.truth import Truth
 
@@ -60,8 +59,10 @@ class Vehicle:
         self.relay = Relay(self.autopilot, *PORTS[self.autopilot]) if relayed else None
         self.endpoint = build.endpoint if self.relay is None else self.relay.endpoint
         # ArduPilot boots when a client comes to its first port, and must keep it until it runs.
-        scheme, _, address = self.endpoint.partition("://")
-        first = _connected(address, build.ready_s) if scheme == "tcp" else nullcontext()
+        first = nullcontext()
+        if self.endpoint.startswith("tcp://"):
+            host, _, port = self.endpoint.removeprefix("tcp://").rpartition(":")
+            first = connected(host, int(port), build.ready_s)
         with first:
             self.station = Station(build)
             self.station.until(lambda: self.station.told, build.ready_s, "heartbeat")
@@ -256,14 +257,3 @@ def real_vehicle(
                 yield vehicle
             finally:
                 vehicle.close()
-
-
-def _connected(address: str, seconds: float) -> socket.socket:
-    """A connection to `host:port`, which may not listen yet."""
-    host, _, port = address.rpartition(":")
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        with suppress(OSError):
-            return socket.create_connection((host, int(port)))
-        time.sleep(0.2)
-    raise AssertionError(f"nobody listens on {address} after {seconds} s")
