@@ -21,6 +21,7 @@ from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.reference_model import ReferenceModel, model_lag
 from companion.attitude.representation import is_unit, normalised, wrap_angle
 from companion.attitude.rotation import within, within_limits
+from companion.attitude.sample_hold import SampleHold
 from companion.attitude.target import admissible
 from companion.attitude.target_frame import TargetFrame
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
@@ -73,6 +74,7 @@ class ModelFollowingPlanner:
         self._dead_time = dead_time = max(axis.dead_time for axis in tilt)
         self._frame_lead = response.lead
         self._frame = TargetFrame(response)
+        self._hold = SampleHold()
         self._gain = min(_fed_back(constants.gain, axis) for axis in tilt)
         self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
@@ -114,6 +116,7 @@ class ModelFollowingPlanner:
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         """Begin the plan at `q`, a unit quaternion below the recovery angle."""
+        self._hold.restart()
         w, x, y, z = q
         square, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
@@ -178,8 +181,10 @@ class ModelFollowingPlanner:
             self._started = True
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
-        by_tilt = self._past.at(self._time - self._dead_time)
-        by_yaw = self._past_yaw.at(self._time - self._yaw.dead_time)
+        self._hold.take(dt)
+        now, dt = self._time + self._hold.late, self._hold.step
+        by_tilt = self._past.at(now - self._dead_time)
+        by_yaw = self._past_yaw.at(now - self._yaw.dead_time)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
@@ -190,6 +195,7 @@ class ModelFollowingPlanner:
         heading += by_tilt.still - by_yaw.turned
         ahead = self._frame_ahead(heading)
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
+        roll, pitch = self._hold.rates(roll, pitch)
         ahead = 0.5 * (ahead + self._frame_ahead(heading))
         roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
         return BodyRates(
@@ -241,8 +247,8 @@ class ModelFollowingPlanner:
         )
         yaw = within(yaw, self._constants.max_yaw_rate)
         self._body.advance(yaw, dt)
-        self._frame.advance(yaw, 0.5 * (still_before + still_after), dt)
         self._still = still_after
+        self._frame.advance(yaw, 0.5 * (still_before + still_after), dt)
         self._remember(x, y, 0.5 * (still_before + still_after) * dt, dt)
 
         return (
@@ -256,7 +262,8 @@ class ModelFollowingPlanner:
 
         What is planned for a time acts one dead time of the tilt later.
         """
-        body = self._past_yaw.at(planned_for + self._dead_time - self._yaw.dead_time)
+        acts = planned_for + self._dead_time
+        body = self._past_yaw.at(acts - self._yaw.dead_time)
         return Turn(body.turned - plan.still, body.turning - plan.z)
 
     def _frame_ahead(self, heading: float) -> float:
@@ -265,19 +272,20 @@ class ModelFollowingPlanner:
         As they were told, else by their lead in time.
 
         Args:
-            heading: of the body, but for what it will have turned by then, rad.
+            heading: of the body, but for what `_turn_when` says, rad.
         """
-        acts = self._time + self._dead_time - self._yaw.dead_time
         told = self._frame.heading()
         if told is not None:
-            to_turn = self._past_yaw.at(acts).turned - self._past.newest.still
-            ahead = wrap_angle(told - heading - to_turn)
+            ahead = wrap_angle(
+                told - heading - self._turn_when(self._time, self._past.newest).angle
+            )
             if abs(ahead) <= FURTHEST_AHEAD:
                 return ahead
         if self._frame_lead == 0.0:
             return 0.0
-        led = self._past_yaw.at(acts + self._frame_lead)
-        return led.turned - self._past_yaw.at(acts).turned
+        acts = self._time + self._dead_time - self._yaw.dead_time
+        past = self._past_yaw
+        return past.at(acts + self._frame_lead).turned - past.at(acts).turned
 
     def _remember(self, x: float, y: float, stilled: float, dt: float) -> None:
         """Note the plan as it stands `dt` later; `stilled` rad of yaw keep its heading still."""

@@ -59,6 +59,11 @@ class RateResponse:
                 raise ValueError(f"{prefix}acceleration must be positive, not {axis.acceleration}")
 
     @property
+    def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
+        """Roll, pitch, yaw."""
+        return self.roll, self.pitch, self.yaw
+
+    @property
     def lead(self) -> float:
         """`frame_lead`, or that of an autopilot that limits acceleration as ArduPilot does, s.
 
@@ -70,11 +75,6 @@ class RateResponse:
         if self.yaw.acceleration == inf:
             return 0.0
         return max(0.0, self.yaw.dead_time + self.yaw.lag - self.tilt.dead_time)
-
-    @property
-    def axes(self) -> tuple[AxisResponse, AxisResponse, AxisResponse]:
-        """Roll, pitch, yaw."""
-        return self.roll, self.pitch, self.yaw
 
     @property
     def tilt(self) -> AxisResponse:

@@ -102,27 +102,27 @@ def disturbance_bandwidth(config: Config) -> float:
 
 
 def hold_delay(config: Config) -> float:
-    """T, s: with a usual rate loop where the vehicle's is not known.
-
-    A command is held for a period of guidance: on average it acts half of one late.
-    """
-    delay = tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
+    """T, s: with a usual rate loop where the vehicle's is not known."""
+    delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+
+
+def _feedback_delay(config: Config) -> float:
+    """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
+    return tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
     """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
-    # The feedback is held for a period: on average it acts half of one late.
-    slowness = tilt.slowness + 0.5 * period
     drag = drag_prior(config).drag.linear
     weights = _CALM if _identifies(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
         LinearSettings(
-            gains=chain_gains(weights, slowness, drag),
+            gains=chain_gains(weights, _feedback_delay(config), drag),
             height=HeightGains(
                 height=guidance.height_gain_per_s,
                 climb=guidance.climb_gain_per_s,

@@ -85,7 +85,9 @@ def test_what_it_asks_changes_no_faster_than_the_autopilot_lets_it(acceleration)
     for most in (acceleration, np.inf):
         flight = stepped(
             lambda most=most: following(
-                limits=Limits(max_tilt_rate=W_M), acceleration=most, frame_lead=0.0
+                limits=Limits(max_tilt_rate=W_M),
+                acceleration=most,
+                frame_lead=0.0,  # the plant takes the rates along its own axes
             ),
             100,
         )

@@ -28,6 +28,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 MAX_TILT_RATE, MAX_YAW_RATE = 90.0, 60.0  # °/s, the defaults of `limits`
 
 NO_NOISE = {
+    "ekf": "none",
     "attitude_noise_deg": 0.0,
     "rate_noise_rad_s": 0.0,
     "position_noise_m": 0.0,

@@ -261,6 +261,22 @@ def test_a_quaternion_of_nan_in_use_ends_the_process():
     assert rig.truth.position_ned == where
 
 
+def test_the_heading_is_aligned_anew_in_each_flight():
+    """ardupilot-circle-5ms.tlog and the others: at 2.67 to 2.88 m, told for both units."""
+    rig = ArduRig()
+    aligned = [f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete" for unit in (0, 1)]
+    for flight in (1, 2):
+        assert rig.switch(GUIDED) == ACCEPTED
+        assert rig.arm() == ACCEPTED
+        assert rig.start(4.0) == ACCEPTED
+        rig.run_until(lambda: rig.height > 2.5, 10.0)
+        assert [text for text in rig.texts() if text in aligned] == aligned * (flight - 1)
+        rig.run_until(lambda: rig.height > 3.2, 10.0)
+        assert [text for text in rig.texts() if text in aligned] == aligned * flight
+        assert rig.switch(LAND) == ACCEPTED
+        rig.run_until(lambda: not rig.state.armed, 30.0)
+
+
 ATTITUDE_TARGET, SET_MESSAGE_INTERVAL = 83, 511
 
 
@@ -281,19 +297,3 @@ def test_attitude_target_tells_the_axes_along_which_the_rates_are_taken():
     assert yaw(tuple(rig.messages("ATTITUDE_TARGET")[-1].q)) - yaw(rig.truth.q) == pytest.approx(
         lead + 0.5, abs=0.02
     )
-
-
-def test_the_heading_is_aligned_anew_in_each_flight():
-    """ardupilot-circle-5ms.tlog and the others: at 2.67 to 2.88 m, told for both units."""
-    rig = ArduRig()
-    aligned = [f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete" for unit in (0, 1)]
-    for flight in (1, 2):
-        assert rig.switch(GUIDED) == ACCEPTED
-        assert rig.arm() == ACCEPTED
-        assert rig.start(4.0) == ACCEPTED
-        rig.run_until(lambda: rig.height > 2.5, 10.0)
-        assert [text for text in rig.texts() if text in aligned] == aligned * (flight - 1)
-        rig.run_until(lambda: rig.height > 3.2, 10.0)
-        assert [text for text in rig.texts() if text in aligned] == aligned * flight
-        assert rig.switch(LAND) == ACCEPTED
-        rig.run_until(lambda: not rig.state.armed, 30.0)

@@ -75,7 +75,7 @@ def test_the_course_is_measured_and_nothing_else(flown):
 def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
     """Told without noise and without delay, the two are one."""
     names = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
-    vehicle(sensors={**dict.fromkeys(names, 0.0), "position_delay_ms": 0.0})
+    vehicle(sensors={**dict.fromkeys(names, 0.0), "position_delay_ms": 0.0, "ekf": "none"})
     tracked = flight.fly(TASKS[0])
     assert tracked.told.rms == pytest.approx(tracked.true.rms, abs=2e-3)
     assert tracked.true.rms < 0.03
