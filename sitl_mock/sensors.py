@@ -42,6 +42,7 @@ class Estimator:
         "_offset",
         "_position_delay",
         "_random",
+        "_rotation",
         "_yaw",
         "reset_counter",
     )
@@ -60,6 +61,7 @@ class Estimator:
         self._dt = dt
         self._random = Random(f"{seed}/sensors")
         self._yaw: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._rotation: Vector = (0.0, 0.0, 0.0)
         self._offset: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
         """Estimator resets since boot."""
@@ -76,13 +78,16 @@ class Estimator:
         self.reset_counter += 1
 
     def as_estimated(self, q: Quaternion) -> Quaternion:
-        """A true attitude in the world as it is believed to lie."""
-        return multiply(self._yaw, q)
+        """A true attitude in the world as the latest estimate believes it to lie."""
+        roll, pitch, heading = self._rotation
+        tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q)
+        return multiply(self._yaw, tilted)
 
     def estimate(self, time: float) -> Estimate:
         """The estimate now, at this time, s; draws fresh noise."""
         config = self._config
         error = self._error(time)
+        self._rotation = error.rotation
         attitude = self._history[-1 - self._attitude_delay]
         _, _, _, w, x, y, z, *rates = attitude.motion
         n, e, d = attitude.acceleration
@@ -91,9 +96,7 @@ class Estimator:
         n, e, d = _add(place.position, error.position)
         off_n, off_e, off_d = self._offset
         turn_x, turn_y, turn_z = self._noise(0.5 * radians(config.attitude_noise_deg))
-        roll, pitch, heading = error.rotation
-        tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), (w, x, y, z))
-        turned = multiply(self.as_estimated(tilted), (1.0, turn_x, turn_y, turn_z))
+        turned = multiply(self.as_estimated((w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
         gyro = _add((rates[0], rates[1], rates[2]), self._noise(config.rate_noise_rad_s))
         return Estimate(
             normalise(turned),

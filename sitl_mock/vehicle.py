@@ -160,7 +160,9 @@ class Vehicle:
     def attitude_target(self) -> Shaped | None:
         """The shaped attitude target in the world as estimated, and its rates; None: none."""
         shaped = self._multirotor.shaped
-        return shaped and shaped._replace(target=self._estimator.as_estimated(shaped.target))
+        if shaped is None:
+            return None
+        return shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
         """An estimator reset: the estimate jumps by this yaw (rad) and position (m)."""
