@@ -47,8 +47,9 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
 
     Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
     a comment says so. Pitch is written where it differs from roll, second order of the two where
-    that is nearer and nothing limits their acceleration, a slew limit where one was found, the lead
-    of ArduPilot's frame with it, the hover thrust where the thrust map is good.
+    that is nearer and nothing limits their acceleration, a slew limit where one was found (the
+    planner takes the lead of ArduPilot's frame from these times), the hover thrust where the thrust
+    map is good.
 
     Args:
         vehicle: as identified.
@@ -68,8 +69,6 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
     axes = {name: kept.get(name) or _found(name, each) for name, each in vehicle.axes.items()}
     lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
-    if vehicle.slews:
-        lines += _frame_lead(axes)
     return "\n".join(lines) + "\n"
 
 
@@ -136,17 +135,6 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
     if axis.damping is not None:
         lines.append(f"  {prefix}damping: {axis.damping:.2f}")
     return lines
-
-
-def _frame_lead(axes: Mapping[str, AxisValues]) -> list[str]:
-    """By how long the attitude target, which does not wait for the body, turns before it in yaw."""
-    tilt = 0.5 * (axes["roll"].dead_time + axes["pitch"].dead_time)
-    lead = max(axes["yaw"].lag + axes["yaw"].dead_time - tilt, 0.0)
-    return [
-        "  # Yaw's lag and dead time, less the dead time of roll and pitch: as acceleration is",
-        "  # limited, rates turn an attitude target (ArduPilot), which does not wait for the body.",
-        f"  yaw_frame_lead_ms: {lead:.1f}",
-    ]
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:

@@ -213,12 +213,6 @@ def test_fitting_is_announced_and_the_include_is_found_from_anywhere(capsys, fit
     assert err.startswith("fitting…")
 
 
-def test_where_acceleration_is_limited_the_lead_of_the_frame_follows_from_the_axes(capsys, fitted):
-    assert run(capsys, "--log", fitted)[0] == 0
-    vehicle = yaml.safe_load((fitted / "vehicle.yaml").read_text())["vehicle"]
-    assert vehicle["yaw_frame_lead_ms"] == 60.0 + 158.0 - 18.0
-
-
 def test_an_axis_that_is_not_good_is_kept_from_the_flights_configuration(capsys, tmp_path):
     shutil.copy(RECORDINGS / "px4-rate-steps.tlog", tmp_path / "flight.tlog")
     known = {"lag_ms": 18.0, "dead_time_ms": 19.0, "yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}

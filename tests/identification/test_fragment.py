@@ -62,7 +62,7 @@ def test_the_configuration_takes_it():
     assert (vehicle.lag_ms, vehicle.dead_time_ms) == (47.5, 41.0)
     assert (vehicle.yaw_lag_ms, vehicle.yaw_dead_time_ms) == (370.0, 102.0)
     assert (vehicle.pitch_lag_ms, vehicle.pitch_dead_time_ms) == (None, None)  # as roll
-    assert vehicle.yaw_frame_lead_ms == 0.0
+    assert vehicle.yaw_frame_lead_ms is None  # it follows from the times of the axes
     assert vehicle.acceleration_limit_deg_s2 is None
     assert vehicle.yaw_acceleration_limit_deg_s2 is None
     assert config.thrust.hover_thrust == pytest.approx((GRAVITY - 0.22) / 19.55, abs=5e-4)
@@ -78,8 +78,6 @@ def test_a_slew_limit_is_taken_where_one_was_found():
     vehicle = configured(limited).vehicle
     assert vehicle.acceleration_limit_deg_s2 == pytest.approx(np.degrees(19.2), abs=0.5)
     assert vehicle.yaw_acceleration_limit_deg_s2 == pytest.approx(np.degrees(4.7), abs=0.5)
-    # Yaw's 370 + 102 ms less the 41 ms of roll and pitch: the attitude target waits for neither.
-    assert vehicle.yaw_frame_lead_ms == pytest.approx(431.0, abs=0.1)
 
 
 def test_an_axis_without_a_slew_limit_does_not_inherit_that_of_roll():
