@@ -100,18 +100,13 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
-def test_roll_and_pitch_are_of_second_order_where_that_is_nearer():
-    roll = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
-    pitch = replace(PITCH, second_order=SecondOrderFit(17.3, 0.76, 0.007, 1.05, None, 0.998))
-    yaw = replace(YAW, second_order=SecondOrderFit(5.6, 0.94, 0.045, 0.92, None, 0.999))
-    vehicle = configured(IdentifiedVehicle(roll, pitch, yaw, MAP)).vehicle
-    assert vehicle.axes["roll"] == (pytest.approx(113.9), 6.0, None, 0.82)
-    assert vehicle.axes["pitch"] == (pytest.approx(87.9), 7.0, None, 0.76)
-    assert vehicle.axes["yaw"] == (370.0, 102.0, None, None)
-    alike = configured(IdentifiedVehicle(roll, roll, yaw, MAP)).vehicle
-    assert (alike.lag_ms, alike.damping, alike.pitch_lag_ms) == (pytest.approx(113.9), 0.82, None)
-    mixed = configured(IdentifiedVehicle(roll, PITCH, yaw, MAP)).vehicle
-    assert mixed.axes["pitch"] == (49.0, 42.0, None, None)  # of first order, unlike roll
+def test_a_second_order_that_is_nearer_is_not_written_but_a_configured_one_is_kept():
+    nearer = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
+    assert configured(replace(VEHICLE, roll=nearer)).vehicle.damping is None
+    known = {"roll": (74.5, 8.5, None, 0.73)}
+    axes = configured(replace(VEHICLE, roll=bad(ROLL)), known).vehicle.axes
+    assert axes["roll"] == (74.5, 8.5, None, 0.73)
+    assert axes["pitch"] == (49.0, 42.0, None, None)
 
 
 def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():
