@@ -236,9 +236,10 @@ class GuidanceConfig(Section):
     """How often guidance makes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
-    makes a stiffer hold. The gains follow from it (LQR). null: 1/T⁴, T the delay of the attitude
-    by planner.gain_per_s, `vehicle` (0.12 s where it is not known) and half a period of
-    guidance."""
+    makes a stiffer hold. The gains follow from it (LQR). null: 2/T⁴ where dead time and
+    half the lag are 65 ms at most, 1/T⁴ from 80 ms on or where they are not known; T is the
+    delay of the attitude by planner.gain_per_s, `vehicle` (0.12 s where it is not known) and
+    half a period of guidance."""
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
     """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None

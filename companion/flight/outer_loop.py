@@ -35,6 +35,8 @@ _CALM_BANDWIDTH = 1.0
 """Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
 _USUAL_RATE_LOOP = 0.12
 """Lag and dead time of a rate loop that nobody identified, s: a heavy vehicle's."""
+_QUICK, _SLOW = 0.065, 0.08
+"""Up to the first dead time with half the lag, s, the hold is stiffer; from the second on not."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
 _POSITION_PULL = 4.0
@@ -85,12 +87,16 @@ def hold_weights(config: Config) -> Weights:
     """The weights of the hold; those that are not told follow from the attitude's delay T.
 
     With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
-    own. `tests/flight/test_margins.py` shows what may be wrong with T and with the thrust then.
+    own. A quick rate loop allows twice the first of them. `tests/flight/test_margins.py` shows what
+    may be wrong with T and with the thrust then.
     """
     guidance, delay = config.guidance, hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
+    lag, dead_time = slower_tilt(config)
+    rate_loop = dead_time + 0.5 * lag if config.vehicle.known else _SLOW
+    quick = min(max(0.0, (_SLOW - rate_loop) / (_SLOW - _QUICK)), 1.0)
     return Weights(
-        1.0 / delay**4 if position is None else position,
+        (1.0 + quick) / delay**4 if position is None else position,
         1.0 / delay**2 if velocity is None else velocity,
     )
 

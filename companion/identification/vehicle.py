@@ -38,11 +38,6 @@ class IdentifiedVehicle:
         """The responses by the axis's name."""
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
-    @property
-    def slews(self) -> bool:
-        """Whether a slew limit was found on any axis."""
-        return any(response.slew is not None for response in self.axes.values())
-
     def faults(self) -> dict[str, str]:
         """Why which axis must not be used; empty if all of them may be."""
         reasons = {name: response.reason() for name, response in self.axes.items()}

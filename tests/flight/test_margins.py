@@ -43,7 +43,9 @@ def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     weights = hold_weights(config)
     nobody_knows = hold_weights(parse("{}", "test", Config))
     assert nobody_knows.position == pytest.approx(0.33**-4)
-    assert (weights.position, weights.velocity) == pytest.approx((delay**-4, delay**-2))
+    assert (weights.position, weights.velocity) == pytest.approx((2.0 * delay**-4, delay**-2))
+    heavy = believed(*VEHICLES[-1])
+    assert hold_weights(heavy).position == pytest.approx(hold_delay(heavy) ** -4)
     assert disturbance_bandwidth(config) == pytest.approx(1.5 / delay)
     told = believed(
         47.0,

@@ -62,7 +62,7 @@ def test_the_configuration_takes_it():
     assert (vehicle.lag_ms, vehicle.dead_time_ms) == (47.5, 41.0)
     assert (vehicle.yaw_lag_ms, vehicle.yaw_dead_time_ms) == (370.0, 102.0)
     assert (vehicle.pitch_lag_ms, vehicle.pitch_dead_time_ms) == (None, None)  # as roll
-    assert vehicle.yaw_frame_lead_ms == 0.0
+    assert vehicle.yaw_frame_lead_ms is None  # it follows from the times of the axes
     assert vehicle.acceleration_limit_deg_s2 is None
     assert vehicle.yaw_acceleration_limit_deg_s2 is None
     assert config.thrust.hover_thrust == pytest.approx((GRAVITY - 0.22) / 19.55, abs=5e-4)
@@ -78,8 +78,6 @@ def test_a_slew_limit_is_taken_where_one_was_found():
     vehicle = configured(limited).vehicle
     assert vehicle.acceleration_limit_deg_s2 == pytest.approx(np.degrees(19.2), abs=0.5)
     assert vehicle.yaw_acceleration_limit_deg_s2 == pytest.approx(np.degrees(4.7), abs=0.5)
-    # Yaw's 370 + 102 ms less the 41 ms of roll and pitch: the attitude target waits for neither.
-    assert vehicle.yaw_frame_lead_ms == pytest.approx(431.0, abs=0.1)
 
 
 def test_an_axis_without_a_slew_limit_does_not_inherit_that_of_roll():
@@ -102,18 +100,13 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
-def test_roll_and_pitch_are_of_second_order_where_that_is_nearer():
-    roll = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
-    pitch = replace(PITCH, second_order=SecondOrderFit(17.3, 0.76, 0.007, 1.05, None, 0.998))
-    yaw = replace(YAW, second_order=SecondOrderFit(5.6, 0.94, 0.045, 0.92, None, 0.999))
-    vehicle = configured(IdentifiedVehicle(roll, pitch, yaw, MAP)).vehicle
-    assert vehicle.axes["roll"] == (pytest.approx(113.9), 6.0, None, 0.82)
-    assert vehicle.axes["pitch"] == (pytest.approx(87.9), 7.0, None, 0.76)
-    assert vehicle.axes["yaw"] == (370.0, 102.0, None, None)
-    alike = configured(IdentifiedVehicle(roll, roll, yaw, MAP)).vehicle
-    assert (alike.lag_ms, alike.damping, alike.pitch_lag_ms) == (pytest.approx(113.9), 0.82, None)
-    mixed = configured(IdentifiedVehicle(roll, PITCH, yaw, MAP)).vehicle
-    assert mixed.axes["pitch"] == (49.0, 42.0, None, None)  # of first order, unlike roll
+def test_a_second_order_that_is_nearer_is_not_written_but_a_configured_one_is_kept():
+    nearer = replace(ROLL, second_order=SecondOrderFit(14.4, 0.82, 0.006, 1.08, None, 0.998))
+    assert configured(replace(VEHICLE, roll=nearer)).vehicle.damping is None
+    known = {"roll": (74.5, 8.5, None, 0.73)}
+    axes = configured(replace(VEHICLE, roll=bad(ROLL)), known).vehicle.axes
+    assert axes["roll"] == (74.5, 8.5, None, 0.73)
+    assert axes["pitch"] == (49.0, 42.0, None, None)
 
 
 def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so():
