@@ -157,3 +157,23 @@ def test_without_telemetry_nothing_is_sent_and_the_autopilot_levels_by_itself(tm
     assert state["last_setpoint"] == left["last_setpoint"]
     assert (state["armed"], state["mode"], state["crashed"]) == (True, "GUIDED", False)
     assert max(map(abs, state["q"][1:3])) < 0.02
+
+
+def test_the_step_past_level_is_straight_by_what_attitude_target_tells(tmp_path):
+    """The axes of the rates lead the body by up to 8°; without ATTITUDE_TARGET it bends by 0.03."""
+    with mock_vehicle(tmp_path, autopilot="ardupilot", seed=7) as mock:
+        summary = fly(
+            mock,
+            tmp_path / "log",
+            vehicle=VEHICLE["vehicle"] | {"yaw_frame_lead_ms": 0.0},
+            flight={"programme": ["corners"], "takeoff_height_m": 3.0},
+            corners={
+                "north_coefficient": 0.4,
+                "east_coefficient": 0.5,
+                "duration_s": 1.2,
+                "settle_s": 0.5,
+            },
+            limits={"max_tilt_deg": 45, "max_tilt_rate_deg_s": 400},
+        )
+    assert summary.result == "ok", summary.events
+    assert summary.response().cross_axis_max < 0.008
