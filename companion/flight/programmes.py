@@ -156,7 +156,8 @@ def _follow(config: Config) -> Follow:
             raise ConfigError(f"{path}: {error}") from error
     elif broken := violations(trajectory, envelope):
         first = min(broken, key=lambda one: one.slowing_helps)
-        raise ConfigError(f"{path}: {first}; {first.remedy}{assumption(config)}")
+        drag = assumption(config) if first.slowing_helps else ""
+        raise ConfigError(f"{path}: {first}; {first.remedy}{drag}")
     return Follow(trajectory, radians(config.limits.max_yaw_rate_deg_s), factor)
 
 

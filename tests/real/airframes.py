@@ -14,11 +14,13 @@ class Airframe:
         px4: parameters of PX4 and of its simulator (SIH).
         ardupilot: parameters of ArduCopter.
         mock: keys of the mock's section.
+        estimated: whether it is flown by the autopilot's estimator.
     """
 
     px4: dict[str, float] = field(default_factory=dict)
     ardupilot: dict[str, float] = field(default_factory=dict)
     mock: dict = field(default_factory=dict)
+    estimated: bool = True
 
     def arguments(self, autopilot: str, folder: Path) -> list[str]:
         """Of the autopilot's `start`; parameters of ArduPilot go by a file in `folder`."""
@@ -35,7 +37,7 @@ AIRFRAMES = {
     "stock": Airframe(),
     # The stock one, flown on the simulator's own state: what is left of an error is not the
     # estimator's.
-    "true-state": Airframe(ardupilot={"AHRS_EKF_TYPE": 10}),
+    "true-state": Airframe(ardupilot={"AHRS_EKF_TYPE": 10}, estimated=False),
     "unlike": Airframe(
         px4={"SIH_MASS": 1.2, "SIH_IXX": 0.04, "SIH_IYY": 0.03, "SIH_KDV": 0.5},
     ),

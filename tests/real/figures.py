@@ -15,7 +15,7 @@ import yaml
 
 from tests.real import table
 from tests.real.airframes import AIRFRAMES, Airframe
-from tests.real.flights import PARTS, VARIANTS
+from tests.real.flights import ESTIMATORS, PARTS, VARIANTS
 from tests.real.flown import Flying
 from tests.real.incidents import INCIDENTS
 from tests.real.mock_vehicle import MockVehicle
@@ -59,8 +59,10 @@ def fly(
     folder = folder.resolve()
     folder.mkdir(parents=True)
     rows: list[dict] = []
-    with simulation(name, folder, AIRFRAMES[airframe], start or [], fifo) as vehicle:
-        flying = Flying(vehicle, changes or {}, base or [])
+    vehicle_flown = AIRFRAMES[airframe]
+    told = ESTIMATORS[name.removeprefix("mock-")] if vehicle_flown.estimated else {}
+    with simulation(name, folder, vehicle_flown, start or [], fifo) as vehicle:
+        flying = Flying(vehicle, merged(told, changes or {}), base or [])
         for asked in flights:
             flight, _, times = asked.partition("*")
             for _ in range(int(times or 1)):

@@ -22,6 +22,14 @@ SIMULATION = {
 }
 """What any flight in a simulation changes."""
 
+ESTIMATORS = {
+    "px4": {},
+    # Its simulated GPS is later than its estimator takes it to be: fitted to the truth of five
+    # flights. It belongs to this simulator, so the configuration that ships says 0.
+    "ardupilot": {"guidance": {"position_lateness_ms": 23.0}},
+}
+"""What is told of an autopilot's estimator in its simulation."""
+
 CORNERS = {
     "limits": {"max_tilt_deg": 45.0},
     # Open loop, it flies some metres per corner and up to 9 m/s; what the autopilot does should we
