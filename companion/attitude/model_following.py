@@ -199,13 +199,7 @@ class ModelFollowingPlanner:
         ahead = 0.5 * (ahead + self._frame_ahead(heading))
         roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
         return BodyRates(
-            *within_limits(
-                roll,
-                pitch,
-                yaw,
-                constants.max_tilt_rate,
-                constants.max_yaw_rate,
-            )
+            *within_limits(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
         )
 
     def _feedback(
@@ -248,9 +242,9 @@ class ModelFollowingPlanner:
         yaw = within(yaw, self._constants.max_yaw_rate)
         self._body.advance(yaw, dt)
         self._still = still_after
-        self._frame.advance(yaw, 0.5 * (still_before + still_after), dt)
-        self._remember(x, y, 0.5 * (still_before + still_after) * dt, dt)
-
+        still = 0.5 * (still_before + still_after)
+        self._frame.advance(yaw, still, dt)
+        self._remember(x, y, still * dt, dt)
         return (
             self._roll.command(self._time, dt, heading, self._turn_when),
             self._pitch.command(self._time, dt, heading, self._turn_when),
