@@ -232,7 +232,7 @@ class Guide:
 
     def _distance(self, reference: Reference, motion: VehicleMotion) -> float | None:
         distance = dist(reference.position_ned, motion.position_ned)
-        self._astray = not reference.closed_loop or (self._astray and distance > _REJOINED)
+        self._astray = not reference.position_is_meant or (self._astray and distance > _REJOINED)
         return None if self.pose is None or self._astray else distance
 
     def _situation(self, now: float) -> Situation:
@@ -276,6 +276,6 @@ class Guide:
         self, vehicle_time: float, reference: Reference, motion: VehicleMotion
     ) -> None:
         north, east, down = reference.position_ned
-        if not reference.closed_loop:
+        if not reference.position_is_meant:
             north = east = nan  # open loop: only the height is meant
         self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

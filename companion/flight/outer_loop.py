@@ -39,9 +39,10 @@ _QUICK, _SLOW = 0.065, 0.08
 """Up to the first dead time with half the lag, s, the hold is stiffer; from the second on not."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
-_POSITION_PULL = 4.0
-"""How much a position tells of the velocity, 1/s: the velocities of real estimators are off by
-0.05 m/s for seconds, measured on PX4 and ArduPilot against truth."""
+_POSITION_PULL = 4.0, 12.0
+"""How much a position tells of the velocity, 1/s, behind a slow and behind a quick rate loop: the
+velocities of real estimators are off by 0.05 m/s for seconds, measured on PX4 and ArduPilot against
+truth."""
 _CORRECTS_WITHIN = 0.65
 """Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
 _CORRECTION_WINDOW = 0.1
@@ -92,13 +93,23 @@ def hold_weights(config: Config) -> Weights:
     """
     guidance, delay = config.guidance, hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
-    lag, dead_time = slower_tilt(config)
-    rate_loop = dead_time + 0.5 * lag if config.vehicle.known else _SLOW
-    quick = min(max(0.0, (_SLOW - rate_loop) / (_SLOW - _QUICK)), 1.0)
     return Weights(
-        (1.0 + quick) / delay**4 if position is None else position,
+        (1.0 + _quickness(config)) / delay**4 if position is None else position,
         1.0 / delay**2 if velocity is None else velocity,
     )
+
+
+def _quickness(config: Config) -> float:
+    """Of the rate loop: 1 up to `_QUICK`, 0 from `_SLOW` on and where nobody identified it."""
+    if not config.vehicle.known:
+        return 0.0
+    lag, dead_time = slower_tilt(config)
+    return min(max(0.0, (_SLOW - dead_time - 0.5 * lag) / (_SLOW - _QUICK)), 1.0)
+
+
+def _position_pull(config: Config) -> float:
+    slow, quick = _POSITION_PULL
+    return slow + _quickness(config) * (quick - slow)
 
 
 def disturbance_bandwidth(config: Config) -> float:
@@ -156,7 +167,7 @@ def motion_estimate(
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
     settings = ObserverSettings(
-        bandwidth, _POSITION_TIME, _POSITION_PULL, guidance.max_disturbance_m_s2
+        bandwidth, _POSITION_TIME, _position_pull(config), guidance.max_disturbance_m_s2
     )
     correction = CorrectionSettings(
         _CORRECTS_WITHIN,

@@ -124,7 +124,9 @@ class LinearGuidance:
 
     def _feedback(self, now: Reference, acts: Reference, situation: Situation) -> Horizontal:
         """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
-        settings, gains = self._settings, self._settings.gains
+        settings, gains, wind = self._settings, self._settings.gains, situation.disturbance
+        if now.drifting:
+            return limited(-wind[0], -wind[1], settings.max_horizontal)
         wanted, slowed = [], situation.drag.deceleration(situation.now.velocity_ned)
         for axis in (0, 1):
             place = situation.acts.position_ned[axis] - acts.position_ned[axis]
@@ -132,14 +134,14 @@ class LinearGuidance:
             acceleration = (
                 situation.thrust[axis]
                 - slowed[axis]
-                + situation.disturbance[axis]
+                + wind[axis]
                 - now.acceleration_ned[axis]
             )
             wanted.append(
                 -gains.position * place
                 - gains.velocity * speed
                 - gains.acceleration * acceleration
-                - situation.disturbance[axis]
+                - wind[axis]
             )
         return limited(wanted[0], wanted[1], settings.max_horizontal)
 

@@ -10,6 +10,9 @@ from companion.guidance.reference import Pose, Reference
 
 _RAMP_ACCELERATION = 1.0
 """Mean acceleration along the path while a circle gathers or loses speed, m/s²."""
+_REST = 1.0
+"""Before open-loop steps the vehicle drifts this long, s: a step is measured from an attitude at
+rest, and a hold that still corrects is not."""
 
 
 class Programme(Protocol):
@@ -60,8 +63,9 @@ class Hover:
 class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
-    A doublet leaves the vehicle, on an ideal response, where it was and at rest; what remains is
-    taken out by position hold for `settle` seconds after each.
+    Each begins from an attitude at rest, for which the hold pauses. A doublet leaves the vehicle,
+    on an ideal response, where it was and at rest; what remains is taken out by position hold for
+    `settle` seconds after each.
 
     Attributes:
         coefficient: length of c, the sine of the tilt.
@@ -78,23 +82,25 @@ class Steps:
 
     @property
     def duration(self) -> float:
-        """Three doublets, each followed by its settling, s."""
+        """Three doublets, each with the rest before and its settling, s."""
         return len(self.DIRECTIONS) * self._period
 
     @property
     def _period(self) -> float:
-        return 4.0 * self.step + self.settle
+        return _REST + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
         """All over each doublet, and once in each settling."""
-        begins = [which * self._period for which in range(len(self.DIRECTIONS))]
+        begins = [which * self._period + _REST for which in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop coefficients in a doublet, position hold between them."""
         which = min(max(int(time / self._period), 0), len(self.DIRECTIONS) - 1)
-        within = time - which * self._period
+        within = time - which * self._period - _REST
         rest = Reference(start.position_ned, heading=start.heading)
+        if within < 0.0:
+            return rest._replace(drifting=True)
         if within >= 4.0 * self.step:
             return rest
         sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
@@ -108,8 +114,9 @@ class Corners:
     """Acceleration steps between the corners of a rectangle, none of them through level.
 
     There the methods differ, as in the paper's figure 2; steps through level run straight with any
-    of them. Twice round, the second time mirrored, brings the vehicle, on an ideal response, back
-    to where it was and to rest; what remains is taken out by position hold for `settle` seconds.
+    of them. The first begins from an attitude at rest, for which the hold pauses. Twice round, the
+    second time mirrored, brings the vehicle, on an ideal response, back to where it was and to
+    rest; what remains is taken out by position hold for `settle` seconds.
 
     Attributes:
         north, east: coefficients of the corners, up to their signs; the tilt there has the sine
@@ -137,17 +144,19 @@ class Corners:
 
     @property
     def duration(self) -> float:
-        """All corners, and the settling, s."""
-        return len(self.CORNERS) * self.step + self.settle
+        """The rest, all corners, and the settling, s."""
+        return _REST + len(self.CORNERS) * self.step + self.settle
 
     def check_times(self) -> list[float]:
         """All over the corners, and the end."""
-        return [*spread(0.0, len(self.CORNERS) * self.step), self.duration]
+        return [*spread(_REST, _REST + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop coefficients at the corners, then position hold."""
         rest = Reference(start.position_ned, heading=start.heading)
-        which = int(max(time, 0.0) / self.step)
+        if time < _REST:
+            return rest._replace(drifting=True)
+        which = int((time - _REST) / self.step)
         if which >= len(self.CORNERS):
             return rest
         north, east = self.CORNERS[which]

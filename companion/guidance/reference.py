@@ -29,7 +29,8 @@ class Reference(NamedTuple):
     """Where the vehicle ought to be at one instant.
 
     With `coefficients` given, the horizontal acceleration is commanded open loop, and position and
-    velocity count for the height only. With `body_rates` given the same holds of these.
+    velocity count for the height only. With `body_rates` given the same holds of these. `drifting`
+    pauses the horizontal feedback: only what holds against the wind is asked for.
     """
 
     position_ned: Vector
@@ -40,11 +41,17 @@ class Reference(NamedTuple):
     coefficients: Coefficients | None = None
     body_rates: BodyRates | None = None
     thrust_steps: bool = False
+    drifting: bool = False
 
     @property
     def closed_loop(self) -> bool:
-        """Whether the horizontal position is meant, and not only the height."""
+        """Whether guidance says which acceleration it takes, and nobody else does."""
         return self.coefficients is None and self.body_rates is None
+
+    @property
+    def position_is_meant(self) -> bool:
+        """Whether the horizontal position is meant, and not only the height."""
+        return self.closed_loop and not self.drifting
 
     @property
     def height_is_steady(self) -> bool:

@@ -144,6 +144,15 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
     assert down < 0.0
 
 
+def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
+    motion = VehicleMotion((7.0, 7.0, -5.0), (3.0, 3.0, 0.0))
+    situation = Situation(motion, motion, (0.5, 0.5), (1.0, -0.5), DRAG, THRUST)
+    reference = Reference((0.0, 0.0, -5.0), drifting=True)
+    target, later, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
+    assert acceleration(target, down)[:2] == pytest.approx([-1.0, 0.5])
+    assert later == target
+
+
 def test_the_heading_is_asked_for_ahead_of_its_response():
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)

@@ -59,6 +59,20 @@ def test_steps_leave_an_ideal_vehicle_where_it_was():
     assert steps.at(steps.duration + 1.0, START).coefficients is None
 
 
+@pytest.mark.parametrize("programme", [Steps(0.25, 1.0, 3.0), Corners(0.3, 0.4, 1.0, 2.0)])
+def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(programme):
+    drifted, before = 0.0, Hover(1.0).at(0.0, START)
+    for k in range(round(programme.duration / 0.01)):
+        reference = programme.at(0.01 * k + 0.005, START)
+        assert not (reference.drifting and reference.coefficients)
+        drifted += 0.01 * reference.drifting
+        if reference.coefficients and not before.coefficients:
+            assert before.drifting
+        before = reference
+    runs = 3 if isinstance(programme, Steps) else 1
+    assert drifted == pytest.approx(runs * 1.0)
+
+
 @given(st.floats(0.0, 40.0))
 def test_sequence_plays_its_parts_in_order(time):
     parts = [Hover(3.0), Steps(0.2, 1.0, 2.0), Circle(3.0, 2.0, 1.0)]
