@@ -39,7 +39,7 @@ _QUICK, _SLOW = 0.065, 0.08
 """Up to the first dead time with half the lag, s, the hold is stiffer; from the second on not."""
 _POSITION_TIME = 0.1
 """With which the position follows the measured one, s."""
-_POSITION_PULL = 4.0, 12.0
+_POSITION_PULL = 4.0, 8.0
 """How much a position tells of the velocity, 1/s, behind a slow and behind a quick rate loop: the
 velocities of real estimators are off by 0.05 m/s for seconds, measured on PX4 and ArduPilot against
 truth."""

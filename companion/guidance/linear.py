@@ -132,10 +132,7 @@ class LinearGuidance:
             place = situation.acts.position_ned[axis] - acts.position_ned[axis]
             speed = situation.acts.velocity_ned[axis] - acts.velocity_ned[axis]
             acceleration = (
-                situation.thrust[axis]
-                - slowed[axis]
-                + wind[axis]
-                - now.acceleration_ned[axis]
+                situation.thrust[axis] - slowed[axis] + wind[axis] - now.acceleration_ned[axis]
             )
             wanted.append(
                 -gains.position * place
