@@ -7,6 +7,7 @@ vehicle, which has a reader of its own.
 import contextlib
 import os
 import time
+from typing import ClassVar
 
 import pytest
 import yaml
@@ -204,7 +205,7 @@ class _Inner(Section):
 
 
 class _File(Section):
-    former_keys = {
+    former_keys: ClassVar = {
         "old": "is now `inner`",
         "inner.pace": "is now `inner.speed_m_s`",
     }
