@@ -18,7 +18,7 @@ from companion.cli import main
 from companion.config import FORMER_KEYS, Config
 from companion.config_file import load
 from companion.yaml_file import ConfigError, Section, parse
-from sitl_mock import config_errors
+from sitl_mock.config import errors as config_errors
 from sitl_mock.settings import load_settings
 
 QUICK = 2.0
