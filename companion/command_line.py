@@ -20,7 +20,7 @@ from companion.extras import MissingExtraError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.figure import FigureError
-from companion.study.names import STUDY_NAMES, TRACK
+from companion.study import registry
 from companion.yaml_file import ConfigError
 
 _PACKAGE = "mavlink-companion"
@@ -223,17 +223,27 @@ def _add_benches(commands: Commands) -> None:
 
 def _add_study(commands: Commands) -> None:
     study = commands.add_parser(
-        "study", help="the paper's experiments, as figures, tables and a page (extra `study`)"
+        "study",
+        help="the paper's experiments, as figures, tables and a page (extra `study`)",
+        epilog=f"studies:\n{registry.help_table()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    study.add_argument("name", choices=STUDY_NAMES, metavar="NAME", help=", ".join(STUDY_NAMES))
     study.add_argument(
-        "--case", type=Path, metavar="FILE", help="for custom: such as configs/study-case.yaml"
+        "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
+    )
+    study.add_argument(
+        "--case",
+        type=Path,
+        metavar="FILE",
+        help=f"for {registry.names_with_case()}: such as configs/study-case.yaml",
     )
     study.add_argument(
         "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
     )
     study.add_argument(
-        "--json", action="store_true", help=f"of {TRACK}: print its rows as one JSON list"
+        "--json",
+        action="store_true",
+        help=f"for {registry.names_with_json()}: print its rows as one JSON list",
     )
     study.set_defaults(run=tools.study)
 

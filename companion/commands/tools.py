@@ -13,8 +13,7 @@ from companion.flight.assembly import link_settings
 from companion.flight.programmes import programme
 from companion.mavlink.endpoint import parse_endpoint
 from companion.recording.figure import draw_flight
-from companion.study import needs
-from companion.study.names import TRACK
+from companion.study import registry
 from companion.yaml_file import ConfigError
 
 
@@ -40,18 +39,19 @@ def bench_planner(options: argparse.Namespace) -> int:
 
 def study(options: argparse.Namespace) -> int:
     """Fly the paper's experiments and ours."""
-    if options.json and options.name != TRACK:
+    if options.json and not all(study.prints_json for study in registry.chosen(options.name)):
         raise ConfigError(
-            f"--json goes with study {TRACK}; study {options.name} writes its tables as CSV"
+            f"--json goes with study {registry.names_with_json()}; study {options.name} writes its"
+            " tables as CSV"
         )
-    needs.check(options.name)
+    registry.check_extras(options.name)
     from companion.study import runner  # noqa: PLC0415  needs the extra
 
     console = Console(stderr=options.json)
     try:
         page, rows = runner.run(options.name, options.case, options.out, console)
     except KeyboardInterrupt:
-        console.print(f"Interrupted; what stands in {options.out} is whole.", highlight=False)
+        console.print(f"Interrupted; the files in {options.out} are complete.", highlight=False)
         return EXIT_FLIGHT
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:

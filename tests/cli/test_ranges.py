@@ -4,7 +4,7 @@ import pytest
 
 from companion.config import Config
 from companion.doctor.undo import Undo
-from companion.study.case import Case
+from companion.study.custom_case import Case
 from companion.yaml_file import ConfigError, parse
 
 _BELOW = {"minimum", "exclusiveMinimum"}

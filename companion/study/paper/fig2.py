@@ -5,8 +5,9 @@ from math import degrees
 import numpy as np
 from matplotlib.figure import Figure
 
+from companion.attitude import Quaternion, Target, body_error
+from companion.attitude.constants import Constants
 from companion.attitude.planner import LawPlanner
-from companion.study import literal
 from companion.study.drawing import (
     draw,
     draw_plane,
@@ -32,16 +33,31 @@ from companion.study.methods import (
     Method,
     planner_of,
 )
-from companion.study.outcome import Finding, Outcome, Tick
+from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
-from companion.study.table import Cell, Table
 
 _SAME = 1e-9
-"""Paths that differ by less between headings are the same."""
-
-
+"""Paths at two headings that differ by less are the same."""
 _METHODS = (*PAPERS, EXACT)
 PARTS = len(_METHODS) + 1
+
+
+def _printed_quaternion_law(
+    q: Quaternion, target: Target, dt: float, constants: Constants
+) -> tuple[float, float, float]:
+    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error that section 4.2 prints.
+
+    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹: this is the body-frame error rotated to the world
+    frame. Using it as body rates shows the effect of the misprint.
+    """
+    w, x, y, z = q
+    i, j, k = body_error.quaternion(q, target, dt, constants)
+    t_x, t_y, t_z = 2.0 * (y * k - z * j), 2.0 * (z * i - x * k), 2.0 * (x * j - y * i)
+    return (
+        i + w * t_x + y * t_z - z * t_y,
+        j + w * t_y + z * t_x - x * t_z,
+        k + w * t_z + x * t_y - y * t_x,
+    )
 
 
 def run(tick: Tick) -> Outcome:
@@ -53,7 +69,8 @@ def run(tick: Tick) -> Outcome:
         responses[method] = fly(planner_of(method, FIGURE_2.gain), FIGURE_2)
     tick("the error as the paper prints it")
     printed = fly(
-        LawPlanner(literal.quaternion, planner_of(QUATERNION, FIGURE_2.gain).constants), FIGURE_2
+        LawPlanner(_printed_quaternion_law, planner_of(QUATERNION, FIGURE_2.gain).constants),
+        FIGURE_2,
     )
     rows: list[tuple[Cell, ...]] = []
     for method, response in responses.items():
@@ -69,14 +86,14 @@ def run(tick: Tick) -> Outcome:
         ),
         figure=_figure(responses, reference),
         caption=(
-            "Every method at one heading, Euler angles at their worst: both coefficients, distance"
+            "Every method at one heading, for Euler angles the worst: both coefficients, distance"
             " from the first-order reference, and the path in the plane of the coefficients."
         ),
         tables=(
             Table(
                 "fig2",
-                "Step response of figure 2; methods that heading changes have a row for the best"
-                " and one for the worst.",
+                "Step response of figure 2. A method that depends on heading has two rows: for its"
+                " best and for its worst heading.",
                 (
                     "method",
                     "largest deviation from first order",
@@ -145,8 +162,8 @@ def _findings(
             "paper",
             "The proposed method follows the first-order reference; the others do not.",
             proposed < 0.2 * best_other,
-            f"Largest deviation {proposed:.2g}; the best of the others at its best heading has"
-            f" {best_other:.2g}, {best_other / proposed:.0f} times as much (asked: 5 times).",
+            f"Largest deviation {proposed:.2g}. The best other method at its best heading has"
+            f" {best_other:.2g}, {best_other / proposed:.0f} times as much (required: 5 times).",
         ),
         Finding(
             "paper",
@@ -157,20 +174,22 @@ def _findings(
             + ", ".join(
                 f"{method.label} {effect[method]:.1g}" for method in (PROPOSED, QUATERNION, SO3)
             )
-            + ". The error has to be taken in the body frame, q⁻¹ ⊗ q_d.",
+            + ". The error must be taken in the body frame, q⁻¹ ⊗ q_d.",
         ),
         Finding(
             "asked",
-            "The same with the quaternion error q_d ⊗ q⁻¹, as the paper prints it.",
+            "Heading does not change the response of the quaternion method with the error"
+            " q_d ⊗ q⁻¹, as the paper prints it.",
             heading_effect(printed) < _SAME,
-            f"Used as body rates, that error makes paths which differ by"
-            f" {heading_effect(printed):.2g} between headings, and the largest deviation is"
+            f"With that error as body rates the paths at two headings differ by up to"
+            f" {heading_effect(printed):.2g}, and the largest deviation is"
             f" {largest_deviation(printed, reference).max():.2g}.",
         ),
         Finding(
             "paper",
             "Heading changes the response of the Euler-angle method.",
             effect[EULER] > _SAME,
-            f"Its deviation is between {away[EULER].min():.2g} and {away[EULER].max():.2g}.",
+            f"Its largest deviation is {away[EULER].min():.2g} at the best heading and"
+            f" {away[EULER].max():.2g} at the worst.",
         ),
     )

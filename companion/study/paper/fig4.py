@@ -27,21 +27,18 @@ from companion.study.methods import (
     Method,
     planner_of,
 )
-from companion.study.outcome import Finding, Outcome, Tick
+from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_4, Floats, Response, fly
-from companion.study.table import Cell, Table
 
 MAX_TILT = radians(40.0)
 MAX_TILT_RATE = pi / 2.0
 
 _METHODS = (QUATERNION, SO3, EULER, PROPOSED, PAPER_LIMIT)
-
-
 PARTS = len(_METHODS)
 
 
 def run(tick: Tick) -> Outcome:
-    """Fly the step of figure 4 with every method, the proposed one with both of its limits."""
+    """Fly the step of figure 4 with every method; the proposed one with each of its limits."""
     tight = Limits(MAX_TILT, MAX_TILT_RATE)
     paper = replace(tight, shape="paper")
     responses = {}
@@ -61,7 +58,7 @@ def run(tick: Tick) -> Outcome:
         ),
         figure=_figure(responses, reference),
         caption=(
-            "Response, path, and √(ω_x² + ω_y²) with its limit; Euler angles at their slowest"
+            "Response, path, and √(ω_x² + ω_y²) with its limit; Euler angles at the slowest"
             " heading. The reference is first order with the limit of equation 33."
         ),
         tables=(
@@ -130,10 +127,10 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
             "asked",
             "That limit makes full use of W_M.",
             rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
-            f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of it and takes"
+            f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of W_M and takes"
             f" {arrived[PAPER_LIMIT]:.3f} s; the tight limit uses"
             f" {100.0 * rate[PROPOSED] / MAX_TILT_RATE:.0f} % and takes {arrived[PROPOSED]:.3f} s,"
-            f" on the same straight line (cross-track {across[PROPOSED]:.2g}).",
+            f" along the same straight line (cross-track {across[PROPOSED]:.2g}).",
         ),
         Finding(
             "asked",

@@ -1,4 +1,4 @@
-"""Appendix A: how much body rate a rate of the coefficients costs, over the disc of tilts."""
+"""Appendix A: the body rate needed per rate of the coefficients, by tilt and direction."""
 
 from math import cos, degrees, pi, radians, sin
 
@@ -9,9 +9,8 @@ from companion.attitude import Coefficients
 from companion.attitude.reference_model import rates_along
 from companion.study.drawing import new_figure
 from companion.study.methods import PROPOSED, REFERENCE
-from companion.study.outcome import Finding, Outcome, Tick
+from companion.study.outcome import Finding, Outcome, Table, Tick
 from companion.study.step import Floats
-from companion.study.table import Table
 
 TILTS = tuple(radians(angle) for angle in (0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0))
 PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
@@ -19,10 +18,11 @@ PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
 
 _LIMIT = radians(60.0)
 _DIRECTIONS = 72
+PARTS = 2
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
-    """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) for coefficients that move towards `direction` (rad)."""
+    """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) when the coefficients move towards `direction` (rad)."""
     roll, pitch, _ = rates_along(c.north, c.east, cos(direction), sin(direction))
     return roll * roll + pitch * pitch
 
@@ -30,9 +30,6 @@ def scaling_factor(c: Coefficients, direction: float) -> float:
 def bound(max_tilt: float) -> float:
     """Appendix A: K_max = 1/(1 − 2A_M²)² with A_M = sin(max_tilt/2)."""
     return float((1.0 - 2.0 * sin(0.5 * max_tilt) ** 2) ** -2)
-
-
-PARTS = 2
 
 
 def run(tick: Tick) -> Outcome:
@@ -61,12 +58,12 @@ def run(tick: Tick) -> Outcome:
         title="Appendix A: the scaling factor K over the tilt disc",
         conditions=(
             "K = (ω_x² + ω_y²)/|ċ|² of the flying planner's kinematics, tilts to 60°, 72 directions"
-            " of ċ. Equation 33 plans with the largest K of the whole disc."
+            " of ċ. Equation 33 uses the largest K of all tilts and directions."
         ),
         figure=_figure(by_tilt),
         caption=(
-            "Left: K for a movement to the north, over the disc of tilts. Right: the largest and"
-            " the smallest K over all directions, by tilt; ● the values that the paper prints."
+            "Left: K for a movement to the north, by tilt. Right: the largest and the smallest K of"
+            " all directions, by tilt; ● are the values that the paper prints."
         ),
         tables=(
             Table(
@@ -92,11 +89,11 @@ def run(tick: Tick) -> Outcome:
             ),
             Finding(
                 "asked",
-                "K_max is what every movement needs.",
+                "A movement in any direction needs K_max.",
                 min(row[3] / row[1] for row in rows) > 0.99,
-                f"By direction K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g} at"
-                f" {rows[-1][0]}°; the mean over all directions is {100.0 * share[40]:.0f} % of the"
-                f" largest rate at 40°, {100.0 * share[60]:.0f} % at 60°.",
+                f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
+                f" depending on direction. The mean body rate is {100.0 * share[40]:.0f} % of the"
+                f" largest at 40° of tilt and {100.0 * share[60]:.0f} % at 60°.",
             ),
         ),
     )

@@ -11,14 +11,11 @@ from matplotlib.figure import Figure
 from companion.study.drawing import draw, draw_reference, label_response, new_figure
 from companion.study.measures import best_and_worst, cross_track, largest_deviation
 from companion.study.methods import EULER, PROPOSED, planner_of
-from companion.study.outcome import Finding, Outcome, Tick
+from companion.study.outcome import Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
-from companion.study.table import Table
 
 _FOLDED = colormaps["viridis"]
-"""By the angle between heading and the axis of the step: 0° along it, 90° across."""
-
-
+"""Colours by the angle between the heading and the axis of the step, 0° to 90°."""
 PARTS = 2
 
 
@@ -38,8 +35,8 @@ def run(tick: Tick) -> Outcome:
         conditions="The step of figure 2 with the Euler-angle method, 72 headings π/36 apart.",
         figure=_figure(response, reference),
         caption=(
-            "One line a heading, dark along the axis of the step, bright across it: both"
-            " coefficients, the paths, and the largest deviation over the heading."
+            "One line for each heading, from dark (along the step) to bright (across it): both"
+            " coefficients, the paths, and the largest deviation by heading."
         ),
         tables=(
             Table(
@@ -52,10 +49,11 @@ def run(tick: Tick) -> Outcome:
         findings=(
             Finding(
                 "asked",
-                "Some headings suit Euler angles much better than others.",
+                "The Euler-angle method is much better at some headings than at others.",
                 bool(away[best] < 0.5 * away[worst]),
-                f"The best, {at[best]}°, deviates by {away[best]:.2g}, the worst, {at[worst]}°, by"
-                f" {away[worst]:.2g}; the proposed method has {proposed.max():.2g} at all of them.",
+                f"Largest deviation {away[best]:.2g} at the best heading, {at[best]}°, and"
+                f" {away[worst]:.2g} at the worst, {at[worst]}°. The proposed method has"
+                f" {proposed.max():.2g} at every heading.",
             ),
         ),
     )
