@@ -6,12 +6,7 @@ from collections.abc import Iterable
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.link import Link
-from sitl_mock.parameters import (
-    UINT32,
-    Encoding,
-    ParameterRefusedError,
-    ParameterTable,
-)
+from sitl_mock.parameters import UINT32, Encoding, ParameterRefusedError, ParameterTable
 from sitl_mock.wire import Message
 
 HASH_NAME = "_HASH_CHECK"

@@ -6,11 +6,7 @@ from sitl_mock.attitude_control import attitude_rates, is_usable
 from sitl_mock.modes import Mode
 from sitl_mock.offboard import OffboardStream
 from sitl_mock.parameters import ParameterTable
-from sitl_mock.position_control import (
-    GRAVITY,
-    PositionController,
-    PositionDemand,
-)
+from sitl_mock.position_control import GRAVITY, PositionController, PositionDemand
 from sitl_mock.px4_gains import attitude_gains, position_gains
 from sitl_mock.px4_modes import PILOTED
 from sitl_mock.quaternion import Quaternion, Vector, along_heading, from_yaw, yaw

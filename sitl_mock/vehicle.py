@@ -4,13 +4,7 @@ from math import nan
 from typing import NamedTuple
 
 from sitl_mock.battery import Battery, BatteryState
-from sitl_mock.config import (
-    AirframeConfig,
-    BatteryConfig,
-    RateLoopConfig,
-    SensorConfig,
-    WindConfig,
-)
+from sitl_mock.config import AirframeConfig, BatteryConfig, RateLoopConfig, SensorConfig, WindConfig
 from sitl_mock.ground import Ground
 from sitl_mock.multirotor import ZERO, Multirotor
 from sitl_mock.navigation_filter import Snapshot

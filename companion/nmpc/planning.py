@@ -4,6 +4,7 @@ from math import hypot, sin
 from time import monotonic, perf_counter
 
 from companion.attitude import BodyRates, InvalidQuaternionError, wrap_angle
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.attitude_models import euler_near
 from companion.nmpc.messages import Answer, Input, Request, Status, Vehicle
 from companion.nmpc.model import Given
@@ -11,7 +12,6 @@ from companion.nmpc.prediction import Predictor, ToppledError
 from companion.nmpc.problem import Plan, Problem
 from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
-from companion.trajectory.sample import Trajectory
 
 _WARM_UP = 5
 """Solves before the first that counts: caches fill, memory is taken."""

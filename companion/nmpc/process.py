@@ -20,11 +20,11 @@ from time import monotonic
 from typing import NamedTuple
 
 from companion.attitude.kinematics import tilt_products
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
 from companion.nmpc.settings import Settings
 from companion.nmpc.solvers import check
 from companion.realtime import schedule_as_usual
-from companion.trajectory.sample import Trajectory
 
 _LARGEST_MESSAGE = 4096
 _LAST_MOMENT = 0.02

@@ -7,13 +7,7 @@ from matplotlib.figure import Figure
 
 from companion.attitude.planner import LawPlanner
 from companion.study import literal
-from companion.study.drawing import (
-    draw,
-    draw_plane,
-    draw_reference,
-    draw_response,
-    new_figure,
-)
+from companion.study.drawing import draw, draw_plane, draw_reference, draw_response, new_figure
 from companion.study.measures import (
     best_and_worst,
     cross_track,

@@ -17,14 +17,14 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from companion import yaml_file
+from companion.files import yaml_file
+from companion.files.yaml_file import ConfigError
 from companion.study import custom, fig2, fig3, fig4, fig5, kmax, lag, rates, track
 from companion.study.case import Case
 from companion.study.drawing import STYLE
 from companion.study.names import TRACK
 from companion.study.outcome import Outcome, Tick
 from companion.study.report import write_outcome, write_page
-from companion.yaml_file import ConfigError
 
 
 class _Study(NamedTuple):

@@ -11,12 +11,12 @@ import time
 import pytest
 import yaml
 
-from companion import bounded_yaml
-from companion.bounded_yaml import MOST_BYTES, YamlError
-from companion.cli import main
+from companion.cli.main import main
 from companion.config import Config
-from companion.config_file import load
-from companion.yaml_file import ConfigError, parse
+from companion.config.files import load
+from companion.files import bounded_yaml
+from companion.files.bounded_yaml import MOST_BYTES, YamlError
+from companion.files.yaml_file import ConfigError, parse
 from sitl_mock import config_errors
 from sitl_mock.settings import load_settings
 

@@ -7,13 +7,7 @@ import pytest
 
 from sitl_mock.ardupilot_climb import Climb, approach
 from sitl_mock.ardupilot_settings import AIRFRAME
-from sitl_mock.ardupilot_thrust import (
-    GRAVITY,
-    asked_climb,
-    asked_thrust,
-    boosted,
-    specific_thrust,
-)
+from sitl_mock.ardupilot_thrust import GRAVITY, asked_climb, asked_thrust, boosted, specific_thrust
 from sitl_mock.config import AirframeConfig
 from sitl_mock.rotors import Rotors
 

@@ -13,10 +13,10 @@ import pytest
 from companion.attitude import BodyRates
 from companion.drag import Drag
 from companion.extras import MissingExtraError
+from companion.guidance.trajectory.figures import Laps, circle
 from companion.nmpc import Input, Request, Settings, Solver, Start, Status, Vehicle
 from companion.nmpc.planning import Planning
 from companion.nmpc.solvers import compile_ahead
-from companion.trajectory.figures import Laps, circle
 
 PYTHON = os.environ.get("COMPANION_ACADOS_PYTHON")
 pytestmark = pytest.mark.skipif(PYTHON is None, reason="COMPANION_ACADOS_PYTHON names none")

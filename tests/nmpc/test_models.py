@@ -6,12 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import Target, make_planner
+from companion.guidance.trajectory.figures import Laps, helix
 from companion.nmpc.model import Given, integrator
 from companion.nmpc.models import MODEL_NAMES, make_model
 from companion.nmpc.reference import Start, node_of
 from companion.nmpc.settings import Settings
 from companion.nmpc.warm_start import on_reference
-from companion.trajectory.figures import Laps, helix
 from tests.nmpc import rigid
 
 H = 1e-5

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from companion.drag import Drag
+from companion.guidance.trajectory.figures import Laps, circle
 from companion.nmpc import Settings, Start, Weights
 from companion.nmpc.model import Given, Motion
 from companion.nmpc.models import MODEL_NAMES, make_model
@@ -14,7 +15,6 @@ from companion.nmpc.problem import Problem
 from companion.nmpc.reference import node_of
 from companion.nmpc.transcription import parameters_of, transcribe
 from companion.nmpc.warm_start import moved_on, on_reference
-from companion.trajectory.figures import Laps, circle
 from tests.attitude.independent import attitudes
 
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))

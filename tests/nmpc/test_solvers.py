@@ -6,11 +6,11 @@ from time import monotonic, sleep
 
 import pytest
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.extras import MissingExtraError
+from companion.guidance.trajectory.figures import Hover
 from companion.nmpc import Settings, Solver, solvers
 from companion.nmpc.solvers import ACADOS, check, compile_ahead
-from companion.trajectory.figures import Hover
 
 LONG = 20.0  # s
 BY_ACADOS = Settings(solver="acados")

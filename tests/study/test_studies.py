@@ -12,11 +12,11 @@ import pytest
 import yaml
 from rich.console import Console
 
-from companion.cli import main
+from companion.cli.main import main
+from companion.files.yaml_file import ConfigError
 from companion.study import fig2, fig3, fig4, fig5, runner
 from companion.study.case import Case
 from companion.study.names import PAPER_STUDIES
-from companion.yaml_file import ConfigError
 
 ROOT = Path(__file__).parents[2]
 PAPER = {name: runner._STUDIES[name] for name in PAPER_STUDIES}
