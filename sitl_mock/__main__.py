@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-from sitl_mock.config_errors import ConfigError
+from sitl_mock.config.errors import ConfigError
 from sitl_mock.server import Server
 from sitl_mock.settings import MockSettings, load_settings
 from sitl_mock.status import StatusLine

@@ -1,8 +1,8 @@
 """The autopilot families that the mock can be."""
 
-from sitl_mock.ardupilot import ArduPilot
-from sitl_mock.personality import Personality
-from sitl_mock.px4 import Px4
+from sitl_mock.ardupilot.personality import ArduPilot
+from sitl_mock.autopilot.personality import Personality
+from sitl_mock.px4.personality import Px4
 from sitl_mock.settings import MockSettings
 
 

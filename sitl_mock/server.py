@@ -4,11 +4,11 @@ import os
 import time
 from math import ceil
 
-from sitl_mock.autopilot import Autopilot
-from sitl_mock.endpoint import Endpoint
+from sitl_mock.link.endpoint import Endpoint
+from sitl_mock.link.framing import Message, decode
 from sitl_mock.settings import MockSettings
+from sitl_mock.simulation import Autopilot
 from sitl_mock.status import StatusLine
-from sitl_mock.wire import Message, decode
 from sitl_mock.wires import Arrived, Wires
 
 BEACON_FIRST_S = 0.05

@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from sitl_mock.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from sitl_mock.ardupilot_settings import with_ardupilot_defaults
-from sitl_mock.config import (
+from sitl_mock.ardupilot.parameters import ARDUPILOT_PARAMETERS
+from sitl_mock.ardupilot.settings import with_ardupilot_defaults
+from sitl_mock.autopilot.parameters import Parameter, ParameterRefusedError, ParameterTable
+from sitl_mock.config.airframe import (
     AirframeConfig,
     BatteryConfig,
     RateLoopConfig,
@@ -16,13 +17,12 @@ from sitl_mock.config import (
     SigningConfig,
     WindConfig,
 )
-from sitl_mock.config_errors import ConfigError, explain, suggestion
-from sitl_mock.fault_config import Fault
-from sitl_mock.parameters import Parameter, ParameterRefusedError, ParameterTable
-from sitl_mock.px4_parameters import PX4_PARAMETERS
-from sitl_mock.section import Finite, NonNegative, Positive, Section
-from sitl_mock.wiring import for_vehicle, parse_wiring
-from sitl_mock.yaml_file import load_yaml
+from sitl_mock.config.errors import ConfigError, explain, suggestion
+from sitl_mock.config.faults import Fault
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section
+from sitl_mock.config.wiring import for_vehicle, parse_wiring
+from sitl_mock.config.yaml_file import load_yaml
+from sitl_mock.px4.parameters import PX4_PARAMETERS
 
 PORT_OFFSET = 40
 """The companion link is sent from this many ports above ``port``, as PX4's simulation does."""

@@ -4,8 +4,8 @@ import sys
 import time
 from math import degrees
 
-from sitl_mock.autopilot import Autopilot
-from sitl_mock.telemetry import euler
+from sitl_mock.autopilot.motion_telemetry import euler
+from sitl_mock.simulation import Autopilot
 
 _PERIOD_S = 0.25
 

@@ -2,17 +2,17 @@
 
 import select
 
-from sitl_mock.autopilot import Autopilot
-from sitl_mock.control import reply
-from sitl_mock.endpoint import Endpoint, bundles
-from sitl_mock.link import Link
-from sitl_mock.pipe import DatagramPipe
-from sitl_mock.serial_endpoint import SerialEndpoint
+from sitl_mock.config.wiring import SerialLine, TcpIn, parse_wiring
+from sitl_mock.control_channel import reply
+from sitl_mock.link.endpoint import Endpoint, bundles
+from sitl_mock.link.framing import Message, decode
+from sitl_mock.link.link import Link
+from sitl_mock.link.pipe import DatagramPipe
+from sitl_mock.link.serial_endpoint import SerialEndpoint
+from sitl_mock.link.tcp_endpoint import TcpEndpoint
+from sitl_mock.link.udp_endpoint import UdpEndpoint
 from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
-from sitl_mock.tcp_endpoint import TcpEndpoint
-from sitl_mock.udp_endpoint import UdpEndpoint
-from sitl_mock.wire import Message, decode
-from sitl_mock.wiring import SerialLine, TcpIn, parse_wiring
+from sitl_mock.simulation import Autopilot
 
 Arrived = tuple[bytes, list[Message]]
 """A datagram and the messages in it."""

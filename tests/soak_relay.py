@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from sitl_mock.wire import decode
+from sitl_mock.link.framing import decode
 
 DEADLINE_S = 0.004
 """`deadman.deadline_ms`, its default."""

@@ -31,8 +31,8 @@ def test_imports_point_one_way():
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("sitl_mock/vehicle.py", "import companion.attitude"),
-        ("companion/flight/watch.py", "import sitl_mock.physics"),
+        ("sitl_mock/physics/vehicle.py", "import companion.attitude"),
+        ("companion/flight/watch.py", "import sitl_mock.physics.rigid_body"),
         ("companion/attitude/limits.py", "import companion.guidance"),
         ("companion/guidance/height.py", "import asyncio"),
         ("companion/attitude/history.py", "import numpy"),
@@ -44,8 +44,8 @@ def test_imports_point_one_way():
         ("companion/nmpc/messages.py", "import casadi"),
         ("companion/flight/watch.py", "import companion.study.step"),
         ("companion/batch/__init__.py", "import companion.study.step"),
-        ("companion/study/inner_loop.py", "import sitl_mock.vehicle"),
-        ("companion/study/step.py", "import sitl_mock.multirotor"),
+        ("companion/study/inner_loop.py", "import sitl_mock.physics.vehicle"),
+        ("companion/study/step.py", "import sitl_mock.physics.multirotor"),
     ],
 )
 def test_a_forbidden_import_is_found(tmp_path, module, line):

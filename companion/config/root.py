@@ -3,8 +3,9 @@
 The defaults fly the bundled vehicle.
 """
 
+from collections.abc import Mapping
 from math import ceil, cos, degrees, floor, hypot, radians, sin
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
@@ -39,12 +40,17 @@ FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
 """Files that one configuration may include, those of its includes among them."""
 
+FORMER_KEYS: dict[str, str] = {}
+"""Keys that were renamed or removed → what to do instead; see `Section.former_keys`."""
+
 _TILT_SHARE = 0.75
 """Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
 
 
 class Config(Section):
     """Configuration of `companion`; the top level of the YAML file."""
+
+    former_keys: ClassVar[Mapping[str, str]] = FORMER_KEYS
 
     link: LinkConfig = LinkConfig()
     planner: PlannerConfig = PlannerConfig()

@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
@@ -11,7 +11,7 @@ from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import MOST_BYTES, YamlError
 
-Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model", bound="Section")
 
 _LONGEST_PATH = 1000
 _FAULTS_TOLD = 5
@@ -27,7 +27,15 @@ def is_path(text: str) -> bool:
 
 
 class Section(BaseModel):
-    """Keys that belong together: immutable, unknown ones refused, every one described."""
+    """Keys that belong together: immutable, unknown ones refused, every one described.
+
+    Attributes:
+        former_keys: keys that were renamed or removed, dotted, as the file writes them
+            (`section.key`) → what became of them, as the end of a sentence that begins with the
+            key. Only those of the model of the whole file are read.
+    """
+
+    former_keys: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
@@ -76,7 +84,7 @@ def load(path: Path, model: type[Model]) -> Model:
     return validated(read(path, model), str(path), model)
 
 
-def read(path: Path, model: type[BaseModel]) -> dict[str, Any]:
+def read(path: Path, model: type[Section]) -> dict[str, Any]:
     """The keys and values of a YAML file, not yet checked against `model`.
 
     Raises:
@@ -99,7 +107,7 @@ def parse(text: str, name: str, model: type[Model]) -> Model:
     return validated(_keys(text, name, model), name, model)
 
 
-def _keys(text: str, name: str, model: type[BaseModel]) -> dict[str, Any]:
+def _keys(text: str, name: str, model: type[Section]) -> dict[str, Any]:
     try:
         data = bounded_yaml.parse(text)
     except YamlError as error:
@@ -113,7 +121,7 @@ def _keys(text: str, name: str, model: type[BaseModel]) -> dict[str, Any]:
     return {key: _filled(key, value, model) for key, value in data.items()}
 
 
-def _filled(key: Any, value: Any, model: type[BaseModel]) -> Any:
+def _filled(key: Any, value: Any, model: type[Section]) -> Any:
     """`value`, or an empty section where nothing but the section's name was written."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
@@ -180,7 +188,7 @@ def _without_consequences(details: list[Any]) -> list[Any]:
     ]
 
 
-def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel]) -> str:
+def _explain(location: tuple[int | str, ...], detail: Any, model: type[Section]) -> str:
     where = ".".join(str(part) for part in location)
     if detail["type"] != "extra_forbidden":
         message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
@@ -188,6 +196,8 @@ def _explain(location: tuple[int | str, ...], detail: Any, model: type[BaseModel
             return str(message)
         value = "" if isinstance(detail["input"], dict) else f" (got {shortened(detail['input'])})"
         return f"`{where}`: {message[:1].lower()}{message[1:]}{value}"
+    if where in model.former_keys:
+        return f"`{where}` {model.former_keys[where]}"
     known = _keys_beside(location, model)
     near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
     hint = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"

@@ -16,8 +16,8 @@ from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.attitude.kinematics import cos_tilt
 from companion.attitude.representation import normalised
 from companion.guidance.thrust import specific_thrust
-from sitl_mock.config import AirframeConfig, RateLoopConfig
-from sitl_mock.multirotor import Multirotor
+from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.physics.multirotor import Multirotor
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)

@@ -7,6 +7,7 @@ vehicle, which has a reader of its own.
 import contextlib
 import os
 import time
+from typing import ClassVar
 
 import pytest
 import yaml
@@ -14,10 +15,11 @@ import yaml
 from companion.cli.main import main
 from companion.config import Config
 from companion.config.files import load
+from companion.config.root import FORMER_KEYS
 from companion.files import bounded_yaml
 from companion.files.bounded_yaml import MOST_BYTES, YamlError
-from companion.files.yaml_file import ConfigError, parse
-from sitl_mock import config_errors
+from companion.files.yaml_file import ConfigError, Section, parse
+from sitl_mock.config import errors as config_errors
 from sitl_mock.settings import load_settings
 
 QUICK = 2.0
@@ -197,3 +199,38 @@ def test_the_bundled_vehicle_reads_numbers_as_yaml_1_2_has_them(tmp_path):
         path.write_text(f"mock: {{seed: {wrong}}}")
         with pytest.raises(config_errors.ConfigError, match=r"mock\.seed"):
             load_settings(path, {})
+
+
+class _Inner(Section):
+    speed_m_s: float = 1.0
+
+
+class _File(Section):
+    former_keys: ClassVar = {
+        "old": "is now `inner`",
+        "inner.pace": "is now `inner.speed_m_s`",
+    }
+    inner: _Inner = _Inner()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("old: {pace: 1}", "f.yaml: `old` is now `inner`"),
+        ("old:", "f.yaml: `old` is now `inner`"),
+        ("inner: {pace: 1}", "f.yaml: `inner.pace` is now `inner.speed_m_s`"),
+        ("pace: 1", "f.yaml: `pace` is not a known key; known here: inner"),
+    ],
+)
+def test_a_former_key_is_refused_with_what_became_of_it(text, words):
+    with pytest.raises(ConfigError) as raised:
+        parse(text, "f.yaml", _File)
+    assert str(raised.value) == words
+
+
+@pytest.mark.parametrize("key", FORMER_KEYS)
+def test_a_former_key_of_the_configuration_says_what_became_of_it(key):
+    text = "".join(f"{'  ' * depth}{part}:\n" for depth, part in enumerate(key.split(".")))
+    with pytest.raises(ConfigError) as raised:
+        parse(text, "c.yaml", Config)
+    assert str(raised.value) == f"c.yaml: `{key}` {FORMER_KEYS[key]}"

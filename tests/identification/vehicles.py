@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sitl_mock.config import AirframeConfig, RateLoopConfig
-from sitl_mock.multirotor import Multirotor
+from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.physics.multirotor import Multirotor
 
 RATE_NOISE = 0.002
 """Standard deviation of a gyroscope's white noise, rad/s."""

@@ -5,7 +5,7 @@ from typing import Any
 from mock_rig import ACCEPTED, Rig
 from pymavlink.dialects.v20 import ardupilotmega
 
-from sitl_mock.wire import decode
+from sitl_mock.link.framing import decode
 
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 2, 4, 5, 6, 9, 17
 FAILED = 4

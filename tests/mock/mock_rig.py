@@ -5,9 +5,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot import Autopilot
+from sitl_mock.link.framing import Framer, decode
 from sitl_mock.settings import MockSettings
-from sitl_mock.wire import Framer, decode
+from sitl_mock.simulation import Autopilot
 
 HOVER = 0.4903
 IGNORE_ATTITUDE = 128

@@ -8,7 +8,7 @@ from typing import Any
 from mock_rig import Rig
 from pymavlink.dialects.v20 import ardupilotmega, development
 
-from sitl_mock.wire import Framer
+from sitl_mock.link.framing import Framer
 
 NAMES = {
     number: message.msgname

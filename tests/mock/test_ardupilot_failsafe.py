@@ -5,9 +5,9 @@ from ardupilot_rig import FAILED, GUIDED, HOVER, LOITER, RTL, THRUST_IS_THRUST, 
 from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.control import truth
-from sitl_mock.fault_config import fault_adapter
-from sitl_mock.wire import Framer
+from sitl_mock.config.faults import fault_adapter
+from sitl_mock.control_channel import truth
+from sitl_mock.link.framing import Framer
 
 
 def fault(rig, kind, **values):

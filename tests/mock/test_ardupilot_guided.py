@@ -8,9 +8,9 @@ from ardupilot_rig import BRAKE, FAILED, GUIDED, HOVER, LAND, RTL, THRUST_IS_THR
 from mock_rig import ACCEPTED
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.attitude_control import body_z
-from sitl_mock.quaternion import yaw
-from sitl_mock.wire import Framer
+from sitl_mock.autopilot.attitude_control import body_z
+from sitl_mock.link.framing import Framer
+from sitl_mock.physics.quaternion import yaw
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 DRAG = 0.37

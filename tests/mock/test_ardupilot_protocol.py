@@ -8,8 +8,8 @@ from mock_rig import ACCEPTED, DENIED, UNSUPPORTED
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.__main__ import main
-from sitl_mock.autopilot import Autopilot
 from sitl_mock.settings import MockSettings
+from sitl_mock.simulation import Autopilot
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 

@@ -6,7 +6,7 @@ from ardupilot_rig import ArduRig
 from mock_rig import ACCEPTED, DENIED
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.ardupilot_streams import ArduPilotStreams
+from sitl_mock.ardupilot.streams import ArduPilotStreams
 
 ATTITUDE_QUATERNION, ATTITUDE, HEARTBEAT = 31, 30, 0
 LOOP_US = 2500

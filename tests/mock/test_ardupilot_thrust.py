@@ -5,11 +5,17 @@ from math import cos, inf, nan, radians
 
 import pytest
 
-from sitl_mock.ardupilot_climb import Climb, approach
-from sitl_mock.ardupilot_settings import AIRFRAME
-from sitl_mock.ardupilot_thrust import GRAVITY, asked_climb, asked_thrust, boosted, specific_thrust
-from sitl_mock.config import AirframeConfig
-from sitl_mock.rotors import Rotors
+from sitl_mock.ardupilot.climb import Climb, approach
+from sitl_mock.ardupilot.settings import AIRFRAME
+from sitl_mock.ardupilot.thrust import (
+    GRAVITY,
+    asked_climb,
+    asked_thrust,
+    boosted,
+    specific_thrust,
+)
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.physics.rotors import Rotors
 
 MEASURED = {
     0.0: 0.045, 0.1: 0.29, 0.2: 0.57, 0.3: 0.82, 0.36: 0.99, 0.4: 1.09, 0.5: 1.33, 0.6: 1.58,

@@ -4,7 +4,7 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.fault_config import fault_adapter
+from sitl_mock.config.faults import fault_adapter
 
 
 def test_a_lost_companion_is_told_after_6_5_s_and_nothing_else():

@@ -6,9 +6,9 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pydantic import ValidationError
 
-from sitl_mock.fault_config import fault_adapter
-from sitl_mock.faults import FaultSchedule
-from sitl_mock.pipe import DatagramPipe
+from sitl_mock.autopilot.fault_schedule import FaultSchedule
+from sitl_mock.config.faults import fault_adapter
+from sitl_mock.link.pipe import DatagramPipe
 
 DATAGRAMS = [bytes([n, n, n]) for n in range(200)]
 

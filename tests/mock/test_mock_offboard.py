@@ -6,7 +6,7 @@ import pytest
 from mock_rig import ACCEPTED, HOVER, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.wire import decode
+from sitl_mock.link.framing import decode
 
 OFFBOARD = 0x00060000
 

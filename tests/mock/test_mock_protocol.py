@@ -8,7 +8,7 @@ import pytest
 from mock_rig import ACCEPTED, DENIED, UNSUPPORTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.wire import decode
+from sitl_mock.link.framing import decode
 
 INT32, REAL32 = 6, 9
 

@@ -6,10 +6,10 @@ import pytest
 from mock_rig import Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config import SigningConfig
-from sitl_mock.config_errors import ConfigError
-from sitl_mock.signing import Signing, key_from_passphrase, link_signing
-from sitl_mock.wire import decode
+from sitl_mock.config.airframe import SigningConfig
+from sitl_mock.config.errors import ConfigError
+from sitl_mock.link.framing import decode
+from sitl_mock.link.signing import Signing, key_from_passphrase, link_signing
 
 PASSPHRASE = "a passphrase"
 KEY = hashlib.sha256(PASSPHRASE.encode()).digest()

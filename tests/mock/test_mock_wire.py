@@ -5,7 +5,7 @@ import random
 from mock_rig import Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.wire import Framer, decode
+from sitl_mock.link.framing import Framer, decode
 
 
 def arbitrary(kind, rng):

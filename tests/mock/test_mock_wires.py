@@ -9,12 +9,12 @@ import pytest
 from mock_process import HOST, ask, free_port, is_free, mock_process
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.byte_stream import ByteStream
-from sitl_mock.config_errors import ConfigError
-from sitl_mock.serial_endpoint import SerialEndpoint
+from sitl_mock.config.errors import ConfigError
+from sitl_mock.link.byte_stream import ByteStream
+from sitl_mock.link.framing import Framer, decode, split
+from sitl_mock.link.serial_endpoint import SerialEndpoint
+from sitl_mock.link.tcp_endpoint import TcpEndpoint
 from sitl_mock.settings import MockSettings, load_settings
-from sitl_mock.tcp_endpoint import TcpEndpoint
-from sitl_mock.wire import Framer, decode, split
 
 FRAMER = Framer(255, 190)
 

@@ -10,10 +10,10 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from sitl_mock.ekf_config import EKFS
-from sitl_mock.navigation_filter import NavigationFilter, Snapshot
+from sitl_mock.config.ekf import EKFS
+from sitl_mock.physics.navigation_filter import NavigationFilter, Snapshot
+from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings
-from sitl_mock.vehicle import ActuatorCommand, Vehicle
 
 DT = 0.02
 SETTLED_S = 40.0

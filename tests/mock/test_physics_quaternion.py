@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sitl_mock.quaternion import from_yaw, multiply, normalise, to_body, yaw
+from sitl_mock.physics.quaternion import from_yaw, multiply, normalise, to_body, yaw
 
 component = st.floats(-1.0, 1.0)
 unit = (

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from sitl_mock.config import AirframeConfig
-from sitl_mock.physics import Body, advance, body_of, derivative
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.physics.rigid_body import Body, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
 FREE = Body(0.02, 0.035, 0.05, drag=0.0, quadratic_drag=0.0, rotational_drag=0.0, gravity=9.80665)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl_mock.config import AirframeConfig
-from sitl_mock.rotors import Rotors, mix
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.physics.rotors import Rotors, mix
 
 AIRFRAME = AirframeConfig()
 difference = st.floats(-0.6, 0.6)

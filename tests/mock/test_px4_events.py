@@ -7,8 +7,8 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.px4_events import PX4_EVENTS
-from sitl_mock.wire import Framer, decode, split
+from sitl_mock.link.framing import Framer, decode, split
+from sitl_mock.px4.events import PX4_EVENTS
 
 EVENT, SEQUENCE, ERROR = 410, 411, 413
 NO_STREAM = "0040000014"

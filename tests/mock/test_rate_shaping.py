@@ -12,11 +12,11 @@ from scipy.optimize import curve_fit
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.__main__ import main
-from sitl_mock.config import AirframeConfig, AxisShaping, RateLoopConfig
-from sitl_mock.multirotor import Multirotor
-from sitl_mock.rate_shaping import RateShaping, closing
+from sitl_mock.config.airframe import AirframeConfig, AxisShaping, RateLoopConfig
+from sitl_mock.physics.multirotor import Multirotor
+from sitl_mock.physics.rate_shaping import RateShaping, closing
+from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
-from sitl_mock.vehicle import ActuatorCommand, Vehicle
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)

@@ -5,9 +5,9 @@ from math import exp
 import numpy as np
 import pytest
 
-from sitl_mock.battery import Battery
-from sitl_mock.config import AirframeConfig, BatteryConfig, WindConfig
-from sitl_mock.wind import Wind
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
+from sitl_mock.physics.battery import Battery
+from sitl_mock.physics.wind import Wind
 
 STEP = 0.01
 HOVER_N = 9.80665

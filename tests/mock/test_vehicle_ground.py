@@ -4,9 +4,9 @@ from math import acos, inf, isnan, nan, radians
 
 import pytest
 
-from sitl_mock.config import AirframeConfig, WindConfig
-from sitl_mock.quaternion import yaw
-from sitl_mock.vehicle import ActuatorCommand, Vehicle
+from sitl_mock.config.airframe import AirframeConfig, WindConfig
+from sitl_mock.physics.quaternion import yaw
+from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 
 def fly(vehicle, seconds, thrust, roll=0.0, armed=True):

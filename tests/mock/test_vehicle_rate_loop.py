@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from sitl_mock.config import AirframeConfig, AxisGains, RateLoopConfig, SensorConfig
-from sitl_mock.rate_loop import AT_REST, RateLoop, axis_law, axis_step
-from sitl_mock.vehicle import ActuatorCommand, Vehicle
+from sitl_mock.config.airframe import AirframeConfig, AxisGains, RateLoopConfig, SensorConfig
+from sitl_mock.physics.rate_loop import AT_REST, RateLoop, axis_law, axis_step
+from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 NOISELESS = SensorConfig(
     attitude_noise_deg=0.0,

@@ -7,9 +7,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from sitl_mock import config
-from sitl_mock.quaternion import yaw
-from sitl_mock.vehicle import ActuatorCommand, Vehicle
+from sitl_mock.config import airframe as config
+from sitl_mock.physics.quaternion import yaw
+from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 PERFECT = {
     "attitude_noise_deg": 0.0,

@@ -1,0 +1,1 @@
+"""ArduCopter, as recorded and measured: its numbers, texts and rules."""

@@ -1,0 +1,110 @@
+"""How ArduCopter comes up: what it says when (recorded), and what it is capable of by then."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
+from sitl_mock.ardupilot.texts import INFO
+from sitl_mock.autopilot.state import State
+
+RECORDED_READY_S = 41.6
+"""From the start to a position estimate that GUIDED can be armed with; times here scale with it."""
+INITIALISED_S = 2.4
+ORIGIN_S = 20.0
+HOME_S = 23.5
+"""From here the pre-arm checks pass, in modes that need no position."""
+RUNTIME_PERIOD_US = 30_000_000
+"""STAT_RUNTIME is saved, and told, this often."""
+
+_TEXTS = (
+    (0.16, "RCInput: decoding UDP (Pulses)"),
+    (0.28, "Calibrating barometer"),
+    (1.87, "Barometer 1 calibration complete"),
+    (1.87, "Barometer 2 calibration complete"),
+    (INITIALISED_S, "ArduPilot Ready"),
+    (INITIALISED_S, "AHRS: DCM active"),
+    (2.7, "RC7: SaveWaypoint LOW"),
+    (4.4, "EKF3 IMU0 initialised"),
+    (4.4, "EKF3 IMU1 initialised"),
+    (4.4, "AHRS: EKF3 active"),
+    (5.75, "EKF3 IMU0 tilt alignment complete"),
+    (5.75, "EKF3 IMU1 tilt alignment complete"),
+    (5.85, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+    (5.85, "EKF3 IMU1 MAG0 initial yaw alignment complete"),
+    (9.76, "GPS 1: probing for u-blox at 230400 baud"),
+    (9.78, "GPS 1: detected u-blox"),
+    (ORIGIN_S, "EKF3 IMU0 origin set"),
+    (ORIGIN_S, "Field Elevation Set: {elevation:.0f}m"),
+    (20.2, "EKF3 IMU1 origin set"),
+    (RECORDED_READY_S, "EKF3 IMU0 is using GPS"),
+    (RECORDED_READY_S, "EKF3 IMU1 is using GPS"),
+)
+_SAVED = (
+    (0.16, "COMPASS_DEV_ID"),
+    (1.87, "BARO1_GND_PRESS"),
+    (INITIALISED_S, "INS_GYR_ID"),
+)
+"""Parameters that it saves on the way, and tells of."""
+
+
+class Voice(NamedTuple):
+    """By what the boot makes itself heard."""
+
+    announce: ArduPilotAnnouncer
+    tell_home: Callable[[], None]
+    tell_parameter: Callable[[str], None]
+
+
+class Boot:
+    """Follows the time since the start.
+
+    Args:
+        state: for the time.
+        voice: tells of what is reached.
+        ready_us: when the position estimate is good.
+        elevation: of home above sea level, m.
+    """
+
+    def __init__(self, state: State, voice: Voice, *, ready_us: int, elevation: float) -> None:
+        self._state = state
+        self._voice = voice
+        self._share = ready_us / (RECORDED_READY_S * 1e6)
+        self._elevation = elevation
+        self._texts = list(_TEXTS)
+        self._saved = list(_SAVED)
+        self._home_told = False
+        self._next_runtime_us = RUNTIME_PERIOD_US
+
+    def reached(self, recorded_s: float) -> bool:
+        """Whether the time of the recording that is called ``recorded_s`` has come, scaled."""
+        return self._state.time_us >= recorded_s * self._share * 1e6
+
+    @property
+    def initialised(self) -> bool:
+        """Whether it is ready for commands."""
+        return self.reached(INITIALISED_S)
+
+    @property
+    def origin_set(self) -> bool:
+        """Whether the estimator has an origin, and so home a place."""
+        return self.reached(ORIGIN_S)
+
+    @property
+    def home_set(self) -> bool:
+        """Whether the estimator has settled on its origin."""
+        return self.reached(HOME_S)
+
+    def step(self) -> None:
+        """Tell of what is reached by now."""
+        voice = self._voice
+        while self._saved and self.reached(self._saved[0][0]):
+            voice.tell_parameter(self._saved.pop(0)[1])
+        while self._texts and self.reached(self._texts[0][0]):
+            text = self._texts.pop(0)[1]
+            voice.announce.say(text.format(elevation=self._elevation), INFO)
+        if self.origin_set and not self._home_told:
+            self._home_told = True
+            voice.tell_home()
+        if self._state.time_us >= self._next_runtime_us:
+            self._next_runtime_us += RUNTIME_PERIOD_US
+            voice.tell_parameter("STAT_RUNTIME")

@@ -1,0 +1,245 @@
+"""ArduCopter's rules of arming, modes and GUIDED, by its measured behaviour."""
+
+from math import isfinite, isnan
+
+from sitl_mock.ardupilot.boot import Boot, Voice
+from sitl_mock.ardupilot.checks import arming_problem
+from sitl_mock.ardupilot.failsafe import ArduPilotFailsafe
+from sitl_mock.ardupilot.guided import Guided, Task
+from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
+from sitl_mock.ardupilot.modes import NEEDS_POSITION, STICKS_HOLD
+from sitl_mock.ardupilot.setpoints import FatalSetpointError, attitude_setpoint
+from sitl_mock.ardupilot.texts import CRITICAL, INFO
+from sitl_mock.autopilot.commander import ACCEPTED, FAILED
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.personality import Occasion
+from sitl_mock.autopilot.setpoints import position_setpoint
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.vehicle import Vehicle
+
+LANDED_TO_DISARM_US = 500_000
+"""LAND disarms this much after the landing (recorded)."""
+_OWN_COMPONENT = 1
+YAW_ALIGNED_M = 2.8
+"""Above this height the estimator aligns its heading anew, once a flight (recorded: 2.7 to 2.9)."""
+
+
+class ArduPilotCommander:
+    """ArduCopter's `Commander`.
+
+    Args:
+        state: the autopilot's state.
+        parameters: its parameters.
+        vehicle: for the battery.
+        control: told of every mode entered.
+        guided: told what GUIDED shall do.
+        stream: counts the setpoints that are obeyed.
+        voice: tells the outside.
+        boot: how far the autopilot has come up.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        vehicle: Vehicle,
+        control: ArduPilotModeControl,
+        guided: Guided,
+        stream: OffboardStream,
+        voice: Voice,
+        boot: Boot,
+    ) -> None:
+        self.refusal: str | None = None
+        self.pilot = False
+        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, voice.announce, self._act)
+        self._state = state
+        self._parameters = parameters
+        self._control = control
+        self._guided = guided
+        self._stream = stream
+        self._announce = voice.announce
+        self._voice = voice
+        self._boot = boot
+        self._landed_since_us = 0
+        self._crashed = False
+        self._internal_error = False
+        self._yaw_aligned = False
+
+    @property
+    def under_setpoints(self) -> bool:
+        """Whether it flies in GUIDED what setpoints of attitude ask."""
+        state = self._state
+        follows = state.mode is Mode.GUIDED and self._guided.task is Task.ANGLE
+        return follows and state.armed and not state.landed
+
+    def arm(self, *, force: bool = False) -> int:
+        """Arm, and return a MAV_RESULT; ``force`` skips the checks but those of the boot."""
+        state = self._state
+        if state.armed:
+            return ACCEPTED
+        problem = self._check()
+        if problem is not None and not (force and self._boot.initialised and not self._crashed):
+            self._announce(Occasion.ARMING_DENIED, problem)
+            return FAILED
+        state.armed = True
+        state.armed_at_us = self._landed_since_us = state.time_us
+        state.flown = self._yaw_aligned = False
+        state.home_ned = state.estimate.position_ned
+        state.home_set_at_us = state.time_us
+        self._announce(Occasion.ARMED, "")
+        self._voice.tell_home()
+        self._control.enter(state.mode)
+        return ACCEPTED
+
+    def tell_problem(self) -> None:
+        """Say what forbids arming now, if anything does."""
+        problem = self._check()
+        if problem is not None:
+            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+
+    def disarm(self, *, force: bool = False) -> int:
+        """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
+        if not self._state.armed:
+            return ACCEPTED
+        if not self._state.landed and not force:
+            return FAILED
+        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
+        return ACCEPTED
+
+    def request_mode(self, mode: Mode) -> int:
+        """Change the mode, and return a MAV_RESULT; before the boot is over it is lost."""
+        state = self._state
+        if not self._boot.initialised or mode is state.mode:
+            return ACCEPTED
+        if state.armed and mode in NEEDS_POSITION and not state.position_valid:
+            self._announce(Occasion.MODE_DENIED, mode.name)
+            return FAILED
+        self._enter(mode)
+        return ACCEPTED
+
+    def take_off(self, height: float) -> int:
+        """Climb to a height above home, m; only armed, in GUIDED, on the ground."""
+        state = self._state
+        ready = state.armed and state.landed and state.mode is Mode.GUIDED
+        if not ready or not isfinite(height) or height <= 0.0:
+            return FAILED
+        self._guided.take_off(height)
+        return ACCEPTED
+
+    def take_over(self, mode: Mode) -> None:
+        """Let the pilot's sticks change the mode (fault injection)."""
+        self.pilot = True
+        self.request_mode(STICKS_HOLD.get(mode, mode))
+
+    def heard(self, heartbeat: Message) -> None:
+        """Note a heartbeat."""
+        self.failsafe.heard(heartbeat)
+
+    def setpoint(self, message: Message) -> None:
+        """Take a setpoint in GUIDED; one that comes from this very autopilot is ignored."""
+        state = self._state
+        own = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
+        if state.mode is not Mode.GUIDED:
+            return
+        if (message.get_srcSystem(), message.get_srcComponent()) == own:
+            return
+        if message.get_type() == "SET_ATTITUDE_TARGET":
+            self._attitude_setpoint(message)
+            return
+        asked = position_setpoint(message)
+        if asked is not None:
+            self._stream.accept(asked, state.time_us)
+            self._guided.follow_position(asked, state.time_us)
+
+    def _attitude_setpoint(self, message: Message) -> None:
+        state = self._state
+        try:
+            asked = attitude_setpoint(message)
+        except FatalSetpointError:
+            state.aborted = True
+            return
+        if asked is None:
+            self._guided.hold()
+            return
+        if asked.rates is not None and any(map(isnan, asked.rates)):
+            self._tell_internal_error()
+        self._stream.accept(asked, state.time_us)
+        self._guided.follow_angle(asked, state.time_us)
+
+    def _tell_internal_error(self) -> None:
+        if not self._internal_error:
+            self._announce.say("Internal Errors 0x400", CRITICAL)
+        self._internal_error = True
+
+    def step(self, *, crashed: bool) -> None:
+        """Run the rules once; called at 20 Hz of vehicle time."""
+        state = self._state
+        self._crashed = crashed
+        self._boot.step()
+        if state.armed and crashed:
+            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
+        self.failsafe.step()
+        self._check()
+        if state.armed:
+            self._align_yaw()
+            self._disarm_on_ground()
+
+    def _align_yaw(self) -> None:
+        """Say that the heading was aligned in the air, as soon as it is high enough."""
+        state = self._state
+        height = state.home_ned[2] - state.estimate.position_ned[2]
+        if self._yaw_aligned or height < YAW_ALIGNED_M:
+            return
+        self._yaw_aligned = True
+        for unit in (0, 1):
+            self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
+
+    def _check(self) -> str | None:
+        """Look for what forbids arming, note it in the state and return it."""
+        state = self._state
+        state.prearm_problem = arming_problem(
+            state,
+            initialised=self._boot.initialised,
+            home_set=self._boot.home_set,
+            crashed=self._crashed,
+            gcs_failsafe=self.failsafe.gcs_lost,
+            refusal=self.refusal,
+        )
+        return state.prearm_problem
+
+    def _disarm_on_ground(self) -> None:
+        state = self._state
+        if not state.landed or self._control.taking_off:
+            self._landed_since_us = state.time_us
+            return
+        waited = state.time_us - self._landed_since_us
+        delay = self._parameters["DISARM_DELAY"] * 1e6
+        if self._control.landing and state.flown:
+            if waited >= LANDED_TO_DISARM_US:
+                self._stop_motors(Occasion.DISARMED_BY_LANDING)
+        elif 0.0 < delay <= waited:
+            self._stop_motors(Occasion.DISARMED_ON_GROUND)
+
+    def _stop_motors(self, occasion: Occasion) -> None:
+        self._state.armed = False
+        self._announce(occasion, "")
+        self._voice.tell_parameter("MOT_THST_HOVER")  # what was learned is saved
+        if self._state.mode is Mode.GUIDED:
+            self._guided.hold()
+
+    def _act(self, mode: Mode) -> None:
+        """Enter a failsafe's mode, LAND where it cannot be; on the ground, disarm."""
+        state = self._state
+        if state.landed:
+            self._stop_motors(Occasion.DISARMED_ON_GROUND)
+        elif mode in NEEDS_POSITION and not state.position_valid:
+            self._enter(Mode.LAND)
+        elif state.mode is not mode:
+            self._enter(mode)
+
+    def _enter(self, mode: Mode) -> None:
+        self._state.mode = self._state.intended_mode = mode
+        self._control.enter(mode)

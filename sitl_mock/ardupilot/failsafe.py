@@ -1,0 +1,130 @@
+"""What ArduCopter does when the ground station, the position or the battery is lost."""
+
+from typing import Protocol
+
+from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOTED
+from sitl_mock.autopilot.commander import Announce
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.personality import Occasion
+from sitl_mock.autopilot.state import BatteryWarning, State
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.vehicle import Vehicle
+
+_GCS_ACTIONS = {1: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL, 5: Mode.LAND, 7: Mode.BRAKE}
+"""FS_GCS_ENABLE -> mode."""
+_BATTERY_ACTIONS = {1: Mode.LAND, 2: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL}
+"""BATT_FS_LOW_ACT and BATT_FS_CRT_ACT -> mode."""
+_PILOT_GOES_ON = 16
+"""Bit of FS_OPTIONS: a lost ground station does not disturb a pilot."""
+
+
+class _Act(Protocol):
+    def __call__(self, mode: Mode) -> None: ...
+
+
+class ArduPilotFailsafe:
+    """Watches and acts while armed; each failsafe acts once, when it begins.
+
+    Args:
+        state: the autopilot's state.
+        parameters: its parameters.
+        vehicle: for the battery's voltage.
+        announce: tells of an occasion.
+        act: enters a mode, or disarms a vehicle that stands.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        vehicle: Vehicle,
+        announce: Announce,
+        act: _Act,
+    ) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._vehicle = vehicle
+        self._announce = announce
+        self._act = act
+        self._gcs_us: int | None = None
+        self.gcs_lost = False
+        """Whether the ground station's failsafe is on."""
+        self._position_lost = False
+        self._voltage_low_since_us: int | None = None
+
+    def heard(self, heartbeat: Message) -> None:
+        """Note a heartbeat: the ground station is whoever has the system id MAV_GCS_SYSID."""
+        if heartbeat.get_srcSystem() == self._parameters["MAV_GCS_SYSID"]:
+            self._gcs_us = self._state.time_us
+
+    def step(self) -> None:
+        """Look once at everything that may be lost."""
+        self._watch_gcs()
+        self._watch_battery()
+        self._watch_position()
+        self._state.failsafe = (
+            self.gcs_lost or self._position_lost or self._state.battery_warning > BatteryWarning.OK
+        )
+
+    def _watch_gcs(self) -> None:
+        state, parameters = self._state, self._parameters
+        enabled = int(parameters["FS_GCS_ENABLE"])
+        if self._gcs_us is None:
+            return
+        limit = parameters["FS_GCS_TIMEOUT"] * 1e6
+        lost = bool(enabled) and state.time_us - self._gcs_us >= limit
+        if self.gcs_lost and not lost:
+            self.gcs_lost = False
+            self._announce(Occasion.GCS_REGAINED, "")
+        elif lost and not self.gcs_lost and state.armed:
+            self.gcs_lost = True
+            self._announce(Occasion.GCS_LOST, "")
+            goes_on = int(parameters["FS_OPTIONS"]) & _PILOT_GOES_ON and state.mode in PILOTED
+            mode = _GCS_ACTIONS.get(enabled)
+            if mode is not None and not goes_on:
+                self._act(mode)
+
+    def _watch_battery(self) -> None:
+        state, parameters = self._state, self._parameters
+        left_mah = state.battery_remaining * parameters["BATT_CAPACITY"]
+        if left_mah < parameters["BATT_CRT_MAH"] or self._voltage_below("BATT_CRT_VOLT"):
+            warning = BatteryWarning.CRITICAL
+        elif left_mah < parameters["BATT_LOW_MAH"] or self._voltage_low():
+            warning = BatteryWarning.LOW
+        else:
+            warning = BatteryWarning.OK
+        if warning <= state.battery_warning:
+            return  # a battery's failsafe does not end in flight
+        state.battery_warning = warning
+        critical = warning is BatteryWarning.CRITICAL
+        used = parameters["BATT_CAPACITY"] - left_mah
+        detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used:.0f} mAh"
+        self._announce(Occasion.BATTERY_CRITICAL if critical else Occasion.BATTERY_LOW, detail)
+        action = parameters["BATT_FS_CRT_ACT" if critical else "BATT_FS_LOW_ACT"]
+        mode = _BATTERY_ACTIONS.get(int(action))
+        if state.armed and mode is not None:
+            self._act(mode)
+
+    def _voltage_below(self, limit: str) -> bool:
+        return self._vehicle.battery.voltage_v < self._parameters[limit]
+
+    def _voltage_low(self) -> bool:
+        """Whether the voltage is below BATT_LOW_VOLT for as long as BATT_LOW_TIMER."""
+        now = self._state.time_us
+        if not self._voltage_below("BATT_LOW_VOLT"):
+            self._voltage_low_since_us = None
+            return False
+        if self._voltage_low_since_us is None:
+            self._voltage_low_since_us = now
+        return now - self._voltage_low_since_us >= self._parameters["BATT_LOW_TIMER"] * 1e6
+
+    def _watch_position(self) -> None:
+        """Land where the position is lost and needed, if FS_EKF_ACTION asks it."""
+        state = self._state
+        lost = state.armed and not state.position_valid
+        began = lost and not self._position_lost and state.mode in NEEDS_POSITION
+        self._position_lost = lost and (self._position_lost or began)
+        if began and self._parameters["FS_EKF_ACTION"]:
+            self._announce(Occasion.POSITION_LOST, "")
+            self._act(Mode.LAND)

@@ -1,0 +1,62 @@
+"""What GUIDED does now: hold a position, take off, follow setpoints of attitude or of position."""
+
+from enum import Enum, auto
+
+from sitl_mock.autopilot.setpoints import AttitudeSetpoint, PositionSetpoint
+
+
+class Task(Enum):
+    """GUIDED's submodes."""
+
+    HOLD = auto()
+    TAKE_OFF = auto()
+    ANGLE = auto()
+    POSITION = auto()
+
+
+class Guided:
+    """The task, and what it was given. Each new one replaces the last at once, a take-off too."""
+
+    def __init__(self) -> None:
+        self.task = Task.HOLD
+        self.takeoff_height = 0.0
+        """Where TAKE_OFF ends, m above home."""
+        self.angle: AttitudeSetpoint | None = None
+        self.position: PositionSetpoint | None = None
+        self.since_us = 0
+        """When the latest setpoint came, vehicle time."""
+        self.changed = True
+        """Whether the task has just begun; whoever flies it clears this."""
+
+    def hold(self) -> None:
+        """Hold the position from here."""
+        self._begin(Task.HOLD)
+
+    def arrive(self) -> None:
+        """End a take-off: hold what it has come to."""
+        self.task = Task.HOLD
+
+    def take_off(self, height: float) -> None:
+        """Climb to a height above home, m."""
+        self.takeoff_height = height
+        self._begin(Task.TAKE_OFF)
+
+    def follow_angle(self, setpoint: AttitudeSetpoint, now_us: int) -> None:
+        """Follow rates or an attitude, with thrust."""
+        self.angle, self.since_us = setpoint, now_us
+        if self.task is not Task.ANGLE:
+            self._begin(Task.ANGLE)
+
+    def follow_position(self, setpoint: PositionSetpoint, now_us: int) -> None:
+        """Follow a position, a velocity or an acceleration."""
+        self.position, self.since_us = setpoint, now_us
+        if self.task is not Task.POSITION:
+            self._begin(Task.POSITION)
+
+    def silent(self, now_us: int, timeout_s: float) -> bool:
+        """Whether the latest setpoint is older than GUID_TIMEOUT."""
+        return now_us - self.since_us > timeout_s * 1e6
+
+    def _begin(self, task: Task) -> None:
+        self.task = task
+        self.changed = True

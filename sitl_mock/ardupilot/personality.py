@@ -1,0 +1,161 @@
+"""ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
+
+from collections.abc import Collection, Iterable, Mapping
+
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
+from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
+from sitl_mock.ardupilot.commander import ArduPilotCommander
+from sitl_mock.ardupilot.commands import ArduPilotCommands
+from sitl_mock.ardupilot.guided import Guided
+from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
+from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
+from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
+from sitl_mock.ardupilot.parameters import ARDUPILOT_TYPES
+from sitl_mock.ardupilot.streams import ArduPilotStreams
+from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
+from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS
+from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.land_detector import LandDetector
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.motion_telemetry import Builder
+from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
+from sitl_mock.autopilot.parameters import FloatEncoding
+from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
+from sitl_mock.link.link import Link
+from sitl_mock.link.streams import StreamSchedule
+from sitl_mock.settings import MockSettings
+
+LANDED_AFTER_US = 1_000_000
+"""Contact with little thrust for this long is a landing."""
+POSITION_TIMEOUT_US = 10_000_000
+"""How long the position stays valid without GPS; not measured."""
+DEFAULT_LOOP_HZ = 400.0
+_HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
+_BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
+_SUPPORTED = frozenset(
+    {
+        *_BOOT_RATES,
+        dialect.MAVLINK_MSG_ID_ATTITUDE,
+        dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+        dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+        dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        dialect.MAVLINK_MSG_ID_BATTERY_STATUS,
+        dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+        dialect.MAVLINK_MSG_ID_GPS_RAW_INT,
+        dialect.MAVLINK_MSG_ID_HIGHRES_IMU,
+        dialect.MAVLINK_MSG_ID_HOME_POSITION,
+        dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        dialect.MAVLINK_MSG_ID_MISSION_CURRENT,
+        dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+        dialect.MAVLINK_MSG_ID_RAW_IMU,
+        dialect.MAVLINK_MSG_ID_RC_CHANNELS,
+        dialect.MAVLINK_MSG_ID_SCALED_PRESSURE,
+        dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+        dialect.MAVLINK_MSG_ID_SYS_STATUS,
+        dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
+        dialect.MAVLINK_MSG_ID_VFR_HUD,
+        dialect.MAVLINK_MSG_ID_VIBRATION,
+        ardupilotmega.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    }
+)
+"""Messages that can be asked for."""
+
+
+class ArduPilot:
+    """The ArduPilot personality, a Copter."""
+
+    events: Mapping[Occasion, Event] = ARDUPILOT_EVENTS
+    boot_mode = Mode.STABILIZE
+    any_component = True
+    system_id_parameter = "MAV_SYSID"
+    unsigned_links: Collection[str] = ("companion",)
+    identity = Identity(
+        capabilities=64495,
+        flight_sw_version=0x04070000,
+        middleware_sw_version=0,
+        os_sw_version=0,
+        flight_custom_version=tuple(b"12f6aa4e"),
+    )
+
+    def slot_us(self, settings: MockSettings) -> int:
+        """Return a turn of the main loop."""
+        return self._loop_us(settings)
+
+    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+        """Return the streams of a link: silent but for the boot's until it is asked."""
+        silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
+        return ArduPilotStreams(
+            _BOOT_RATES,
+            _SUPPORTED,
+            loop_us=self._loop_us(settings),
+            silent_until_us=silent_s * 1e6,
+        )
+
+    def mode_of(self, custom_mode: int) -> Mode | None:
+        """Return the mode a custom_mode means, None if the mock has none such."""
+        return MODES_BY_NUMBER.get(custom_mode)
+
+    def rules(self, parts: Parts) -> Rules:
+        """Put ArduCopter's rules together."""
+        state, parameters, links = parts.state, parts.parameters, parts.links
+        announce = ArduPilotAnnouncer(links)
+        protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
+        guided = Guided()
+        control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
+        voice = Voice(
+            announce,
+            tell_home=lambda: _tell(commands, _HOME, links),
+            tell_parameter=lambda name: protocol.tell(name, [x for x in links if x.heard]),
+        )
+        boot = Boot(state, voice, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
+        commander = ArduPilotCommander(
+            state, parameters, parts.vehicle, control, guided, parts.stream, voice, boot
+        )
+        builders = self._builders(parts, boot)
+        commands = ArduPilotCommands(state, commander, builders, announce)
+        return Rules(
+            control,
+            commander,
+            commands,
+            protocol,
+            LandDetector(
+                state,
+                announce,
+                hover_thrust=control.hover_throttle,
+                landed_after_us=LANDED_AFTER_US,
+                climbing=lambda: control.taking_off,
+            ),
+            builders,
+            handlers={"REQUEST_DATA_STREAM": commands.data_stream},
+            converged_us=parts.ready_us,
+            position_timeout_us=lambda: POSITION_TIMEOUT_US,
+        )
+
+    def _builders(self, parts: Parts, boot: Boot) -> dict[int, Builder]:
+        motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin)
+        system = ArduPilotSystemTelemetry(
+            parts.state,
+            parts.origin,
+            self.identity,
+            parts.vehicle,
+            initialised=lambda: boot.initialised,
+            origin_set=lambda: boot.origin_set,
+        )
+        return motion.builders() | system.builders()
+
+    @staticmethod
+    def _loop_us(settings: MockSettings) -> int:
+        rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
+        return round(1e6 / rate)
+
+
+def _tell(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
+    """Send messages once on every link."""
+    for link in links:
+        for message_id in messages:
+            commands.send(message_id, link)

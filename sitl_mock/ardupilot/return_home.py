@@ -1,0 +1,65 @@
+"""ArduCopter's RTL: climb, fly home, wait above it, land."""
+
+from enum import Enum, auto
+from math import hypot
+
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.state import State
+
+_NEAR_M = 2.0
+"""Nearer to home than this (WPNAV_RADIUS) the vehicle is there."""
+_REACHED_M = 0.3
+
+
+class Leg(Enum):
+    """Where on the way home the vehicle is."""
+
+    CLIMB = auto()
+    HOME = auto()
+    WAIT = auto()
+    LAND = auto()
+
+
+class Return:
+    """The way home.
+
+    Args:
+        state: the autopilot's state.
+        parameters: heights and times.
+    """
+
+    def __init__(self, state: State, parameters: ParameterTable) -> None:
+        self._state = state
+        self._parameters = parameters
+        self.leg = Leg.CLIMB
+        self.height = 0.0
+        """To fly home at, m above the local origin."""
+        self._waiting_since_us = 0
+
+    def begin(self) -> None:
+        """Choose the height: RTL_ALT, less near home by RTL_CONE_SLOPE, never lower than now."""
+        state, parameters = self._state, self._parameters
+        height = -state.estimate.position_ned[2]
+        cone = parameters["RTL_CONE_SLOPE"] * self._distance()
+        wanted = min(0.01 * parameters["RTL_ALT"], cone) - state.home_ned[2]
+        self.height = max(height, wanted)
+        self.leg = Leg.CLIMB
+
+    def step(self) -> None:
+        """Go on to the next leg when this one is done."""
+        state = self._state
+        if self.leg is Leg.CLIMB:
+            if self.height + state.estimate.position_ned[2] < _REACHED_M:
+                self.leg = Leg.HOME
+        elif self.leg is Leg.HOME:
+            if self._distance() < _NEAR_M:
+                self.leg = Leg.WAIT
+                self._waiting_since_us = state.time_us
+        elif self.leg is Leg.WAIT:
+            waited_ms = (state.time_us - self._waiting_since_us) / 1e3
+            if waited_ms >= self._parameters["RTL_LOIT_TIME"]:
+                self.leg = Leg.LAND
+
+    def _distance(self) -> float:
+        (x, y, _), home = self._state.estimate.position_ned, self._state.home_ned
+        return hypot(x - home[0], y - home[1])

@@ -1,0 +1,160 @@
+"""The messages that tell how the vehicle and its autopilot are, in ArduCopter's conventions."""
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.ardupilot.modes import MODE_NUMBERS, base_mode
+from sitl_mock.autopilot.motion_telemetry import Builder, clip
+from sitl_mock.autopilot.personality import Identity
+from sitl_mock.autopilot.state import NAN, State
+from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.vehicle import Vehicle
+
+_SENSORS_PRESENT = 1399979055
+_SENSORS_ENABLED = 1382128687
+_SENSORS_HEALTHY = 1467063343
+"""Recorded disarmed, without a height or position controller."""
+_HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+_POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_LOGGING = dialect.MAV_SYS_STATUS_LOGGING
+_EKF_GOOD = 0x33F
+_EKF_NO_POSITION = (
+    ardupilotmega.EKF_ATTITUDE
+    | ardupilotmega.EKF_VELOCITY_VERT
+    | ardupilotmega.EKF_POS_VERT_ABS
+    | ardupilotmega.EKF_CONST_POS_MODE
+)
+_STICKS_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
+"""The simulated transmitter at rest."""
+
+
+class ArduPilotSystemTelemetry(SystemTelemetry):
+    """Builds messages about the state, the battery, GPS and the estimator.
+
+    Args:
+        state: the autopilot's state.
+        origin: of the local frame.
+        identity: what AUTOPILOT_VERSION says.
+        vehicle: for the battery.
+        initialised: whether the autopilot has come up.
+        origin_set: whether the estimator has an origin.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        origin: Origin,
+        identity: Identity,
+        vehicle: Vehicle,
+        *,
+        initialised: Callable[[], bool],
+        origin_set: Callable[[], bool],
+    ) -> None:
+        super().__init__(state, origin, identity)
+        self._vehicle = vehicle
+        self._initialised = initialised
+        self._origin_set = origin_set
+        self._used_as = 0.0
+        self._used_at_us = 0
+
+    def builders(self) -> dict[int, Builder]:
+        """Return message id -> builder."""
+        return super().builders() | {
+            dialect.MAVLINK_MSG_ID_HEARTBEAT: self.heartbeat,
+            dialect.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
+            dialect.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
+            dialect.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
+            dialect.MAVLINK_MSG_ID_RC_CHANNELS: self.rc_channels,
+            ardupilotmega.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self.ekf_status_report,
+        }
+
+    def heartbeat(self) -> Message:
+        """Return HEARTBEAT; until it is initialised the guided bit is set (recorded: 89)."""
+        state = self._state
+        controlled = state.position_controlled or not self._initialised()
+        return dialect.MAVLink_heartbeat_message(
+            dialect.MAV_TYPE_QUADROTOR,
+            dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base_mode(armed=state.armed, position_controlled=controlled),
+            MODE_NUMBERS[state.mode],
+            self.system_status(),
+            3,
+        )
+
+    def system_status(self) -> int:
+        """Return MAV_STATE: 1 booting, 3 on the ground, armed or not, 4 flying, 5 in failsafe."""
+        state = self._state
+        if state.failsafe:
+            return int(dialect.MAV_STATE_CRITICAL)
+        if not self._initialised():
+            return int(dialect.MAV_STATE_BOOT)
+        return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
+
+    def sys_status(self) -> Message:
+        """Return SYS_STATUS; the prearm bit is what clients call armable."""
+        state, battery = self._state, self._vehicle.battery
+        working = _HEIGHT_CONTROL if state.height_controlled else 0
+        working |= _POSITION_CONTROL if state.position_controlled else 0
+        return dialect.MAVLink_sys_status_message(
+            _SENSORS_PRESENT,
+            _SENSORS_ENABLED | working | (_LOGGING if state.armed else 0),
+            self._healthy(_SENSORS_HEALTHY | working),
+            0,
+            clip(battery.voltage_v * 1e3, 15),
+            clip(battery.current_a * 1e2, 15),
+            round(100 * battery.remaining),
+            *(0,) * 6,
+        )
+
+    def battery_status(self) -> Message:
+        """Return BATTERY_STATUS."""
+        battery, state = self._vehicle.battery, self._state
+        self._used_as += battery.current_a * (state.time_us - self._used_at_us) / 1e6
+        self._used_at_us = state.time_us
+        return dialect.MAVLink_battery_status_message(
+            0,
+            dialect.MAV_BATTERY_FUNCTION_UNKNOWN,
+            dialect.MAV_BATTERY_TYPE_UNKNOWN,
+            32767,
+            [round(battery.voltage_v * 1e3)] + [NO_VALUE] * 9,
+            clip(battery.current_a * 1e2, 15),
+            round(self._used_as / 3.6),
+            0,
+            round(100 * battery.remaining),
+            0,
+            int(state.battery_warning),
+        )
+
+    def gps_raw_int(self) -> Message:
+        """Return GPS_RAW_INT: nothing until the receiver is found, then an RTK fix (recorded)."""
+        state = self._state
+        if not state.gps_ok or not self._initialised():
+            return dialect.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, NO_VALUE, NO_VALUE, 0, 0, 0)
+        return self._gps_fix(dialect.GPS_FIX_TYPE_RTK_FIXED, (121, 200), 0, (300, 300))
+
+    def ekf_status_report(self) -> Message:
+        """Return EKF_STATUS_REPORT with the recorded flags and typical variances."""
+        if not self._initialised():
+            flags, variances = ardupilotmega.EKF_UNINITIALIZED, (0.0,) * 5
+        elif not self._state.position_valid:
+            flags, variances = _EKF_NO_POSITION, (0.0, 0.0, 0.001, 0.03, 0.0)
+        else:
+            flags, variances = _EKF_GOOD, (0.006, 0.002, 0.001, 0.028, 0.0)
+        return ardupilotmega.MAVLink_ekf_status_report_message(int(flags), *variances)
+
+    def rc_channels(self) -> Message:
+        """Return RC_CHANNELS: the sticks at rest."""
+        channels = [*_STICKS_US, *(0,) * 10]
+        return dialect.MAVLink_rc_channels_message(self._state.shown_us // 1000, 16, *channels, 255)
+
+    def home_position(self) -> Message | None:
+        """Return HOME_POSITION, without an attitude (recorded), once there is a home."""
+        return self._home_position((NAN, NAN, NAN, NAN)) if self._origin_set() else None
+
+    def gps_global_origin(self) -> Message | None:
+        """Return GPS_GLOBAL_ORIGIN, once there is one."""
+        return super().gps_global_origin() if self._origin_set() else None

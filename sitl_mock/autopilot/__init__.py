@@ -1,0 +1,1 @@
+"""What every autopilot has: state, commands, parameters, telemetry, setpoints, faults."""

@@ -1,0 +1,89 @@
+"""PX4's attitude controller: quaternion error with a reduced yaw weight to body rates (pure)."""
+
+from math import acos, asin, copysign, cos, isnan, sin, sqrt
+from typing import NamedTuple
+
+from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
+
+_LEVEL_EPSILON = 1e-5
+
+
+class AttitudeGains(NamedTuple):
+    """Gains in 1/s, ``yaw_weight`` 0..1, rate limits in rad/s."""
+
+    roll: float
+    pitch: float
+    yaw: float
+    yaw_weight: float
+    max_rates: Vector
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """Return the inverse rotation."""
+    w, x, y, z = q
+    return (w, -x, -y, -z)
+
+
+def body_z(q: Quaternion) -> Vector:
+    """Return the body's down axis in world axes."""
+    w, x, y, z = q
+    return (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
+
+
+def attitude_rates(
+    q: Quaternion, target: Quaternion, yaw_rate: float, gains: AttitudeGains
+) -> Vector:
+    """Return the body rates (rad/s, FRD) that turn ``q`` to ``target``.
+
+    The thrust axis goes first, along the shortest arc; the rest of the turn, about that axis, is
+    weighted by ``yaw_weight`` and its gain raised by as much (as PX4's AttitudeControl does).
+
+    Args:
+        q: present attitude.
+        target: attitude to reach; need not be of unit length.
+        yaw_rate: feed-forward about the world's down axis, rad/s.
+        gains: gains and limits.
+    """
+    target = normalise(target)
+    reduced = multiply(_shortest_arc(q, target), q)
+    mix = multiply(conjugate(reduced), target)
+    sign = copysign(1.0, mix[0])
+    half = max(-1.0, min(1.0, mix[0] * sign))
+    twist = max(-1.0, min(1.0, mix[3] * sign))
+    weight = gains.yaw_weight
+    weighted = multiply(reduced, (cos(weight * acos(half)), 0.0, 0.0, sin(weight * asin(twist))))
+    ew, ex, ey, ez = multiply(conjugate(q), weighted)
+    scale = copysign(2.0, ew)
+    yaw_gain = gains.yaw / weight if weight > 0.0 else gains.yaw
+    w, x, y, z = q
+    down = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    limits = gains.max_rates
+    return (
+        _limit(scale * ex * gains.roll + down[0] * yaw_rate, limits[0]),
+        _limit(scale * ey * gains.pitch + down[1] * yaw_rate, limits[1]),
+        _limit(scale * ez * yaw_gain + down[2] * yaw_rate, limits[2]),
+    )
+
+
+def is_usable(q: Quaternion) -> bool:
+    """Whether a quaternion is free of NaN and not zero."""
+    w, x, y, z = q
+    square = w * w + x * x + y * y + z * z
+    return not isnan(square) and 1e-6 < square < 1e6
+
+
+def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:
+    """Return the world rotation that takes the body's down axis of ``q`` to that of ``target``."""
+    ax, ay, az = body_z(q)
+    bx, by, bz = body_z(target)
+    dot = ax * bx + ay * by + az * bz
+    if dot < -1.0 + _LEVEL_EPSILON:
+        return multiply(target, conjugate(q))
+    w = sqrt(2.0 * (1.0 + dot))
+    return normalise(
+        (0.5 * w, (ay * bz - az * by) / w, (az * bx - ax * bz) / w, (ax * by - ay * bx) / w)
+    )
+
+
+def _limit(value: float, bound: float) -> float:
+    return max(-bound, min(bound, value))

@@ -1,0 +1,72 @@
+"""Landed or not: contact and little thrust for a while; taken off at once."""
+
+from collections.abc import Callable
+
+from sitl_mock.autopilot.commander import Announce
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.personality import Occasion
+from sitl_mock.autopilot.state import Landed, State
+
+LOW_THRUST_SHARE = 0.3
+"""Little thrust: below this share of the hover thrust."""
+
+
+class LandDetector:
+    """Keeps ``contact``, ``landed``, ``landed_state`` and ``flown`` of the state.
+
+    Args:
+        state: the autopilot's state.
+        announce: tells of a take-off and a landing.
+        hover_thrust: the normalised thrust of a hover.
+        landed_after_us: contact with little thrust for this long is a landing.
+        climbing: whether a take-off is still below its end.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        announce: Announce,
+        *,
+        hover_thrust: Callable[[], float],
+        landed_after_us: int,
+        climbing: Callable[[], bool],
+    ) -> None:
+        self._state = state
+        self._announce = announce
+        self._hover_thrust = hover_thrust
+        self._landed_after_us = landed_after_us
+        self._climbing = climbing
+        self._quiet_since_us = 0
+
+    def step(self, *, contact: bool) -> None:
+        """Look once: ``contact`` with the ground, and the thrust commanded."""
+        state = self._state
+        was_landed = state.landed
+        self._look(contact=contact)
+        if was_landed != state.landed and state.armed:
+            landed = Occasion.LANDING_DETECTED if state.landed else Occasion.TAKEOFF_DETECTED
+            self._announce(landed, "")
+        state.landed_state = self._landed_state()
+
+    def _look(self, *, contact: bool) -> None:
+        state = self._state
+        state.contact = contact
+        # Written so that a NaN thrust, which is none, counts as little.
+        pushing = state.armed and state.command.thrust > LOW_THRUST_SHARE * self._hover_thrust()
+        if not contact or pushing:
+            self._quiet_since_us = state.time_us
+            state.landed = False
+            state.flown = state.flown or not contact
+        elif not state.armed or state.time_us - self._quiet_since_us >= self._landed_after_us:
+            state.landed = True
+
+    def _landed_state(self) -> Landed:
+        """Return EXTENDED_SYS_STATE.landed_state."""
+        state = self._state
+        if state.landed:
+            return Landed.ON_GROUND
+        if self._climbing():
+            return Landed.TAKEOFF
+        if state.mode is Mode.LAND:
+            return Landed.LANDING
+        return Landed.IN_AIR

@@ -1,0 +1,255 @@
+"""The messages that tell where the vehicle is and how it moves, in PX4's conventions."""
+
+from collections.abc import Callable, Sequence
+from math import asin, atan2, degrees, hypot, isnan, pi
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.setpoints import (
+    ACCELERATION_BITS,
+    POSITION_BITS,
+    VELOCITY_BITS,
+    YAW_IGNORED,
+)
+from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.geodesy import Geodetic, Origin, to_geodetic
+from sitl_mock.physics.quaternion import Quaternion, yaw
+from sitl_mock.physics.vehicle import Vehicle
+
+Builder = Callable[[], Message | None]
+
+_SEA_LEVEL_HPA = 1013.25
+MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)
+_POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
+_VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
+
+
+class MotionTelemetry:
+    """Builds messages from the estimate. A builder returns None when it has nothing valid.
+
+    Args:
+        state: the autopilot's state.
+        vehicle: for what is not estimated (rotors).
+        origin: of the local frame.
+    """
+
+    def __init__(self, state: State, vehicle: Vehicle, origin: Origin) -> None:
+        self._state = state
+        self._vehicle = vehicle
+        self._origin = origin
+
+    airspeed = NAN
+    """VFR_HUD's: there is no sensor for it."""
+
+    def builders(self) -> dict[int, Builder]:
+        """Return message id -> builder."""
+        return {
+            dialect.MAVLINK_MSG_ID_ATTITUDE: self.attitude,
+            dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self.attitude_quaternion,
+            dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self.local_position_ned,
+            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.global_position_int,
+            dialect.MAVLINK_MSG_ID_ODOMETRY: self.odometry,
+            dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
+            dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
+            dialect.MAVLINK_MSG_ID_HIGHRES_IMU: self.highres_imu,
+            dialect.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
+            dialect.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
+            dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
+            dialect.MAVLINK_MSG_ID_VIBRATION: self.vibration,
+        }
+
+    @property
+    def _boot_ms(self) -> int:
+        return self._state.shown_us // 1000
+
+    def place(self) -> Geodetic:
+        """Return where the vehicle believes to be."""
+        return to_geodetic(self._origin, self._state.estimate.position_ned)
+
+    def attitude(self) -> Message:
+        """Return ATTITUDE."""
+        estimate = self._state.estimate
+        roll, pitch, heading = euler(estimate.q)
+        return dialect.MAVLink_attitude_message(
+            self._boot_ms, roll, pitch, heading, *estimate.body_rates
+        )
+
+    def attitude_quaternion(self) -> Message:
+        """Return ATTITUDE_QUATERNION."""
+        estimate = self._state.estimate
+        return dialect.MAVLink_attitude_quaternion_message(
+            self._boot_ms, *estimate.q, *estimate.body_rates
+        )
+
+    def local_position_ned(self) -> Message | None:
+        """Return LOCAL_POSITION_NED."""
+        if not self._state.position_valid:
+            return None
+        estimate = self._state.estimate
+        return dialect.MAVLink_local_position_ned_message(
+            self._boot_ms, *estimate.position_ned, *estimate.velocity_ned
+        )
+
+    def global_position_int(self) -> Message | None:
+        """Return GLOBAL_POSITION_INT."""
+        state = self._state
+        if not state.position_valid:
+            return None
+        place = self.place()
+        vx, vy, vz = state.estimate.velocity_ned
+        height = state.home_ned[2] - state.estimate.position_ned[2]
+        return dialect.MAVLink_global_position_int_message(
+            self._boot_ms,
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            round(place.altitude_m * 1e3),
+            round(height * 1e3),
+            clip(vx * 100, 15),
+            clip(vy * 100, 15),
+            clip(vz * 100, 15),
+            round(self._heading_deg() * 100) % 36000,
+        )
+
+    def odometry(self) -> Message:
+        """Return ODOMETRY; velocity is in the local frame, as PX4 sends it."""
+        estimate = self._state.estimate
+        return dialect.MAVLink_odometry_message(
+            self._state.shown_us,
+            dialect.MAV_FRAME_LOCAL_NED,
+            dialect.MAV_FRAME_LOCAL_NED,
+            *estimate.position_ned,
+            estimate.q,
+            *estimate.velocity_ned,
+            *estimate.body_rates,
+            _POSE_COVARIANCE,
+            _VELOCITY_COVARIANCE,
+            self._vehicle.reset_counter & 0xFF,
+            dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+            100,
+        )
+
+    def attitude_target(self) -> Message:
+        """Return ATTITUDE_TARGET: what the attitude and rate controllers follow."""
+        target = self._state.attitude_target
+        return dialect.MAVLink_attitude_target_message(
+            self._boot_ms, 0, target.q, *target.rates, target.thrust
+        )
+
+    def position_target_local_ned(self) -> Message | None:
+        """Return POSITION_TARGET_LOCAL_NED while a position controller runs."""
+        target = self._state.position_target
+        if not target.active:
+            return None
+        return dialect.MAVLink_position_target_local_ned_message(
+            self._boot_ms,
+            dialect.MAV_FRAME_LOCAL_NED,
+            _ignored(target),
+            *target.position,
+            *target.velocity,
+            *target.acceleration,
+            target.yaw,
+            0.0,
+        )
+
+    def highres_imu(self) -> Message:
+        """Return HIGHRES_IMU."""
+        estimate = self._state.estimate
+        altitude = self._origin.altitude_m - estimate.position_ned[2]
+        return dialect.MAVLink_highres_imu_message(
+            self._state.shown_us,
+            *estimate.specific_force_frd,
+            *estimate.gyro,
+            *MAGNETIC_FIELD_NED,
+            self.pressure_hpa(),
+            0.0,
+            altitude,
+            15.0,
+            63,
+        )
+
+    def pressure_hpa(self) -> float:
+        """Return the air's pressure at the estimated height (ICAO standard atmosphere)."""
+        altitude = self._origin.altitude_m - self._state.estimate.position_ned[2]
+        return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * altitude) ** 5.25588)
+
+    def vfr_hud(self) -> Message:
+        """Return VFR_HUD."""
+        state = self._state
+        vx, vy, vz = state.estimate.velocity_ned
+        thrust = state.attitude_target.thrust
+        percent = 0 if isnan(thrust) else round(100 * max(0.0, min(1.0, thrust)))
+        altitude = self._origin.altitude_m - state.estimate.position_ned[2]
+        return dialect.MAVLink_vfr_hud_message(
+            self.airspeed, hypot(vx, vy), int(self._heading_deg()), percent, altitude, -vz
+        )
+
+    def altitude(self) -> Message:
+        """Return ALTITUDE."""
+        state = self._state
+        up = -state.estimate.position_ned[2]
+        amsl = self._origin.altitude_m + up
+        return dialect.MAVLink_altitude_message(
+            state.shown_us, amsl, amsl, up, up + state.home_ned[2], 0.0, up
+        )
+
+    def servo_output_raw(self) -> Message:
+        """Return SERVO_OUTPUT_RAW: 900 us disarmed, 1000..2000 us armed, PX4's rotor order."""
+        state = self._state
+        outputs = [900] * 16
+        if state.armed:
+            throttles = self._vehicle.truth.throttles
+            outputs[: len(throttles)] = [1000 + round(1000 * share) for share in throttles]
+        return dialect.MAVLink_servo_output_raw_message(state.shown_us & 0xFFFFFFFF, 0, *outputs)
+
+    def vibration(self) -> Message:
+        """Return VIBRATION; the mock's airframe does not shake."""
+        return dialect.MAVLink_vibration_message(self._state.shown_us, 0.0, 0.01, 0.11, 0, 0, 0)
+
+    def _heading_deg(self) -> float:
+        return degrees(yaw(self._state.estimate.q)) % 360.0
+
+
+def _ignored(target: PositionTargetEcho) -> int:
+    """Return the POSITION_TARGET_TYPEMASK that leaves out what is not followed."""
+    parts = (
+        (POSITION_BITS, target.position),
+        (VELOCITY_BITS, target.velocity),
+        (ACCELERATION_BITS, target.acceleration),
+        ((YAW_IGNORED,), (target.yaw,)),
+    )
+    return sum(
+        bit
+        for bits, values in parts
+        for bit, value in zip(bits, values, strict=True)
+        if isnan(value)
+    )
+
+
+def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:
+    """Return a diagonal matrix's upper triangle, row by row, as MAVLink sends covariances."""
+    size = len(variances)
+    return tuple(
+        variances[row] if column == row else 0.0
+        for row in range(size)
+        for column in range(row, size)
+    )
+
+
+_POSE_COVARIANCE = upper_triangle(_POSE_VARIANCES)
+_VELOCITY_COVARIANCE = upper_triangle(_VELOCITY_VARIANCES)
+
+
+def euler(q: Quaternion) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw (Z-Y-X, rad)."""
+    w, x, y, z = q
+    roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    sine = 2.0 * (w * y - z * x)
+    pitch = asin(sine) if abs(sine) < 1.0 else (pi / 2 if sine > 0 else -pi / 2)
+    return roll, pitch, yaw(q)
+
+
+def clip(value: float, bits: int) -> int:
+    """Return a value rounded into a signed integer with this many bits beside the sign."""
+    limit = (1 << bits) - 1
+    return max(-limit, min(limit, round(value)))

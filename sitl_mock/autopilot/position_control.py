@@ -1,0 +1,168 @@
+"""The position controller of the autopilot's own modes: P and PI to attitude and thrust."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import atan2, copysign, cos, hypot, isnan, pi, radians, sin, sqrt, tan
+from typing import NamedTuple
+
+from sitl_mock.autopilot.state import NAN, NAN_VECTOR
+from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
+
+GRAVITY = 9.80665
+_STEEPEST = radians(80.0)
+"""No limit on the tilt lets it grow beyond this."""
+
+
+class PositionDemand(NamedTuple):
+    """What to follow: position, velocity and acceleration (NED, SI; NaN = free) and yaw (rad).
+
+    ``speed`` bounds the horizontal velocity asked by the position loop, ``down_speed`` and
+    ``up_speed`` the vertical one, m/s.
+    """
+
+    position: Vector
+    velocity: Vector
+    acceleration: Vector = NAN_VECTOR
+    yaw: float = NAN
+    speed: float = 12.0
+    up_speed: float = 3.0
+    down_speed: float = 1.5
+
+
+class PositionOutput(NamedTuple):
+    """Attitude to hold, collective thrust 0..1, and the velocity and acceleration asked (NED)."""
+
+    q: Quaternion
+    thrust: float
+    velocity: Vector
+    acceleration: Vector
+
+
+class PositionGains(NamedTuple):
+    """Gains and limits: velocity per position error (1/s), acceleration per velocity error.
+
+    Thrusts are normalised: at a hover, the least and the most.
+    """
+
+    horizontal: float
+    vertical: float
+    horizontal_speed: float  # 1/s
+    vertical_speed: float  # 1/s
+    horizontal_integral: float  # 1/s^2
+    vertical_integral: float  # 1/s^2
+    max_tilt: float  # rad
+    hover_thrust: float
+    min_thrust: float
+    max_thrust: float
+
+
+@dataclass
+class PositionController:
+    """A multicopter's position control in its plain form: P on position, PI on velocity.
+
+    Args:
+        gains: asked at every step, so that a PARAM_SET acts at once.
+    """
+
+    gains: Callable[[], PositionGains]
+    _integral: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    def reset(self) -> None:
+        """Forget the integrals."""
+        self._integral = [0.0, 0.0, 0.0]
+
+    def step(
+        self,
+        demand: PositionDemand,
+        position: Vector,
+        velocity: Vector,
+        dt: float,
+    ) -> PositionOutput:
+        """Return attitude and thrust for one period of ``dt`` s from the estimated state."""
+        gains = self.gains()
+        asked_velocity = _velocity(gains, demand, position)
+        acceleration = self._acceleration(gains, demand, asked_velocity, velocity, dt)
+        return _thrust_vector(gains, acceleration, asked_velocity, demand.yaw)
+
+    def _acceleration(
+        self,
+        gains: PositionGains,
+        demand: PositionDemand,
+        asked: Vector,
+        velocity: Vector,
+        dt: float,
+    ) -> Vector:
+        xy = (gains.horizontal_speed, gains.horizontal_integral)
+        z = (gains.vertical_speed, gains.vertical_integral)
+        result = []
+        for axis, (proportional, integral) in enumerate((xy, xy, z)):
+            feed_forward = demand.acceleration[axis]
+            total = 0.0 if isnan(feed_forward) else feed_forward
+            error = asked[axis] - velocity[axis]
+            if not isnan(error):
+                grown = self._integral[axis] + integral * error * dt
+                self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, grown))
+                total += proportional * error + self._integral[axis]
+            result.append(total)
+        north, east, down = result
+        return (north, east, down)
+
+
+def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
+    """Return the velocity asked, NED; NaN = none."""
+    factors = (gains.horizontal, gains.horizontal, gains.vertical)
+    asked = []
+    for axis in range(3):
+        error = demand.position[axis] - position[axis]
+        wanted = demand.velocity[axis]
+        if isnan(error):
+            asked.append(wanted)
+        else:
+            asked.append(factors[axis] * error + (0.0 if isnan(wanted) else wanted))
+    north, east, down = asked
+    speed = hypot(north, east)
+    if speed > demand.speed:
+        north, east = north * demand.speed / speed, east * demand.speed / speed
+    if not isnan(down):
+        down = max(-demand.up_speed, min(demand.down_speed, down))
+    return (north, east, down)
+
+
+def _thrust_vector(
+    gains: PositionGains, acceleration: Vector, asked: Vector, yaw: float
+) -> PositionOutput:
+    """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw."""
+    north, east, down = acceleration
+    lift = max(GRAVITY - down, 0.1 * GRAVITY)
+    limit = lift * tan(min(gains.max_tilt, _STEEPEST))
+    side = hypot(north, east)
+    if side > limit:
+        north, east = north * limit / side, east * limit / side
+    specific = sqrt(north * north + east * east + lift * lift)
+    q = _thrust_attitude((-north / specific, -east / specific, lift / specific), yaw)
+    thrust = gains.hover_thrust * max(GRAVITY - down, 0.0) / GRAVITY
+    thrust *= specific / lift
+    thrust = max(gains.min_thrust, min(gains.max_thrust, thrust))
+    return PositionOutput(q, thrust, asked, (north, east, down))
+
+
+def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:
+    """Return the attitude with this body down axis (unit, NED) and Euler yaw (rad)."""
+    zx, zy, zz = down_axis
+    # Tilt about a level axis, then the turn about the body axis that gives the Euler yaw.
+    w = sqrt(max(0.5 * (1.0 + zz), 1e-9))
+    tilt = (w, -zy / (2.0 * w), zx / (2.0 * w), 0.0)
+    # Body x of (tilt ⊗ turn by h) must point along yaw: solve for h on the level plane.
+    ex = (1.0 - 2.0 * tilt[2] * tilt[2], 2.0 * tilt[1] * tilt[2])
+    ey = (2.0 * tilt[1] * tilt[2], 1.0 - 2.0 * tilt[1] * tilt[1])
+    c, s = cos(yaw), sin(yaw)
+    across_x = ex[0] * s - ex[1] * c
+    across_y = ey[0] * s - ey[1] * c
+    turn = atan2(-across_x, across_y)
+    if (ex[0] * cos(turn) + ey[0] * sin(turn)) * c + (
+        ex[1] * cos(turn) + ey[1] * sin(turn)
+    ) * s < 0:
+        turn += copysign(pi, -turn)
+    cw, cz = cos(0.5 * turn), sin(0.5 * turn)
+    tw, tx, ty, _ = tilt
+    return normalise((tw * cw, tx * cw + ty * cz, ty * cw - tx * cz, tw * cz))

@@ -1,0 +1,145 @@
+"""What a message that arrives does: a table from message to handler."""
+
+from collections.abc import Callable
+from math import nan
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.commander import DENIED
+from sitl_mock.autopilot.commands import Command
+from sitl_mock.autopilot.personality import Personality, Rules
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link
+
+_COMPONENT = 1
+_BROADCAST = 0
+_PLACE_FRAMES = frozenset(
+    {
+        dialect.MAV_FRAME_GLOBAL,
+        dialect.MAV_FRAME_GLOBAL_INT,
+        dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+    }
+)
+
+
+class Receiver:
+    """Hands every message meant for this autopilot to its handler.
+
+    Args:
+        state: the autopilot's state.
+        rules: what the autopilot's family does.
+        personality: translates custom modes.
+        system_id: this vehicle's.
+    """
+
+    def __init__(
+        self, state: State, rules: Rules, personality: Personality, system_id: int
+    ) -> None:
+        self.clock_ns: Callable[[], int] = lambda: state.shown_us * 1000
+        self._commander = commander = rules.commander
+        self._commands = rules.commands
+        self._personality = personality
+        self._system_id = system_id
+        self._handlers: dict[str, Callable[[Message, Link], None]] = {
+            "SET_ATTITUDE_TARGET": lambda message, _: commander.setpoint(message),
+            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.setpoint(message),
+            "HEARTBEAT": self._heartbeat,
+            "COMMAND_LONG": self._command_long,
+            "COMMAND_INT": self._command_int,
+            "SET_MODE": self._set_mode,
+            "TIMESYNC": self._timesync,
+            "PING": self._ping,
+            "PARAM_REQUEST_LIST": rules.parameter_protocol.request_list,
+            "PARAM_REQUEST_READ": rules.parameter_protocol.request_read,
+            "PARAM_SET": rules.parameter_protocol.set,
+            "MISSION_REQUEST_LIST": self._mission_list,
+            **rules.handlers,
+        }
+
+    def handle(self, message: Message, link: Link) -> None:
+        """Handle one message.
+
+        What is not for this autopilot, unknown, or not signed as it must be, is ignored in silence.
+        """
+        if not link.admits(message):
+            return
+        link.heard = True
+        handler = self._handlers.get(message.get_type())
+        if handler is not None and self._for_us(message):
+            handler(message, link)
+
+    def _for_us(self, message: Message) -> bool:
+        system = getattr(message, "target_system", _BROADCAST)
+        component = getattr(message, "target_component", _BROADCAST)
+        return system in (_BROADCAST, self._system_id) and (
+            component in (_BROADCAST, _COMPONENT) or self._personality.any_component
+        )
+
+    def _heartbeat(self, message: Message, link: Link) -> None:
+        if message.get_srcSystem() == self._system_id and message.get_srcComponent() == _COMPONENT:
+            return
+        link.gcs_heard = link.gcs_heard or message.type == dialect.MAV_TYPE_GCS
+        self._commander.heard(message)
+
+    def _command_long(self, message: Message, link: Link) -> None:
+        parameters = tuple(getattr(message, f"param{number}") for number in range(1, 8))
+        self._run(Command(message.command, parameters), message, link)
+
+    def _command_int(self, message: Message, link: Link) -> None:
+        x, y = float(message.x), float(message.y)
+        if message.frame in _PLACE_FRAMES:
+            x, y = (nan if value == 2**31 - 1 else value / 1e7 for value in (x, y))
+        parameters = (
+            message.param1,
+            message.param2,
+            message.param3,
+            message.param4,
+            x,
+            y,
+            message.z,
+        )
+        self._run(Command(message.command, parameters), message, link)
+
+    def _set_mode(self, message: Message, link: Link) -> None:
+        custom = message.custom_mode
+        mode = self._personality.mode_of(custom)
+        valid = mode and message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        result = self._commander.request_mode(mode) if mode and valid else DENIED
+        self._acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, message, link)
+
+    def _run(self, command: Command, message: Message, link: Link) -> None:
+        self._acknowledge(command.number, self._commands.run(command, link), message, link)
+
+    def _acknowledge(self, command: int, result: int, message: Message, link: Link) -> None:
+        link.send(
+            dialect.MAVLink_command_ack_message(
+                command,
+                result,
+                target_system=message.get_srcSystem(),
+                target_component=message.get_srcComponent(),
+            )
+        )
+
+    def _timesync(self, message: Message, link: Link) -> None:
+        if message.tc1 == 0:
+            link.send(dialect.MAVLink_timesync_message(self.clock_ns(), message.ts1))
+
+    def _ping(self, message: Message, link: Link) -> None:
+        if message.target_system == _BROADCAST and message.target_component == _BROADCAST:
+            link.send(
+                dialect.MAVLink_ping_message(
+                    message.time_usec,
+                    message.seq,
+                    message.get_srcSystem(),
+                    message.get_srcComponent(),
+                )
+            )
+
+    def _mission_list(self, message: Message, link: Link) -> None:
+        link.send(
+            dialect.MAVLink_mission_count_message(
+                message.get_srcSystem(), message.get_srcComponent(), 0, message.mission_type
+            )
+        )

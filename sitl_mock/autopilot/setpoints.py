@@ -1,0 +1,92 @@
+"""What an offboard setpoint asks, and the masks of the messages that carry it."""
+
+import math
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.quaternion import Quaternion, Vector
+
+NAN = float("nan")
+
+ROLL_OR_PITCH_RATE_IGNORED = 1 | 2
+YAW_RATE_IGNORED = 4
+THRUST_BODY = 32
+THROTTLE_IGNORED = 64
+ATTITUDE_IGNORED = 128
+"""ATTITUDE_TARGET_TYPEMASK of SET_ATTITUDE_TARGET."""
+
+POSITION_BITS = (1, 2, 4)
+VELOCITY_BITS = (8, 16, 32)
+ACCELERATION_BITS = (64, 128, 256)
+FORCE = 512
+YAW_IGNORED = 1024
+POSITION_YAW_RATE_IGNORED = 2048
+"""POSITION_TARGET_TYPEMASK of SET_POSITION_TARGET_LOCAL_NED."""
+
+_BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
+
+
+class AttitudeSetpoint(NamedTuple):
+    """Attitude and/or rates with thrust, as SET_ATTITUDE_TARGET carries them.
+
+    ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
+    present one; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
+    """
+
+    q: Quaternion | None
+    rates: Vector | None
+    yaw_rate: float
+    thrust: float
+
+
+class PositionSetpoint(NamedTuple):
+    """Position, velocity, acceleration (NED, SI) and yaw; NaN = that one is free.
+
+    ``in_body_heading``: the horizontal components are along the heading, not north and east.
+    """
+
+    position: Vector
+    velocity: Vector
+    acceleration: Vector
+    yaw: float
+    yaw_rate: float
+    in_body_heading: bool
+
+
+Setpoint = AttitudeSetpoint | PositionSetpoint
+
+
+def position_setpoint(message: Message) -> PositionSetpoint | None:
+    """Return what a SET_POSITION_TARGET_LOCAL_NED asks, or None when it asks nothing.
+
+    Frames MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
+    """
+    mask = message.type_mask
+    in_body = message.coordinate_frame in _BODY_FRAMES
+    if mask & FORCE or not (in_body or message.coordinate_frame == dialect.MAV_FRAME_LOCAL_NED):
+        return None
+    position = _masked(mask, POSITION_BITS, (message.x, message.y, message.z))
+    velocity = _masked(mask, VELOCITY_BITS, (message.vx, message.vy, message.vz))
+    acceleration = _masked(mask, ACCELERATION_BITS, (message.afx, message.afy, message.afz))
+    if in_body:
+        position = (NAN, NAN, NAN)
+    if all(map(math.isnan, (*position, *velocity, *acceleration))):
+        return None
+    return PositionSetpoint(
+        position,
+        velocity,
+        acceleration,
+        NAN if mask & YAW_IGNORED else message.yaw,
+        NAN if mask & POSITION_YAW_RATE_IGNORED else message.yaw_rate,
+        in_body,
+    )
+
+
+def _masked(mask: int, bits: tuple[int, int, int], values: Vector) -> Vector:
+    x, y, z = (
+        NAN if mask & bit or not math.isfinite(value) else value
+        for bit, value in zip(bits, values, strict=True)
+    )
+    return (x, y, z)

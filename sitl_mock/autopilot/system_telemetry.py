@@ -1,0 +1,136 @@
+"""The messages about the vehicle and its autopilot that every family builds alike."""
+
+from math import hypot
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.motion_telemetry import Builder, clip
+from sitl_mock.autopilot.personality import Identity
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.framing import Message
+from sitl_mock.physics.geodesy import Origin, to_geodetic
+from sitl_mock.physics.quaternion import Quaternion
+
+UNIX_AT_BOOT_US = 1_795_236_148_441_838
+"""SYSTEM_TIME's wall clock at boot: fixed, so that a run repeats to the bit."""
+_PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
+_GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
+NO_VALUE = 65535
+"""An unsigned 16-bit field that tells nothing."""
+
+
+class SystemTelemetry:
+    """Builds messages about the state and the link; a family's own come on top.
+
+    Args:
+        state: the autopilot's state.
+        origin: of the local frame.
+        identity: what AUTOPILOT_VERSION says.
+    """
+
+    def __init__(self, state: State, origin: Origin, identity: Identity) -> None:
+        self._state = state
+        self._origin = origin
+        self._identity = identity
+
+    def builders(self) -> dict[int, Builder]:
+        """Return message id -> builder."""
+        return {
+            dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
+            dialect.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
+            dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
+            dialect.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
+            dialect.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
+            dialect.MAVLINK_MSG_ID_MISSION_CURRENT: self.mission_current,
+            dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.autopilot_version,
+        }
+
+    def extended_sys_state(self) -> Message:
+        """Return EXTENDED_SYS_STATE."""
+        return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
+
+    def _healthy(self, sensors: int) -> int:
+        """Return the health bits of SYS_STATUS: ``sensors``, less what fails just now."""
+        if self._state.prearm_problem is not None:
+            sensors &= ~_PREARM_CHECK
+        if not self._state.gps_ok:
+            sensors &= ~_GPS_SENSOR
+        return sensors
+
+    def _gps_fix(
+        self, fix: int, dilutions: tuple[int, int], course: int, accuracies: tuple[int, ...]
+    ) -> Message:
+        """Return GPS_RAW_INT at the estimated place; the rest in its own units."""
+        state = self._state
+        place = to_geodetic(self._origin, state.estimate.position_ned)
+        altitude_mm = round(place.altitude_m * 1e3)
+        vx, vy, _ = state.estimate.velocity_ned
+        return dialect.MAVLink_gps_raw_int_message(
+            state.shown_us,
+            fix,
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            altitude_mm,
+            *dilutions,
+            clip(hypot(vx, vy) * 100, 15),
+            course,
+            10,
+            altitude_mm,
+            *accuracies,
+        )
+
+    def home_position(self) -> Message | None:
+        """Return HOME_POSITION."""
+        return self._home_position(self._state.home_q)
+
+    def _home_position(self, q: Quaternion) -> Message:
+        state = self._state
+        place = to_geodetic(self._origin, state.home_ned)
+        return dialect.MAVLink_home_position_message(
+            round(place.latitude_deg * 1e7),
+            round(place.longitude_deg * 1e7),
+            round(place.altitude_m * 1e3),
+            *state.home_ned,
+            q,
+            0.0,
+            0.0,
+            0.0,
+            state.home_set_at_us,
+        )
+
+    def gps_global_origin(self) -> Message | None:
+        """Return GPS_GLOBAL_ORIGIN."""
+        latitude, longitude, altitude = self._origin
+        return dialect.MAVLink_gps_global_origin_message(
+            round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3), 0
+        )
+
+    def system_time(self) -> Message:
+        """Return SYSTEM_TIME."""
+        shown = self._state.shown_us
+        return dialect.MAVLink_system_time_message(UNIX_AT_BOOT_US + shown, shown // 1000)
+
+    def timesync(self) -> Message:
+        """Return a TIMESYNC request with the vehicle's clock, ns."""
+        return dialect.MAVLink_timesync_message(0, self._state.shown_us * 1000)
+
+    def mission_current(self) -> Message:
+        """Return MISSION_CURRENT: there is no mission."""
+        return dialect.MAVLink_mission_current_message(0, NO_VALUE, 1, 2)
+
+    def autopilot_version(self) -> Message:
+        """Return AUTOPILOT_VERSION."""
+        identity = self._identity
+        return dialect.MAVLink_autopilot_version_message(
+            identity.capabilities,
+            identity.flight_sw_version,
+            identity.middleware_sw_version,
+            identity.os_sw_version,
+            1,
+            identity.flight_custom_version,
+            identity.flight_custom_version,
+            (0,) * 8,
+            0,
+            0,
+            5283920058631409231,
+        )

@@ -1,0 +1,1 @@
+"""What can be set: typed sections, and the reading of their YAML."""

@@ -1,0 +1,143 @@
+"""The faults that can be asked of the mock, in the configuration or over the control channel."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, TypeAdapter, model_validator
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.config.errors import suggestion
+from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section
+
+_MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
+
+
+def _known_message(name: str) -> str:
+    if name not in _MESSAGES:
+        raise ValueError(f"unknown message {name}{suggestion(name, _MESSAGES)}")
+    return name
+
+
+MessageName = Annotated[str, AfterValidator(_known_message)]
+"""The name of a MAVLink message, e.g. ATTITUDE_QUATERNION."""
+
+Direction = Literal["to_companion", "from_companion", "both"]
+
+
+class Timed(Section):
+    """When a fault is active, in vehicle time; without a start it begins at once."""
+
+    at_s: NonNegative | None = None
+    """Begin this long after boot."""
+    after_offboard_s: NonNegative | None = None
+    """Begin this long after OFFBOARD was first entered with the motors armed."""
+    duration_s: Positive | None = None
+    """End after this long; without it, the fault stays."""
+
+    @model_validator(mode="after")
+    def _one_start(self) -> Self:
+        if self.at_s is not None and self.after_offboard_s is not None:
+            raise ValueError("give at_s or after_offboard_s, not both")
+        return self
+
+
+class LinkFault(Timed):
+    """Datagrams of the companion's link are lost, late, doubled, swapped or damaged."""
+
+    kind: Literal["drop", "delay", "duplicate", "reorder", "corrupt"]
+    direction: Direction = "both"
+    probability: Fraction = 1.0
+    """Share of the datagrams that it strikes."""
+    delay_ms: NonNegative = 100.0
+    """For ``delay``: how much later the datagram arrives, vehicle time."""
+
+
+class StopTelemetry(Timed):
+    """The vehicle's streams fall silent; answers still come."""
+
+    kind: Literal["stop_telemetry"]
+    messages: tuple[MessageName, ...] = ()
+    """Names of the messages that stop; empty = all."""
+
+
+class FreezeClock(Timed):
+    """Telemetry goes on, but its time stands still."""
+
+    kind: Literal["freeze_clock"]
+
+
+class SlipClock(Timed):
+    """The vehicle stands still for a moment, and its clock does not catch up (paced time only)."""
+
+    kind: Literal["slip_clock"]
+    slip_ms: Annotated[float, Field(gt=0.0, le=60_000.0)] = 12.0
+    """How far the clock falls behind; ArduPilot's simulator on a busy computer: 10 to 16."""
+
+
+class NanField(Timed):
+    """One float field of one message is NaN."""
+
+    kind: Literal["nan_field"]
+    message: MessageName
+    field: str
+
+    @model_validator(mode="after")
+    def _float_field(self) -> Self:
+        kind = _MESSAGES[self.message]
+        types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
+        floats = [name for name in types if types[name] in ("float", "double")]
+        if self.field not in floats:
+            raise ValueError(f"{self.message} has no float field {self.field!r}; it has {floats}")
+        return self
+
+
+class PilotTakeover(Timed):
+    """The pilot takes the sticks and changes the mode."""
+
+    kind: Literal["pilot_takeover"]
+    mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
+    """PX4's words; ArduCopter takes them as LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
+
+
+class EstimatorReset(Timed):
+    """The estimate jumps, and the reset counter grows."""
+
+    kind: Literal["estimator_reset"]
+    yaw_deg: Finite = 0.0
+    position_ned_m: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+
+
+class RefuseArming(Timed):
+    """Arming is refused with a reason."""
+
+    kind: Literal["refuse_arming"]
+    reason: str = "system power unavailable"
+
+
+class LowBattery(Timed):
+    """The battery falls to a charge."""
+
+    kind: Literal["low_battery"]
+    remaining: Fraction = 0.06
+
+
+class GpsLoss(Timed):
+    """GPS has no fix; the position is lost EKF2_NOAID_TOUT later."""
+
+    kind: Literal["gps_loss"]
+
+
+VehicleFault = (
+    StopTelemetry
+    | FreezeClock
+    | SlipClock
+    | NanField
+    | PilotTakeover
+    | EstimatorReset
+    | RefuseArming
+    | LowBattery
+    | GpsLoss
+)
+Fault = Annotated[LinkFault | VehicleFault, Field(discriminator="kind")]
+
+fault_adapter: TypeAdapter[LinkFault | VehicleFault] = TypeAdapter(Fault)
+"""Validates one fault given as a mapping."""

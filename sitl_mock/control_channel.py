@@ -1,0 +1,89 @@
+"""The control channel: JSON requests that ask for faults or for the truth (pure).
+
+Requests, one object each:
+
+- ``{"fault": {"kind": "drop", "probability": 0.5, "duration_s": 3}}``: any fault of the
+  configuration; without a start condition it begins at once -> ``{"ok": true}``
+- ``{"clear": true}``: end all faults -> ``{"ok": true}``
+- ``{"state": true}``: the truth -> see `truth`
+
+Anything else -> ``{"error": "..."}``.
+"""
+
+import json
+from typing import Any
+
+from pydantic import ValidationError
+
+from sitl_mock.config.faults import fault_adapter
+from sitl_mock.simulation import Autopilot
+
+_USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
+
+
+def reply(autopilot: Autopilot, request: bytes) -> bytes:
+    """Carry out one request and return the answer, both JSON."""
+    return json.dumps(_answer(autopilot, request), allow_nan=False).encode()
+
+
+def _answer(autopilot: Autopilot, request: bytes) -> dict[str, Any]:
+    try:
+        asked = json.loads(request)
+    except (ValueError, RecursionError):
+        return {"error": f"not JSON; {_USAGE}"}
+    match asked:
+        case {"fault": dict(fault)} if len(asked) == 1:
+            return _add_fault(autopilot, fault)
+        case {"clear": True} if len(asked) == 1:
+            autopilot.clear_faults()
+            return {"ok": True}
+        case {"state": True} if len(asked) == 1:
+            return truth(autopilot)
+    return {"error": _USAGE}
+
+
+def _add_fault(autopilot: Autopilot, fault: dict[str, Any]) -> dict[str, Any]:
+    try:
+        valid = fault_adapter.validate_python(fault)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"])
+        return {"error": f"fault {where}: {detail['msg']}".replace("fault :", "fault:")}
+    autopilot.faults.add(valid, autopilot.time_us)
+    return {"ok": True}
+
+
+def truth(autopilot: Autopilot) -> dict[str, Any]:
+    """Return what is really so: SI, NED (origin: home on the ground), FRD, q body to world.
+
+    Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
+    ``aborted`` (the autopilot's process has ended: nothing moves or answers any more),
+    ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
+    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
+    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
+    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
+    """
+    state, stream = autopilot.state, autopilot.stream
+    now = autopilot.vehicle.truth
+    signing = autopilot.companion.signing
+    touched = now.touchdown_speed == now.touchdown_speed  # not NaN
+    return {
+        "time": state.time_s,
+        "armed": state.armed,
+        "mode": state.mode.name,
+        "intended_mode": state.intended_mode.name,
+        "failsafe": state.failsafe,
+        "landed": state.landed,
+        "aborted": state.aborted,
+        "position": now.position_ned,
+        "velocity": now.velocity_ned,
+        "q": now.q,
+        "rates": now.body_rates,
+        "on_ground": now.on_ground,
+        "crashed": now.crashed,
+        "touchdown_speed": now.touchdown_speed if touched else None,
+        "battery": autopilot.vehicle.battery.remaining,
+        "setpoints": stream.received,
+        "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
+        "signing": None if signing is None else signing.counts(),
+    }

@@ -1,0 +1,1 @@
+"""MAVLink on its way: sockets, framing, signing, a bad link."""

@@ -1,0 +1,66 @@
+"""MAVLink frames over a file descriptor that carries bytes: a TCP connection, a serial line."""
+
+import os
+from collections import deque
+
+from sitl_mock.link.framing import split
+
+_READ_BYTES = 65536
+
+
+class ByteStream:
+    """Whole frames in, whole frames out, neither way blocking.
+
+    A frame is never cut short: what the kernel does not take of it goes before anything else, and
+    the frames that come meanwhile are lost, as an autopilot's are when its transmit buffer is full.
+
+    Attributes:
+        open: False once the other side is gone.
+
+    Args:
+        descriptor: non-blocking; its owner closes it.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.open = True
+        self._descriptor = descriptor
+        self._frames: deque[bytes] = deque()
+        self._rest = b""
+        self._unsent = b""
+
+    def receive(self) -> bytes | None:
+        """Return the next whole frame, None if there is none yet."""
+        if not self._frames:
+            self._read()
+        return self._frames.popleft() if self._frames else None
+
+    def send(self, frames: list[bytes]) -> None:
+        """Send frames, as far as the kernel takes them."""
+        if self._unsent:
+            self._unsent = self._unsent[self._write(self._unsent) :]
+        if not self._unsent:
+            data = b"".join(frames)
+            written = self._write(data)
+            self._unsent = data[written:] if written else b""
+
+    def _read(self) -> None:
+        try:
+            data = os.read(self._descriptor, _READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self.open = False
+            return
+        frames, self._rest = split(self._rest + data)
+        self._frames.extend(frames)
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self._descriptor, data) if data else 0
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self.open = False
+            return 0

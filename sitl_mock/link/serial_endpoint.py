@@ -1,0 +1,89 @@
+"""A serial line of the mock: one end of a pseudo-terminal, whose other end a companion opens."""
+
+import os
+import select
+import tty
+from pathlib import Path
+
+from sitl_mock.config.errors import ConfigError
+from sitl_mock.link.byte_stream import ByteStream
+
+
+class SerialEndpoint:
+    """A UART without a baud rate. While nobody has the other end open, what is sent is lost.
+
+    Args:
+        path: a symbolic link to make to the device; None = none.
+
+    Raises:
+        ConfigError: the link cannot be made there, or the system has no pseudo-terminals left.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        try:
+            self._master, slave = os.openpty()
+        except OSError as error:
+            raise ConfigError(f"no pseudo-terminal to be had: {error.strerror}") from error
+        tty.setraw(slave)
+        self._device = os.ttyname(slave)
+        # Not kept open: only so does the kernel tell whether anybody else has it open.
+        os.close(slave)
+        os.set_blocking(self._master, False)
+        self._poll = select.poll()
+        self._poll.register(self._master, 0)
+        self._stream = ByteStream(self._master)
+        self._path = path
+        self.where = self._device if path is None else f"{self._device} ({path})"
+        self.heard = False
+        if path is not None:
+            self._link(path)
+
+    @property
+    def connected(self) -> bool:
+        """A UART cannot know, so yes."""
+        return True
+
+    @property
+    def readable(self) -> list[int]:
+        """Our end, while the other is open; hung up, it would always be readable."""
+        return [self._master] if self._attached() else []
+
+    def receive(self) -> tuple[bytes, bool] | None:
+        """Return the next frame, None if there is none."""
+        if not self._attached():
+            return None
+        frame = self._stream.receive()
+        if frame is None:
+            return None
+        self.heard = True
+        return frame, True
+
+    def send(self, datagrams: list[bytes]) -> None:
+        """Send to whoever has the other end open."""
+        if self._attached():
+            self._stream.send(datagrams)
+
+    def close(self) -> None:
+        """Close our end and remove the link."""
+        os.close(self._master)
+        if self._path is not None:
+            self._path.unlink(missing_ok=True)
+
+    def _attached(self) -> bool:
+        """Whether anybody has the other end open; after a hang-up, begin with a clean stream."""
+        hung_up = any(event & select.POLLHUP for _, event in self._poll.poll(0))
+        if hung_up or not self._stream.open:
+            self._stream = ByteStream(self._master)
+        return not hung_up
+
+    def _link(self, path: Path) -> None:
+        try:
+            if path.is_symlink():
+                path.unlink()  # of a mock that was killed
+            path.symlink_to(self._device)
+        except OSError as error:
+            os.close(self._master)
+            raise ConfigError(
+                f"endpoint serial://{path}: cannot make this link ({error.strerror}); "
+                "choose another path"
+            ) from error

@@ -1,0 +1,88 @@
+"""A TCP port of the mock, with ArduPilot's rule: one client, and whoever else comes is sent off."""
+
+import socket
+
+from sitl_mock.config.errors import ConfigError
+from sitl_mock.link.byte_stream import ByteStream
+
+
+class TcpEndpoint:
+    """Listens for one client at a time; when that one leaves, another may come.
+
+    Args:
+        host: address to listen on.
+        port: to listen on.
+
+    Raises:
+        ConfigError: the port is in use, or the address not ours.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        try:
+            self._listener = socket.create_server((host, port))
+        except OSError as error:
+            raise ConfigError(
+                f"TCP port {port} on {host} cannot be used ({error.strerror}): is another"
+                " mock running? Choose a different --endpoint"
+            ) from error
+        self._listener.setblocking(False)
+        self._client: socket.socket | None = None
+        self._stream: ByteStream | None = None
+        self.where = f"TCP {host}:{port}"
+        self.heard = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a client."""
+        self._accept()
+        return self._stream is not None
+
+    @property
+    def readable(self) -> list[int]:
+        """The port, and the client's connection."""
+        descriptors = [self._listener.fileno()]
+        if self._client is not None:
+            descriptors.append(self._client.fileno())
+        return descriptors
+
+    def receive(self) -> tuple[bytes, bool] | None:
+        """Return the client's next frame, None if there is none."""
+        self._accept()
+        if self._stream is None:
+            return None
+        frame = self._stream.receive()
+        self._let_go()
+        if frame is None:
+            return None
+        self.heard = True
+        return frame, True
+
+    def send(self, datagrams: list[bytes]) -> None:
+        """Send to the client, if there is one."""
+        if self._stream is not None:
+            self._stream.send(datagrams)
+            self._let_go()
+
+    def close(self) -> None:
+        """Close the port and the connection."""
+        self._listener.close()
+        if self._client is not None:
+            self._client.close()
+
+    def _accept(self) -> None:
+        try:
+            caller, _ = self._listener.accept()
+        except OSError:
+            return
+        if self._client is not None:
+            caller.close()
+            return
+        caller.setblocking(False)
+        caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client, self._stream = caller, ByteStream(caller.fileno())
+
+    def _let_go(self) -> None:
+        """Forget a client that has left."""
+        if self._client is not None and self._stream is not None and not self._stream.open:
+            self._client.close()
+            self._client = self._stream = None

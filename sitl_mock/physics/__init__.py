@@ -1,0 +1,1 @@
+"""The vehicle itself: rigid body, rotors, rate loop, air, ground, battery, sensors (pure)."""

@@ -1,0 +1,49 @@
+"""A battery pack: charge, current and a voltage that sags, and the thrust that sags with it."""
+
+from typing import NamedTuple
+
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig
+
+
+class BatteryState(NamedTuple):
+    """What a power module measures."""
+
+    voltage_v: float
+    current_a: float
+    remaining: float  # charge left, 0..1
+
+
+class Battery:
+    """Charge counted in ampere seconds; open-circuit voltage linear in it, less R I."""
+
+    __slots__ = ("_charge_as", "_config", "_hover_thrust", "_reference_v", "state", "thrust_factor")
+
+    def __init__(self, config: BatteryConfig, airframe: AirframeConfig) -> None:
+        self._config = config
+        self._charge_as = config.capacity_ah * 3600.0
+        self._hover_thrust = airframe.mass_kg * airframe.gravity_m_s2
+        self._reference_v = (
+            config.cells * config.full_cell_v
+            - (config.idle_current_a + config.hover_current_a) * config.resistance_ohm
+        )
+        self.state = BatteryState(0.0, 0.0, config.initial_remaining)
+        self.thrust_factor = 1.0
+        """Factor on every rotor's thrust; 1 for the full pack in a hover."""
+        self.step(0.0, 0.0)
+
+    def set_remaining(self, remaining: float) -> None:
+        """Put the charge to a fraction 0..1 of the capacity."""
+        self.state = self.state._replace(remaining=min(max(remaining, 0.0), 1.0))
+        self.step(0.0, 0.0, current=self.state.current_a)
+
+    def step(self, thrust: float, dt: float, current: float | None = None) -> None:
+        """Draw for `dt` seconds what `thrust` (N) takes, or a given current (A)."""
+        config = self._config
+        if current is None:
+            load = thrust / self._hover_thrust
+            current = config.idle_current_a + config.hover_current_a * load**1.5
+        remaining = max(0.0, self.state.remaining - current * dt / self._charge_as)
+        cell = config.empty_cell_v + (config.full_cell_v - config.empty_cell_v) * remaining
+        voltage = max(0.0, config.cells * cell - config.resistance_ohm * current)
+        self.state = BatteryState(voltage, current, remaining)
+        self.thrust_factor = (voltage / self._reference_v) ** config.thrust_exponent

@@ -1,0 +1,45 @@
+"""Between local NED and latitude, longitude, altitude: a flat map about an origin."""
+
+from math import cos, degrees, radians
+from typing import NamedTuple
+
+from sitl_mock.physics.quaternion import Vector
+
+EARTH_RADIUS_M = 6371000.0
+
+
+class Origin(NamedTuple):
+    """The local frame's origin: degrees, and m above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+class Geodetic(NamedTuple):
+    """A place: degrees, and m above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+def to_geodetic(origin: Origin, position: Vector) -> Geodetic:
+    """Return the place of a local NED position (m)."""
+    north, east, down = position
+    parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
+    return Geodetic(
+        origin.latitude_deg + degrees(north / EARTH_RADIUS_M),
+        origin.longitude_deg + degrees(east / parallel),
+        origin.altitude_m - down,
+    )
+
+
+def to_local(origin: Origin, place: Geodetic) -> Vector:
+    """Return the local NED position (m) of a place."""
+    parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
+    return (
+        radians(place.latitude_deg - origin.latitude_deg) * EARTH_RADIUS_M,
+        radians(place.longitude_deg - origin.longitude_deg) * parallel,
+        origin.altitude_m - place.altitude_m,
+    )

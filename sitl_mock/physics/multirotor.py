@@ -1,0 +1,171 @@
+"""A multirotor in the air under rate control: rate loop, allocation, rotors and rigid body.
+
+No ground, battery, wind, sensors or MAVLink: what a vehicle adds to it, or a study leaves out.
+"""
+
+from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.physics.quaternion import Quaternion, Vector
+from sitl_mock.physics.rate_loop import RateLoop
+from sitl_mock.physics.rate_shaping import RateShaping, Shaped
+from sitl_mock.physics.rigid_body import Load, Motion, advance, body_of, derivative
+from sitl_mock.physics.rotors import STOPPED, Mix, Rotors, mix
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class Multirotor:
+    """The complete inner loop in fixed steps; a step is `drive`, then `move` (or `rest`).
+
+    It begins at rest, its rotors turning steadily.
+
+    Args:
+        airframe: body and rotors.
+        rate_loop: the body-rate controller.
+        q: attitude at the start.
+        specific_thrust: of all rotors at the start, m/s^2.
+
+    Attributes:
+        dt: length of a step, s.
+        motion: velocity (NED), attitude and body rates (FRD) after the latest step.
+        acceleration: NED, m/s^2, mean over the latest step.
+        angular_acceleration: FRD, rad/s^2, mean over the latest step.
+        mix: throttles of the latest step, and whether they fell short of a torque.
+        rotors: the four of them.
+    """
+
+    __slots__ = (
+        "_body",
+        "_mass",
+        "_rate_hz",
+        "_rate_loop",
+        "_shaping",
+        "_tilt_torque",
+        "_yaw_torque",
+        "acceleration",
+        "angular_acceleration",
+        "dt",
+        "mix",
+        "motion",
+        "rotors",
+    )
+
+    motion: Motion
+    acceleration: Vector
+    angular_acceleration: Vector
+
+    def __init__(
+        self,
+        airframe: AirframeConfig,
+        rate_loop: RateLoopConfig,
+        q: Quaternion,
+        specific_thrust: float = 0.0,
+    ) -> None:
+        self._rate_hz = airframe.physics_rate_hz
+        self.dt = 1.0 / self._rate_hz
+        self._mass = airframe.mass_kg
+        per_throttle = airframe.mass_kg * airframe.thrust_slope_m_s2
+        self._tilt_torque = airframe.rotor_arm_m * per_throttle  # N m per throttle difference
+        self._yaw_torque = airframe.rotor_drag_ratio_m * per_throttle
+        self._body = body_of(airframe)
+        shaping = rate_loop.shaping
+        self._shaping = None if shaping is None else RateShaping(shaping, self.dt)
+        self._rate_loop = RateLoop(rate_loop, self.dt)
+        self.rotors = Rotors(airframe, self.dt)
+        throttle = self.throttle(specific_thrust)
+        self.mix: Mix = mix(throttle, *ZERO)
+        thrust = self.rotors.steady(throttle)
+        self.rotors.thrusts = (thrust, thrust, thrust, thrust)
+        self.rest(q)
+
+    @property
+    def q(self) -> Quaternion:
+        """Attitude after the latest step."""
+        return self.motion[3:7]
+
+    @property
+    def body_rates(self) -> Vector:
+        """Body rates after the latest step, rad/s, FRD."""
+        return self.motion[7:]
+
+    @property
+    def shaped(self) -> Shaped | None:
+        """The attitude target that the body follows; None: it follows rates, or nothing."""
+        return None if self._shaping is None else self._shaping.shaped
+
+    def throttle(self, specific_thrust: float) -> float:
+        """Collective throttle that settles at a specific thrust (m/s^2), at most 1."""
+        return self.rotors.throttle(0.25 * self._mass * specific_thrust)
+
+    def drive(
+        self,
+        setpoint: Vector,
+        throttle: float,
+        *,
+        controlled: bool = True,
+        thrust_factor: float = 1.0,
+        wind: Vector = ZERO,
+    ) -> Load:
+        """Controller, allocation and rotors of one step: what then acts on the body.
+
+        Args:
+            setpoint: body rates, rad/s, FRD; NaN holds the present rate, and so does infinity
+                unless the rate loop shapes its setpoints: then the rate runs away.
+            throttle: collective; NaN or <= 0 stops the rotors, above 1 is full.
+            controlled: whether the rate loop acts; without it, it idles.
+            thrust_factor: on every rotor's thrust, for the battery's voltage.
+            wind: the air's velocity, NED, m/s.
+        """
+        if controlled:
+            if self._shaping is not None:
+                setpoint = self._shaping.step(setpoint, self.motion[3:7])
+            torques = self._rate_loop.step(
+                setpoint,
+                self.motion[7:],
+                self.angular_acceleration,
+                tilt_saturated=self.mix.tilt_saturated,
+                yaw_saturated=self.mix.yaw_saturated,
+            )
+        else:
+            if self._shaping is not None:
+                self._shaping.idle(setpoint)
+            self._rate_loop.idle(setpoint)
+            torques = ZERO
+        # Written so that a NaN throttle fails the comparison and stops the rotors.
+        if throttle > 0.0:
+            self.mix = mix(
+                throttle,
+                torques[0] / self._tilt_torque,
+                torques[1] / self._tilt_torque,
+                torques[2] / self._yaw_torque,
+            )
+        else:
+            self.mix = STOPPED
+        thrust, torque_x, torque_y, torque_z = self.rotors.step(self.mix.throttles, thrust_factor)
+        return (thrust / self._mass, torque_x, torque_y, torque_z, *wind)
+
+    def sinks(self, load: Load) -> bool:
+        """Whether this load does not lift the body: its vertical acceleration is not upwards."""
+        return derivative(self.motion, load, self._body)[2] >= 0.0
+
+    def move(self, load: Load) -> Vector:
+        """One step of the body under this load; returns the displacement, NED, m."""
+        before, rate_hz = self.motion, self._rate_hz
+        after, moved = advance(before, load, self._body, self.dt)
+        self.motion = after
+        self.acceleration = (
+            (after[0] - before[0]) * rate_hz,
+            (after[1] - before[1]) * rate_hz,
+            (after[2] - before[2]) * rate_hz,
+        )
+        self.angular_acceleration = (
+            (after[7] - before[7]) * rate_hz,
+            (after[8] - before[8]) * rate_hz,
+            (after[9] - before[9]) * rate_hz,
+        )
+        return moved
+
+    def rest(self, q: Quaternion) -> None:
+        """Hold the body at rest with this attitude."""
+        self.motion = (*ZERO, *q, *ZERO)
+        self.acceleration = ZERO
+        self.angular_acceleration = ZERO

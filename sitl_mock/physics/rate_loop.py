@@ -1,0 +1,112 @@
+"""The autopilot's body-rate controller: PI with feed-forward and damping on each axis."""
+
+from math import exp, isfinite
+from typing import NamedTuple
+
+from sitl_mock.config.airframe import AxisGains, RateLoopConfig
+from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.setpoint_delay import SetpointDelay
+
+
+class AxisLaw(NamedTuple):
+    """Constants of one axis, as the control law uses them."""
+
+    proportional: float  # N m per rad/s
+    integral: float  # N m per rad
+    feed_forward: float  # N m per rad/s
+    damping: float  # N m per rad/s^2
+    integral_limit: float  # N m
+    filter_decay: float  # the torque filter's memory from one step to the next, 0 = no filter
+
+
+AxisState = tuple[float, float]
+"""Memory of one axis, N m: its integral, and its filtered torque, which is its output."""
+AT_REST: AxisState = (0.0, 0.0)
+
+
+def axis_law(gains: AxisGains, dt: float) -> AxisLaw:
+    """The law of one axis for steps of `dt` seconds."""
+    filter_s = gains.torque_filter_ms * 1e-3
+    return AxisLaw(
+        gains.proportional_n_m_s,
+        gains.integral_n_m,
+        gains.feed_forward_n_m_s,
+        gains.damping_n_m_s2,
+        gains.integral_limit_n_m,
+        exp(-dt / filter_s) if filter_s > 0.0 else 0.0,
+    )
+
+
+def axis_step(
+    law: AxisLaw,
+    state: AxisState,
+    setpoint: float,
+    rate: float,
+    acceleration: float,
+    saturated: bool,
+    dt: float,
+) -> AxisState:
+    """One step of one axis; pure.
+
+    Args:
+        law: the axis's constants.
+        state: its memory.
+        setpoint: wanted body rate, rad/s.
+        rate: present body rate, rad/s.
+        acceleration: present angular acceleration, rad/s^2.
+        saturated: the rotors could not give the last torque; the integral may then only shrink.
+        dt: step, s.
+    """
+    proportional, integral_gain, feed_forward, damping, limit, memory = law
+    integral, filtered = state
+    error = setpoint - rate
+    if not (saturated and error * filtered > 0.0):
+        integral += integral_gain * error * dt
+        integral = limit if integral > limit else -limit if integral < -limit else integral
+    wanted = proportional * error + integral + feed_forward * setpoint - damping * acceleration
+    return integral, wanted + memory * (filtered - wanted)
+
+
+class RateLoop:
+    """The three axes, and the transport delay of their setpoints.
+
+    A setpoint that is NaN or infinite holds the present rate, as PX4 was measured to do: the axis
+    sees no error, and a rolling vehicle rolls on. Setpoints are not clipped.
+    """
+
+    __slots__ = ("_axes", "_delay", "_dt", "_laws")
+
+    def __init__(self, config: RateLoopConfig, dt: float) -> None:
+        self._dt = dt
+        gains = (config.roll, config.pitch, config.yaw)
+        self._laws = tuple(axis_law(axis, dt) for axis in gains)
+        roll, pitch, yaw = (axis.setpoint_delay_ms for axis in gains)
+        self._delay = SetpointDelay((roll, pitch, yaw), dt)
+        self._axes = (AT_REST, AT_REST, AT_REST)
+
+    def step(
+        self,
+        setpoint: Vector,
+        rates: Vector,
+        accelerations: Vector,
+        *,
+        tilt_saturated: bool,
+        yaw_saturated: bool,
+    ) -> Vector:
+        """Torques about body x, y, z in N m for this step."""
+        roll, pitch, yaw = self._delay.step(setpoint)
+        p, q, r = rates
+        p_dot, q_dot, r_dot = accelerations
+        x_law, y_law, z_law = self._laws
+        x, y, z = self._axes
+        dt = self._dt
+        x = axis_step(x_law, x, roll if isfinite(roll) else p, p, p_dot, tilt_saturated, dt)
+        y = axis_step(y_law, y, pitch if isfinite(pitch) else q, q, q_dot, tilt_saturated, dt)
+        z = axis_step(z_law, z, yaw if isfinite(yaw) else r, r, r_dot, yaw_saturated, dt)
+        self._axes = (x, y, z)
+        return x[1], y[1], z[1]
+
+    def idle(self, setpoint: Vector) -> None:
+        """A step without control (disarmed, or standing): memory cleared, setpoints delayed."""
+        self._delay.step(setpoint)
+        self._axes = (AT_REST, AT_REST, AT_REST)

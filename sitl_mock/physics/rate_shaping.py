@@ -1,0 +1,118 @@
+"""Shaped body rates: limited in acceleration, integrated into an attitude target, which is held.
+
+ArduPilot's way with a body-rate setpoint. What comes out is the setpoint of the rate loop.
+"""
+
+from math import atan2, copysign, inf, isnan, sqrt
+from typing import NamedTuple
+
+from sitl_mock.config.airframe import AxisShaping
+from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise, to_body
+from sitl_mock.physics.setpoint_delay import SetpointDelay
+
+AT_REST: Vector = (0.0, 0.0, 0.0)
+
+
+class Shaped(NamedTuple):
+    """What the shaping remembers from one step to the next."""
+
+    rates: Vector
+    """Shaped rates along the axes of the attitude target, rad/s."""
+    target: Quaternion
+    """Attitude target, body to world."""
+
+
+def slewed(goal: float, rate: float, most: float) -> float:
+    """The rate moved to its goal, by `most` at the farthest.
+
+    A NaN goal holds the rate. An infinite one is never reached: the rate runs away, as ArduPilot
+    was measured to do.
+    """
+    if isnan(goal):
+        return rate
+    change = goal - rate
+    return rate + (most if change > most else -most if change < -most else change)
+
+
+def turned(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
+    """The attitude after `dt` seconds of body rates (rad/s); its angle errs by (rate dt)^3 / 12."""
+    half = 0.5 * dt
+    return normalise(multiply(q, (1.0, half * rates[0], half * rates[1], half * rates[2])))
+
+
+def rotation_vector(q: Quaternion) -> Vector:
+    """Rotation vector of a unit quaternion, rad, the short way round."""
+    w, x, y, z = q if q[0] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
+    sine = sqrt(x * x + y * y + z * z)
+    scale = 2.0 * atan2(sine, w) / sine if sine > 0.0 else 2.0
+    return scale * x, scale * y, scale * z
+
+
+def closing(angle: float, gain: float, acceleration: float) -> float:
+    """Rate that closes an angle: proportional, then so that it can stop at this deceleration.
+
+    ArduPilot's sqrt_controller.
+    """
+    linear = acceleration / (gain * gain) if gain > 0.0 else inf
+    if abs(angle) <= linear:
+        return gain * angle
+    return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear)), angle)
+
+
+class RateShaping:
+    """The three axes, their delays before the shaping, and the attitude target they share.
+
+    Args:
+        axes: constants of roll, pitch and yaw.
+        dt: step, s.
+    """
+
+    __slots__ = ("_closing", "_delay", "_dt", "_most", "_shaped")
+
+    def __init__(self, axes: tuple[AxisShaping, AxisShaping, AxisShaping], dt: float) -> None:
+        self._dt = dt
+        self._most = tuple(axis.acceleration_limit_rad_s2 * dt for axis in axes)
+        self._closing = tuple(
+            (axis.attitude_gain_1_s, 0.5 * axis.acceleration_limit_rad_s2) for axis in axes
+        )
+        roll, pitch, yaw = axes
+        self._delay = SetpointDelay((roll.delay_ms, pitch.delay_ms, yaw.delay_ms), dt)
+        self._shaped: Shaped | None = None
+
+    @property
+    def shaped(self) -> Shaped | None:
+        """The attitude target after the latest step; None while nothing is controlled."""
+        return self._shaped
+
+    def step(self, setpoint: Vector, q: Quaternion) -> Vector:
+        """Body rates for the rate loop, rad/s, FRD.
+
+        Args:
+            setpoint: wanted body rates, rad/s; NaN holds the shaped rate, infinity runs away.
+            q: present attitude; the attitude target begins there.
+        """
+        goals = self._delay.step(setpoint)
+        rates, target = self._shaped or Shaped(AT_REST, q)
+        most = self._most
+        rates = (
+            slewed(goals[0], rates[0], most[0]),
+            slewed(goals[1], rates[1], most[1]),
+            slewed(goals[2], rates[2], most[2]),
+        )
+        target = turned(target, rates, self._dt)
+        self._shaped = Shaped(rates, target)
+        w, x, y, z = target
+        ahead = multiply((w, -x, -y, -z), q)  # the body as the attitude target sees it
+        turn_x, turn_y, turn_z = rotation_vector(ahead)
+        roll, pitch, yaw = to_body(ahead, rates)
+        for_roll, for_pitch, for_yaw = self._closing
+        return (
+            roll - closing(turn_x, *for_roll),
+            pitch - closing(turn_y, *for_pitch),
+            yaw - closing(turn_z, *for_yaw),
+        )
+
+    def idle(self, setpoint: Vector) -> None:
+        """A step without control: the attitude target is forgotten, setpoints are delayed."""
+        self._delay.step(setpoint)
+        self._shaped = None

@@ -1,0 +1,127 @@
+"""Rigid-body dynamics as pure arithmetic on floats and tuples: one step, no state.
+
+World NED, body FRD, quaternion (w, x, y, z) body to world, SI. Nothing here allocates more than
+tuples or looks anything up, so the same functions can be compiled for batches.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.physics.quaternion import Vector
+
+Motion = tuple[float, float, float, float, float, float, float, float, float, float]
+"""(v_n, v_e, v_d [m/s], w, x, y, z, p, q, r [rad/s]): all that the derivative depends on."""
+Load = tuple[float, float, float, float, float, float, float]
+"""(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
+
+
+class Body(NamedTuple):
+    """Constants of the rigid body."""
+
+    inertia_x: float  # kg m^2, about body x
+    inertia_y: float  # kg m^2, about body y
+    inertia_z: float  # kg m^2, about body z
+    drag: float  # linear drag per mass, 1/s
+    quadratic_drag: float  # per mass, 1/m
+    rotational_drag: float  # damping torque, N m per rad/s
+    gravity: float  # m/s^2
+
+
+def body_of(airframe: AirframeConfig) -> Body:
+    """The rigid body of an airframe."""
+    return Body(
+        *airframe.inertia_kg_m2,
+        drag=airframe.drag_n_s_per_m / airframe.mass_kg,
+        quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
+        rotational_drag=airframe.rotational_drag_n_m_s,
+        gravity=airframe.gravity_m_s2,
+    )
+
+
+def derivative(motion: Motion, load: Load, body: Body) -> Motion:
+    """Time derivative of the motion (Newton, Euler, quaternion kinematics).
+
+    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind);
+    J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
+    """
+    vn, ve, vd, w, x, y, z, p, q, r = motion
+    thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
+    jx, jy, jz, drag, quadratic, damping, gravity = body
+    air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
+    if quadratic:
+        drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
+    return (
+        drag * air_n - 2.0 * thrust * (x * z + w * y),
+        drag * air_e - 2.0 * thrust * (y * z - w * x),
+        drag * air_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
+        -0.5 * (x * p + y * q + z * r),
+        0.5 * (w * p + y * r - z * q),
+        0.5 * (w * q + z * p - x * r),
+        0.5 * (w * r + x * q - y * p),
+        (torque_x - damping * p - (jz - jy) * q * r) / jx,
+        (torque_y - damping * q - (jx - jz) * r * p) / jy,
+        (torque_z - damping * r - (jy - jx) * p * q) / jz,
+    )
+
+
+def along(motion: Motion, rate: Motion, dt: float) -> Motion:
+    """The motion moved by `dt` seconds along a derivative."""
+    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = motion
+    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = rate
+    return (
+        a0 + dt * b0,
+        a1 + dt * b1,
+        a2 + dt * b2,
+        a3 + dt * b3,
+        a4 + dt * b4,
+        a5 + dt * b5,
+        a6 + dt * b6,
+        a7 + dt * b7,
+        a8 + dt * b8,
+        a9 + dt * b9,
+    )
+
+
+def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, Vector]:
+    """One classical Runge-Kutta step of `dt` seconds under a constant load.
+
+    Returns the new motion, its quaternion normalised, and the displacement (NED, m). The position
+    is the integral of the velocity and nothing depends on it, so its own four stages collapse to
+    v dt + (k1 + k2 + k3) dt^2 / 6.
+    """
+    half = 0.5 * dt
+    k1 = derivative(motion, load, body)
+    k2 = derivative(along(motion, k1, half), load, body)
+    k3 = derivative(along(motion, k2, half), load, body)
+    k4 = derivative(along(motion, k3, dt), load, body)
+    vn, ve, vd, w, x, y, z, p, q, r = motion
+    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1
+    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = k3
+    d0, d1, d2, d3, d4, d5, d6, d7, d8, d9 = k4
+    sixth = dt / 6.0
+    displacement = (
+        dt * (vn + sixth * (a0 + b0 + c0)),
+        dt * (ve + sixth * (a1 + b1 + c1)),
+        dt * (vd + sixth * (a2 + b2 + c2)),
+    )
+    w += sixth * (a3 + 2.0 * (b3 + c3) + d3)
+    x += sixth * (a4 + 2.0 * (b4 + c4) + d4)
+    y += sixth * (a5 + 2.0 * (b5 + c5) + d5)
+    z += sixth * (a6 + 2.0 * (b6 + c6) + d6)
+    # The norm leaves 1 by less than 1e-9 a step, so one Newton step of 1/sqrt is exact enough.
+    scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
+    moved = (
+        vn + sixth * (a0 + 2.0 * (b0 + c0) + d0),
+        ve + sixth * (a1 + 2.0 * (b1 + c1) + d1),
+        vd + sixth * (a2 + 2.0 * (b2 + c2) + d2),
+        w * scale,
+        x * scale,
+        y * scale,
+        z * scale,
+        p + sixth * (a7 + 2.0 * (b7 + c7) + d7),
+        q + sixth * (a8 + 2.0 * (b8 + c8) + d8),
+        r + sixth * (a9 + 2.0 * (b9 + c9) + d9),
+    )
+    return moved, displacement

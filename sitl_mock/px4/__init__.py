@@ -1,0 +1,1 @@
+"""PX4, as recorded and measured: its numbers, texts and rules."""

@@ -1,0 +1,287 @@
+"""PX4's rules of arming and modes, by its measured behaviour."""
+
+import struct
+
+from sitl_mock.autopilot.commander import ACCEPTED, TEMPORARILY_REJECTED
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.personality import Occasion
+from sitl_mock.autopilot.setpoints import position_setpoint
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link
+from sitl_mock.physics.quaternion import Vector
+from sitl_mock.px4.checks import NEVER_ARMED_IN, arming_problem
+from sitl_mock.px4.failsafe import Announce, Failsafe
+from sitl_mock.px4.health import HealthReport
+from sitl_mock.px4.mode_control import Px4ModeControl
+from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
+from sitl_mock.px4.setpoints import attitude_setpoint
+from sitl_mock.px4.sticks import Sticks
+
+PREFLIGHT_MARGIN_US = 1_000_000
+"""Armed but never flown, the vehicle disarms this much after COM_DISARM_PRFLT (measured 11 s)."""
+STATUS_PERIOD_US = 500_000
+"""The vehicle's status is published this often, and whenever it changes (measured)."""
+
+
+class Px4Commander:
+    """PX4's `Commander`.
+
+    Args:
+        state: the autopilot's state.
+        parameters: its parameters.
+        control: told of every mode entered.
+        stream: the offboard setpoints.
+        announce: tells the outside of an occasion, with a detail.
+        health: tells which checks fail.
+        ready_us: vehicle time from which arming is possible.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        control: Px4ModeControl,
+        stream: OffboardStream,
+        announce: Announce,
+        health: HealthReport,
+        *,
+        ready_us: int,
+    ) -> None:
+        self.refusal: str | None = None
+        self.pilot = False
+        self.failsafe = Failsafe(
+            state, parameters, stream, announce, self._enter, self._stop_motors
+        )
+        self._sticks = Sticks(parameters)
+        self._health = health
+        self._state = state
+        self._parameters = parameters
+        self._control = control
+        self._stream = stream
+        self._announce = announce
+        self._ready_us = ready_us
+        self._landed_since_us = 0
+        self._crashed = False
+        self._asked_takeoff_z: float | None = None
+        self._status: tuple[bool, Mode, Mode, bool] | None = None
+
+    def arm(self, *, force: bool = False) -> int:
+        """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
+        state = self._state
+        if state.armed:
+            return ACCEPTED
+        problem = self.check()
+        if problem is not None and (not force or self._crashed):
+            self._announce(Occasion.ARMING_DENIED, "")
+            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+            return TEMPORARILY_REJECTED
+        state.armed = True
+        state.armed_at_us = self._landed_since_us = state.time_us
+        state.flown = False
+        state.home_ned = state.estimate.position_ned
+        state.home_q = state.estimate.q
+        state.home_set_at_us = state.time_us
+        self._announce(Occasion.ARMED, "")
+        self._enter(state.mode)
+        return ACCEPTED
+
+    def disarm(self, *, force: bool = False) -> int:
+        """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
+        if not self._state.armed:
+            return ACCEPTED
+        if not self._state.landed and not force:
+            self._announce(Occasion.DISARM_DENIED, "")
+            return TEMPORARILY_REJECTED
+        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
+        return ACCEPTED
+
+    def request_mode(
+        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
+    ) -> int:
+        """Change the intended mode, and return a MAV_RESULT.
+
+        Disarmed, every mode is entered (arming is what fails then); armed, a mode that cannot run
+        is refused.
+
+        Args:
+            mode: the mode asked.
+            takeoff_z: where TAKEOFF ends, m down; None = MIS_TAKEOFF_ALT above home.
+            hold: where LOITER goes, NED; None = here.
+        """
+        state = self._state
+        if state.armed and not self._can_run(mode):
+            asked = struct.pack("<I", custom_mode(mode))
+            self._announce(Occasion.MODE_DENIED, mode.name.capitalize(), asked)
+            return TEMPORARILY_REJECTED
+        self._intend(mode)
+        self.failsafe.clear()
+        if mode is Mode.TAKEOFF:
+            self._asked_takeoff_z = takeoff_z
+        self._enter(mode, hold=hold)
+        return ACCEPTED
+
+    def land(self) -> int:
+        """Land here, and return a MAV_RESULT; it is told, as a change of mode is not."""
+        result = self.request_mode(Mode.LAND)
+        if result == ACCEPTED:
+            self._announce(Occasion.LANDING_COMMANDED, "")
+        return result
+
+    def take_over(self, mode: Mode) -> None:
+        """Let the pilot's sticks change the mode (fault injection)."""
+        self.pilot = True
+        self._announce(Occasion.PILOT_TOOK_OVER, "")
+        self.request_mode(mode)
+
+    def heard(self, heartbeat: Message) -> None:
+        """Note a heartbeat: the links that failsafes watch are told apart by its type."""
+        self.failsafe.heard(heartbeat.type)
+
+    def manual_control(self, message: Message, _: Link) -> None:
+        """Take a pilot's sticks."""
+        self._sticks.heard(message, self._state.time_us)
+
+    def setpoint(self, message: Message) -> None:
+        """Take a setpoint if PX4 would count it, whatever the mode."""
+        decode = (
+            attitude_setpoint if message.get_type() == "SET_ATTITUDE_TARGET" else position_setpoint
+        )
+        setpoint = decode(message)
+        if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
+            self._stream.accept(setpoint, self._state.time_us)
+
+    @property
+    def under_setpoints(self) -> bool:
+        """Whether it is armed in OFFBOARD."""
+        return self._state.armed and self._state.mode is Mode.OFFBOARD
+
+    def tell_problem(self) -> None:
+        """Say what forbids arming now, if anything does."""
+        problem = self.check()
+        if problem is not None:
+            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+
+    def check(self) -> str | None:
+        """Look for what forbids arming, note it in the state and return it."""
+        state = self._state
+        problem = arming_problem(
+            state,
+            self._parameters,
+            ready_us=self._ready_us,
+            crashed=self._crashed,
+            offboard_alive=self.offboard_alive,
+            gcs_alive=self.failsafe.gcs_alive,
+            pilot=self._at_sticks,
+            refusal=self.refusal,
+        )
+        state.prearm_problem = problem
+        return problem
+
+    @property
+    def offboard_alive(self) -> bool:
+        """Whether setpoints stream in often enough."""
+        return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
+
+    def step(self, *, crashed: bool) -> None:
+        """Run the rules once; called at 20 Hz of vehicle time."""
+        state = self._state
+        self._crashed = crashed
+        if state.armed and crashed:
+            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
+        self.check()
+        self._health.step(
+            offboard_alive=self.offboard_alive,
+            pilot=self._at_sticks,
+            gcs_alive=self.failsafe.gcs_alive,
+            gcs_required=self._parameters["NAV_DLL_ACT"] > 0,
+        )
+        self._watch_sticks()
+        self.failsafe.step(pilot=self._at_sticks)
+        if state.armed:
+            if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
+                if state.intended_mode is Mode.TAKEOFF:
+                    self._intend(Mode.LOITER)
+                self._enter(Mode.LOITER)
+            self._disarm_on_ground()
+        self._publish_status()
+
+    @property
+    def _at_sticks(self) -> bool:
+        """Whether a pilot is there, by fault injection or by MANUAL_CONTROL."""
+        return self.pilot or self._sticks.present(self._state.time_us)
+
+    def _watch_sticks(self) -> None:
+        """A pilot who moves the sticks takes over, in the air and from any automatic mode."""
+        state = self._state
+        flies_itself = state.armed and not state.landed and state.mode not in PILOTED
+        if not flies_itself or self.failsafe.holds_before_acting:
+            return
+        if self._sticks.override(state.time_us):
+            self._announce(Occasion.PILOT_TOOK_OVER, "")
+            self.request_mode(Mode.POSCTL)
+
+    def _disarm_on_ground(self) -> None:
+        state, parameters = self._state, self._parameters
+        if not state.landed:
+            self._landed_since_us = state.time_us
+            return
+        waited = state.time_us - self._landed_since_us
+        if state.flown:
+            limit = parameters["COM_DISARM_LAND"]
+            if limit > 0 and waited >= limit * 1e6:
+                self._stop_motors(Occasion.DISARMED_BY_LANDING)
+        else:
+            limit = parameters["COM_DISARM_PRFLT"]
+            if limit > 0 and waited >= limit * 1e6 + PREFLIGHT_MARGIN_US:
+                self._stop_motors(Occasion.DISARMED_ON_GROUND)
+
+    def _stop_motors(self, occasion: Occasion) -> None:
+        state = self._state
+        state.armed = False
+        # Measured: a landing entered from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
+        state.intended_mode = state.after_disarming
+        self.failsafe.clear()
+        self._enter(state.intended_mode)
+        self._announce(occasion, "")
+
+    def _intend(self, mode: Mode) -> None:
+        """Note the mode that the user wants.
+
+        On disarming the last one comes back that may be armed; measured: TAKEOFF does not count.
+        """
+        self._state.intended_mode = mode
+        if mode not in NEVER_ARMED_IN and mode is not Mode.TAKEOFF:
+            self._state.after_disarming = mode
+
+    def _publish_status(self) -> None:
+        """Publish the status when it changed, else twice a second."""
+        state = self._state
+        status = (state.armed, state.mode, state.intended_mode, state.failsafe)
+        if status != self._status or state.time_us - state.status_us >= STATUS_PERIOD_US:
+            self._status, state.status_us = status, state.time_us
+
+    def _can_run(self, mode: Mode) -> bool:
+        if mode is Mode.OFFBOARD:
+            return self.offboard_alive
+        if mode in PILOTED and not self._at_sticks:
+            return False
+        return self._state.position_valid or mode not in NEEDS_POSITION
+
+    def _enter(self, mode: Mode, *, hold: Vector | None = None) -> None:
+        """Enter a mode at the present estimate, whatever the intended one is."""
+        self._state.mode = mode
+        takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
+        self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)
+
+    def _takeoff_z(self) -> float:
+        """Return where TAKEOFF ends, m down: as asked, else MIS_TAKEOFF_ALT above home."""
+        if self._asked_takeoff_z is not None:
+            return self._asked_takeoff_z
+        altitude = self._parameters["MIS_TAKEOFF_ALT"]
+        if self._state.armed:
+            packed = struct.pack("<f", altitude)
+            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
+        return self._state.home_ned[2] - altitude

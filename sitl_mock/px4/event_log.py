@@ -1,0 +1,110 @@
+"""PX4's events as it sends them: numbered, kept for a while, and sent again when asked for.
+
+Source: the MAVLink events interface; intervals and flags as recorded.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.event_messages import (
+    CURRENT_EVENT_SEQUENCE,
+    EVENT,
+    RESPONSE_EVENT_ERROR,
+    Layout,
+)
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link
+
+_KEPT = 20
+"""Events that can be asked for again."""
+_SEQUENCE_PERIOD_US = 3_000_000
+_RESET = 1
+"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the numbers begin anew; sent before the first event."""
+_UNAVAILABLE = 0
+"""MAV_EVENT_ERROR_REASON."""
+
+
+class _Sent(NamedTuple):
+    sequence: int
+    payload: bytes
+
+
+class EventLog:
+    """Sends events on all links.
+
+    Args:
+        state: for the time.
+        links: where to.
+    """
+
+    def __init__(self, state: State, links: list[Link]) -> None:
+        self._state = state
+        self._links = links
+        self._sent: deque[_Sent] = deque(maxlen=_KEPT)
+        self._latest = 0
+        self._told_us = 0
+
+    def send(
+        self, event_id: int, severity: int, internal: int | None = None, arguments: bytes = b""
+    ) -> None:
+        """Send a new event.
+
+        Args:
+            event_id: see `px4_events.event_id`.
+            severity: MAV_SEVERITY (8: for programs only) that the user sees.
+            internal: the same for the vehicle's own log; None = as the user's.
+            arguments: its values, packed.
+        """
+        first = not self._sent
+        self._latest = (self._latest + 1) & 0xFFFF
+        if first:
+            self._tell_sequence(_RESET)
+        levels = (severity if internal is None else internal) << 4 | severity
+        payload = EVENT.payload.pack(
+            event_id, self._state.shown_us // 1000, self._latest, 0, 0, levels, arguments
+        )
+        self._sent.append(_Sent(self._latest, payload))
+        for link in self._links:
+            _send(link, EVENT, payload)
+
+    def step(self) -> None:
+        """Tell the latest number now and then, so that whoever missed an event finds out."""
+        if self._state.time_us - self._told_us >= _SEQUENCE_PERIOD_US:
+            self._tell_sequence(0 if self._sent else _RESET)
+
+    def requested(self, request: Message, link: Link) -> None:
+        """Answer a REQUEST_EVENT: each event again, or why it cannot be.
+
+        Of a range that is longer than what is kept, one refusal stands for all the older ones.
+        """
+        first, last = request.first_sequence, request.last_sequence
+        wanted = (last - first & 0xFFFF) + 1
+        if wanted > _KEPT:
+            self._refuse(first, request, link)
+            first = last - _KEPT + 1
+        kept = {sent.sequence: sent.payload for sent in self._sent}
+        for number in range(first, first + min(wanted, _KEPT)):
+            sequence = number & 0xFFFF
+            if sequence in kept:
+                _send(link, EVENT, kept[sequence])
+            else:
+                self._refuse(sequence, request, link)
+
+    def _refuse(self, sequence: int, request: Message, link: Link) -> None:
+        after = (sent.sequence for sent in self._sent if sent.sequence != sequence)
+        oldest = min(after, key=lambda one: one - sequence & 0xFFFF, default=self._latest)
+        payload = RESPONSE_EVENT_ERROR.payload.pack(
+            sequence, oldest, request.get_srcSystem(), request.get_srcComponent(), _UNAVAILABLE
+        )
+        _send(link, RESPONSE_EVENT_ERROR, payload)
+
+    def _tell_sequence(self, flags: int) -> None:
+        self._told_us = self._state.time_us
+        payload = CURRENT_EVENT_SEQUENCE.payload.pack(self._latest, flags)
+        for link in self._links:
+            _send(link, CURRENT_EVENT_SEQUENCE, payload)
+
+
+def _send(link: Link, layout: Layout, payload: bytes) -> None:
+    link.send_raw(layout.message_id, layout.crc_extra, payload)

@@ -1,0 +1,123 @@
+"""PX4's health report: events that tell which checks fail, and in which modes it can be armed.
+
+Recorded byte for byte; names are those of PX4's source, where one of that number was found.
+"""
+
+import struct
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from sitl_mock.autopilot.state import State
+from sitl_mock.px4.event_log import EventLog
+from sitl_mock.px4.events import event_id
+
+_CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
+
+_ALL_MODES = 0xFFFFFFFF
+_ARMABLE = 0x807F7AB0
+"""Modes in which it can be armed when nothing is wrong and no pilot is there, one bit each."""
+_PRESENT = 0x38020D02
+_GPS_PRESENT = 1 << 3
+_GCS_PRESENT = 1 << 12
+_PERIOD_US = 2_000_000
+"""No two reports are closer."""
+
+_SUMMARY = struct.Struct("<BIIII")
+"""Chunk, components with errors, with warnings, modes that can be armed, that can be run."""
+_FAILURE = struct.Struct("<IB")
+"""Modes that it concerns, component."""
+_HEALTH = struct.Struct("<BIII")
+"""Chunk, components present, with errors, with warnings."""
+
+
+class _Check(NamedTuple):
+    event_id: int
+    modes: int
+    component: int
+    severity: int
+
+
+_HEADING = _Check(30203637, 0x7E00FC, 17, _ERROR)
+"""Seen only while the heading is not known; of its name nothing but the number was found."""
+_OFFBOARD = _Check(event_id("check_modes_offboard_signal_lost"), 0x4000, 20, _ERROR)
+_ATTITUDE = _Check(event_id("check_modes_attitude"), 0x7ED1FE, 16, _CRITICAL)
+_LOCAL_POSITION = _Check(event_id("check_modes_local_pos"), 0x7E00FC, 17, _ERROR)
+_GLOBAL_POSITION = _Check(event_id("check_modes_global_pos"), 0x38, 24, _ERROR)
+_MISSION = _Check(event_id("check_modes_mission"), 0x08, 20, _INFO)
+_NO_PILOT = _Check(event_id("check_modes_manual_control"), _ALL_MODES, 7, _WARNING)
+_NO_GCS = _Check(event_id("check_rc_dl_no_dllink"), _ALL_MODES, 12, _INFO)
+_GCS_REQUIRED = _NO_GCS._replace(severity=_ERROR)
+
+
+class HealthReport:
+    """Sends a report when something in it changed, and not before two seconds after the last.
+
+    Args:
+        state: the autopilot's state.
+        events: sends them.
+        ready_us: vehicle time at which the estimator is ready.
+    """
+
+    def __init__(self, state: State, events: EventLog, ready_us: int) -> None:
+        self._state = state
+        self._events = events
+        self._ready_us = ready_us
+        self._reported: tuple[tuple[_Check, ...], int] | None = None
+        self._reported_us = 0
+
+    def step(
+        self, *, offboard_alive: bool, pilot: bool, gcs_alive: bool, gcs_required: bool
+    ) -> None:
+        """Look at what changed, and report it if it is time."""
+        state = self._state
+        self._events.step()
+        if state.time_us - self._reported_us < _PERIOD_US:
+            return
+        gcs = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
+        candidates = (
+            _HEADING if state.time_us < self._ready_us // 2 else None,
+            None if offboard_alive else _OFFBOARD,
+            _ATTITUDE if state.time_us < self._ready_us // 2 else None,
+            None if self._located else _LOCAL_POSITION,
+            None if self._located else _GLOBAL_POSITION,
+            _MISSION,
+            None if pilot else _NO_PILOT,
+            gcs,
+        )
+        failing = tuple(check for check in candidates if check is not None)
+        gps = state.gps_ok and state.position_valid
+        present = _PRESENT | (_GPS_PRESENT if gps else 0) | (_GCS_PRESENT if gcs_alive else 0)
+        if (failing, present) != self._reported:
+            self._reported = (failing, present)
+            self._reported_us = state.time_us
+            self._send(failing, present)
+
+    @property
+    def _located(self) -> bool:
+        return self._state.position_valid and self._state.time_us >= self._ready_us
+
+    def _send(self, failing: tuple[_Check, ...], present: int) -> None:
+        errors = [check for check in failing if check.severity <= _ERROR]
+        warnings = [check for check in failing if check.severity == _WARNING]
+        modes = _ARMABLE
+        for check in errors:
+            modes &= ~check.modes
+        summary = _SUMMARY.pack(0, _components(errors), _components(warnings), modes, modes)
+        send = self._events.send
+        send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
+        for check in failing:
+            send(
+                check.event_id,
+                check.severity,
+                arguments=_FAILURE.pack(check.modes, check.component),
+            )
+        health = _HEALTH.pack(0, present, 0, 0)
+        send(event_id("commander_health_summary"), _PROTOCOL, arguments=health)
+
+
+def _components(checks: Iterable[_Check]) -> int:
+    """Return the components of checks, one bit each."""
+    bits = 0
+    for check in checks:
+        bits |= 1 << check.component
+    return bits

@@ -1,0 +1,153 @@
+"""PX4's personality: its numbers, and its rules put together (recorded from PX4 main, SIH)."""
+
+from collections.abc import Collection, Mapping
+from random import Random
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.land_detector import LandDetector
+from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
+from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
+from sitl_mock.autopilot.parameters import BytewiseEncoding
+from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
+from sitl_mock.link.streams import StreamSchedule
+from sitl_mock.px4.announcer import Announcer
+from sitl_mock.px4.commander import Px4Commander
+from sitl_mock.px4.commands import Px4Commands
+from sitl_mock.px4.event_log import EventLog
+from sitl_mock.px4.events import PX4_EVENTS
+from sitl_mock.px4.health import HealthReport
+from sitl_mock.px4.mode_control import Px4ModeControl
+from sitl_mock.px4.modes import mode_of
+from sitl_mock.px4.streams import SLOT_US, Px4Streams
+from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
+from sitl_mock.settings import MockSettings
+
+CONVERGED_SHARE = 0.7
+"""The position becomes valid this far into the time before arming is possible (recorded: 3.2 s)."""
+LANDED_AFTER_US = 1_100_000
+"""Contact with little thrust for this long is a landing (measured 1.1 s)."""
+
+_COMPANION_RATES: dict[int, float] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 100.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+    dialect.MAVLINK_MSG_ID_HIGHRES_IMU: 50.0,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+    dialect.MAVLINK_MSG_ID_ODOMETRY: 30.0,
+    dialect.MAVLINK_MSG_ID_TIMESYNC: 10.0,
+    dialect.MAVLINK_MSG_ID_ALTITUDE: 10.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10.0,
+    dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10.0,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 8.0,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 5.0,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+    dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
+    dialect.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    dialect.MAVLINK_MSG_ID_PING: 1.0,
+    dialect.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
+    dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+    dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    dialect.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
+    dialect.MAVLINK_MSG_ID_VIBRATION: 0.5,
+}
+
+_GCS_RATES: dict[int, float] = {
+    **_COMPANION_RATES,
+    dialect.MAVLINK_MSG_ID_ATTITUDE: 15.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+    dialect.MAVLINK_MSG_ID_HIGHRES_IMU: 1.0,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 10.0,
+    dialect.MAVLINK_MSG_ID_ODOMETRY: 1.0,
+    dialect.MAVLINK_MSG_ID_TIMESYNC: 1.0,
+    dialect.MAVLINK_MSG_ID_ALTITUDE: 2.0,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: 2.0,
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 2.0,
+    dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 2.0,
+    dialect.MAVLINK_MSG_ID_VFR_HUD: 4.0,
+    dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
+}
+
+
+class Px4:
+    """The PX4 personality."""
+
+    events: Mapping[Occasion, Event] = PX4_EVENTS
+    boot_mode = Mode.LOITER
+    any_component = False
+    system_id_parameter = "MAV_SYS_ID"
+    unsigned_links: Collection[str] = ()
+    identity = Identity(
+        capabilities=0xE8FF,
+        flight_sw_version=18022464,
+        middleware_sw_version=18022464,
+        os_sw_version=101854463,
+        flight_custom_version=(0, 0, 0, 245, 216, 154, 203, 253),
+    )
+
+    def slot_us(self, settings: MockSettings) -> int:
+        """Return the slot period that the inner loop sets."""
+        return SLOT_US[settings.inner_loop_hz]
+
+    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+        """Return the measured onboard rates, and lower ones for the ground station's link."""
+        lockstep = settings.lockstep.enabled
+        rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
+        if lockstep and link == "companion":
+            del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # there, that message is the beacon
+        exact = lockstep if settings.exact_rates is None else settings.exact_rates
+        busy = settings.inner_loop_hz == 250 and not exact
+        return Px4Streams(rates, luck=Random(f"{settings.seed}/{link}") if busy else None)
+
+    def mode_of(self, custom_mode: int) -> Mode | None:
+        """Return the mode a custom_mode means, None if there is no such mode."""
+        return mode_of(custom_mode)
+
+    def rules(self, parts: Parts) -> Rules:
+        """Put PX4's rules together."""
+        state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
+        events = EventLog(state, parts.links)
+        announce = Announcer(self, parts.links, events)
+        control = Px4ModeControl(state, parameters, parts.stream)
+        commander = Px4Commander(
+            state,
+            parameters,
+            control,
+            parts.stream,
+            announce,
+            HealthReport(state, events, parts.ready_us),
+            ready_us=parts.ready_us,
+        )
+        builders = {
+            **MotionTelemetry(state, vehicle, parts.origin).builders(),
+            **Px4SystemTelemetry(
+                state, parts.origin, self.identity, vehicle, parts.stream
+            ).builders(),
+        }
+        return Rules(
+            control,
+            commander,
+            Px4Commands(state, commander, builders, parts.origin),
+            ParameterProtocol(parameters, BytewiseEncoding()),
+            LandDetector(
+                state,
+                announce,
+                hover_thrust=lambda: parameters["MPC_THR_HOVER"],
+                landed_after_us=LANDED_AFTER_US,
+                climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
+            ),
+            builders,
+            handlers={
+                "MANUAL_CONTROL": commander.manual_control,
+                "REQUEST_EVENT": events.requested,
+            },
+            converged_us=CONVERGED_SHARE * parts.ready_us,
+            position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
+        )

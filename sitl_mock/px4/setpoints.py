@@ -1,0 +1,51 @@
+"""What an offboard setpoint message asks, by PX4's type-mask rules (measured, see README)."""
+
+import math
+import struct
+
+from sitl_mock.autopilot.setpoints import (
+    ATTITUDE_IGNORED,
+    ROLL_OR_PITCH_RATE_IGNORED,
+    THROTTLE_IGNORED,
+    THRUST_BODY,
+    YAW_RATE_IGNORED,
+    AttitudeSetpoint,
+)
+from sitl_mock.link.framing import Message
+
+NAN = float("nan")
+
+_THRUST_BODY_FIELD = struct.Struct("<3f")
+_FULL_LENGTH = 51
+_MAGIC_V2 = 0xFD
+
+
+def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
+    """Return what a SET_ATTITUDE_TARGET asks, or None when PX4 would not count it.
+
+    Rates are not clipped; NaN and infinite ones hold the present rate, NaN thrust is none.
+    """
+    mask = message.type_mask
+    if mask & THROTTLE_IGNORED:
+        return None
+    with_rates = not mask & ROLL_OR_PITCH_RATE_IGNORED
+    with_attitude = not mask & ATTITUDE_IGNORED
+    if not with_rates and not with_attitude:
+        return None
+    yaw_rate = NAN if mask & YAW_RATE_IGNORED else message.body_yaw_rate
+    rates = (message.body_roll_rate, message.body_pitch_rate, yaw_rate) if with_rates else None
+    w, x, y, z = message.q
+    thrust = -_thrust_body_down(message) if mask & THRUST_BODY else message.thrust
+    return AttitudeSetpoint(
+        (w, x, y, z) if with_attitude else None,
+        rates,
+        0.0 if math.isnan(yaw_rate) else yaw_rate,
+        thrust,
+    )
+
+
+def _thrust_body_down(message: Message) -> float:
+    """Return the down component of the extension field thrust_body, which the dialect lacks."""
+    frame = message.get_msgbuf()
+    payload = bytes(frame[10 : 10 + frame[1]]) if frame[0] == _MAGIC_V2 else b""
+    return float(_THRUST_BODY_FIELD.unpack_from(payload.ljust(_FULL_LENGTH, b"\0"), 39)[2])

@@ -1,0 +1,56 @@
+"""A pilot's sticks as PX4 knows them: MANUAL_CONTROL, there or lost, at rest or moving."""
+
+from math import exp, isfinite
+
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.link.framing import Message
+
+_MAVLINK_SOURCES = frozenset({1, 2, 3, 5, 6, 7, 8})
+"""Values of COM_RC_IN_MODE that take sticks from MAVLink; 0 is a receiver only, 4 nothing."""
+_FILTER_S = 0.1
+_FULL_TRAVEL = 1000.0
+
+
+class Sticks:
+    """What the pilot does.
+
+    Args:
+        parameters: COM_RC_IN_MODE, COM_RC_LOSS_T, MAN_OVERRIDE_SPD.
+    """
+
+    def __init__(self, parameters: ParameterTable) -> None:
+        self._parameters = parameters
+        self._last_us: int | None = None
+        self._axes: tuple[float, ...] = ()
+        self._speeds: tuple[float, ...] = ()
+
+    def heard(self, message: Message, now_us: int) -> None:
+        """Take a MANUAL_CONTROL."""
+        if int(self._parameters["COM_RC_IN_MODE"]) not in _MAVLINK_SOURCES:
+            return
+        axes = tuple(float(axis) / _FULL_TRAVEL for axis in (message.x, message.y, message.r))
+        if self.present(now_us) and self._last_us is not None and now_us > self._last_us:
+            dt = (now_us - self._last_us) / 1e6
+            share = 1.0 - exp(-dt / _FILTER_S)
+            self._speeds = tuple(
+                speed + share * ((new - old) / dt - speed)
+                for speed, new, old in zip(self._speeds, axes, self._axes, strict=True)
+            )
+        else:
+            self._speeds = (0.0,) * len(axes)
+        self._axes, self._last_us = axes, now_us
+
+    def present(self, now_us: int) -> bool:
+        """Whether sticks were heard in the last COM_RC_LOSS_T."""
+        limit = self._parameters["COM_RC_LOSS_T"] * 1e6
+        return self._last_us is not None and now_us - self._last_us <= limit
+
+    def override(self, now_us: int) -> bool:
+        """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels a s; negative: never).
+
+        The speed is filtered with 0.1 s, as PX4 does against noise.
+        """
+        limit = self._parameters["MAN_OVERRIDE_SPD"]
+        if limit < 0.0 or not isfinite(limit) or not self.present(now_us):
+            return False
+        return any(abs(speed) > limit for speed in self._speeds)

@@ -1,0 +1,166 @@
+"""The autopilot: messages in, messages out, one vehicle flown, in vehicle time (no I/O)."""
+
+from collections.abc import Callable
+from math import radians
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.fault_effects import FaultEffects
+from sitl_mock.autopilot.fault_schedule import FaultSchedule
+from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.personality import Parts
+from sitl_mock.autopilot.receiver import Receiver
+from sitl_mock.autopilot.state import State
+from sitl_mock.link.framing import Framer, Message
+from sitl_mock.link.link import Link
+from sitl_mock.link.signing import link_signing
+from sitl_mock.personalities import personality_of
+from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.vehicle import Vehicle
+from sitl_mock.settings import MockSettings
+
+COMMANDER_PERIOD_US = 50_000
+"""The rules of state run this often, vehicle time."""
+
+
+class Autopilot:
+    """One vehicle with its autopilot.
+
+    Args:
+        settings: everything that can be set.
+        system_id: MAVLink system id.
+    """
+
+    def __init__(self, settings: MockSettings, system_id: int = 1) -> None:
+        personality = personality_of(settings)
+        overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}
+        self.parameters = ParameterTable(settings.known_parameters, overrides)
+        home = settings.home
+        self.vehicle = Vehicle(
+            settings.airframe,
+            settings.rate_loop,
+            settings.wind,
+            settings.battery,
+            settings.sensors,
+            seed=settings.seed,
+            heading=radians(home.heading_deg),
+        )
+        self.state = State(self.vehicle.estimate())
+        self.state.mode = self.state.intended_mode = personality.boot_mode
+        lockstep = settings.lockstep
+        self._slot_us = (
+            lockstep.period_ms * 1000 if lockstep.enabled else personality.slot_us(settings)
+        )
+        self._slots = 0
+        self._rate_hz = settings.airframe.physics_rate_hz
+        self._next_commander_us = 0
+        self.stream = OffboardStream()
+        signed = settings.signing is not None
+        self.companion, self.gcs = (
+            Link(
+                name,
+                Framer(system_id, 1, signed=signed),
+                personality.streams(name, settings),
+                link_signing(settings.signing, name, unsigned_links=personality.unsigned_links),
+            )
+            for name in ("companion", "gcs")
+        )
+        self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
+        self._beacon_framer = Framer(system_id, 1, signed=signed)
+        self._rules = personality.rules(
+            Parts(
+                self.state,
+                self.parameters,
+                self.vehicle,
+                self.stream,
+                Origin(home.latitude_deg, home.longitude_deg, home.altitude_m),
+                self.links,
+                round(settings.prearm_delay_s * 1e6),
+            )
+        )
+        self.commander = self._rules.commander
+        self.faults = FaultSchedule(settings.faults)
+        self.effects = FaultEffects(
+            self.state, self.vehicle, self.commander, self._rules.control, self.links
+        )
+        self._receiver = Receiver(self.state, self._rules, personality, system_id)
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time since boot, us; a whole number of ms."""
+        return self.state.time_us
+
+    @property
+    def next_us(self) -> int:
+        """Vehicle time of the next slot, us."""
+        next_us = (self._slots + 1) * self._slot_us
+        return next_us - next_us % 1000
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        self.effects.apply([], self.faults.clear())
+
+    def handle(self, message: Message, link: Link) -> None:
+        """Take one message that came on a link; answers are queued on that link."""
+        if not self.state.aborted:
+            self._receiver.handle(message, link)
+
+    def set_clock(self, clock_ns: Callable[[], int]) -> None:
+        """Give TIMESYNC a finer clock of vehicle time than the ticks are."""
+        self._receiver.clock_ns = clock_ns
+
+    def tick(self) -> None:
+        """Fly on to the next slot, then queue the telemetry that is due."""
+        state = self.state
+        next_us = self.next_us
+        self._slots += 1
+        if state.aborted:
+            state.time_us = next_us
+            return
+        command = self._rules.control.command((next_us - state.time_us) / 1e6)
+        vehicle = self.vehicle
+        step = vehicle.step
+        for _ in range(next_us * self._rate_hz // 1_000_000 - vehicle.steps):
+            step(command)
+        state.time_us = next_us
+        if not self.effects.clock_frozen:
+            state.shown_us = next_us
+        state.estimate = vehicle.estimate()
+        self._look_about()
+        self._rules.parameter_protocol.step()
+        self._send_due(self._slots * self._slot_us)
+
+    def boot(self) -> None:
+        """Queue the telemetry of the time 0."""
+        self._look_about()
+        self._send_due(0)
+
+    def beacon(self) -> bytes:
+        """Return the lockstep beacon of the present time, unsigned; no fault touches it."""
+        return self._beacon_framer.frame(
+            dialect.MAVLink_system_time_message(0, self.state.time_us // 1000)
+        )
+
+    def _look_about(self) -> None:
+        state, vehicle, rules = self.state, self.vehicle, self._rules
+        rules.land_detector.step(contact=vehicle.on_ground)
+        if rules.commander.under_setpoints and self.effects.offboard_us is None:
+            self.effects.offboard_us = state.time_us
+        self.effects.apply(*self.faults.update(state.time_us, self.effects.offboard_us))
+        if state.time_us >= self._next_commander_us:
+            self._next_commander_us += COMMANDER_PERIOD_US
+            state.battery_remaining = vehicle.battery.remaining
+            self.effects.watch_position(rules.converged_us, rules.position_timeout_us())
+            rules.commander.step(crashed=vehicle.crashed)
+
+    def _send_due(self, slot_us: int) -> None:
+        builders, silenced = self._rules.builders, self.effects.silenced
+        for link in self.links:
+            for message_id in link.streams.due(slot_us, self.state.status_us):
+                builder = builders.get(message_id)
+                if builder is None or silenced(message_id):
+                    continue
+                message = builder()
+                if message is not None:
+                    link.send(message)
