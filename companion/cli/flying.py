@@ -21,7 +21,6 @@ from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
-from companion.nmpc.solvers import compile_ahead
 from companion.realtime import RealtimeError
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
@@ -53,7 +52,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     # What cannot be flown is to be found out before anything is begun.
     programme(told)
     if told.guidance.kind == "nmpc":
-        compile_ahead(predictive_settings(told), told.nmpc.python)
+        predictive_settings(told)
+        require("casadi", "nmpc", "guidance.kind: nmpc")
     if told.link.backend == "mavsdk":
         require("mavsdk", "mavsdk", "link.backend: mavsdk")
     return told

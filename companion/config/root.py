@@ -25,7 +25,6 @@ from companion.config.sections import (
     GuidanceConfig,
     LimitsConfig,
     LinkConfig,
-    NmpcConfig,
     PlannerConfig,
     RealtimeConfig,
     RecordingConfig,
@@ -40,7 +39,10 @@ FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
 """Files that one configuration may include, those of its includes among them."""
 
-FORMER_KEYS: dict[str, str] = {}
+FORMER_KEYS = {
+    "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
+    " no key of its own, only the extra `nmpc`",
+}
 """Keys that were renamed or removed → what to do instead; see `Section.former_keys`."""
 
 _TILT_SHARE = 0.75
@@ -59,7 +61,6 @@ class Config(Section):
     deadman: DeadmanConfig = DeadmanConfig()
     safety: SafetyConfig = SafetyConfig()
     guidance: GuidanceConfig = GuidanceConfig()
-    nmpc: NmpcConfig = NmpcConfig()
     thrust: ThrustConfig = ThrustConfig()
     flight: FlightConfig = FlightConfig()
     hover: HoverConfig = HoverConfig()

@@ -270,17 +270,6 @@ class GuidanceConfig(Section):
         return None if told is None else Drag(told, self.quadratic_drag_per_m)
 
 
-class NmpcConfig(Section):
-    """Predictive control's solver, where guidance.kind is nmpc."""
-
-    solver: Literal["hpipm", "acados"] = "hpipm"
-    """hpipm (extra `nmpc`), or acados (extra `acados`): quicker, but it compiles C code when it
-    meets a configuration for the first time (make and cc; seconds, kept in the user's cache)."""
-    python: PathKey | None = None
-    """Interpreter of the solver's process; null: ours. The extra `acados` brings a casadi of its
-    own, so it needs an environment without the extra `nmpc`, with this program in it, too."""
-
-
 class ThrustConfig(Section):
     """From specific thrust in m/s² to the 0..1 that MAVLink carries."""
 

@@ -198,7 +198,7 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
     """
     settings = predictive_settings(config)
     return Predictive(
-        lambda report: Solver(settings, part.trajectory, report, config.nmpc.python),
+        lambda report: Solver(settings, part.trajectory, report),
         period=settings.lead,
         lockstep=config.link.lockstep,
         note=note,
@@ -226,7 +226,6 @@ def predictive_settings(config: Config) -> Settings:
             min_thrust=min_thrust,
             max_thrust=max_thrust,
             lead=period,
-            solver=config.nmpc.solver,
             deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
         )
     except ValueError as error:

@@ -9,8 +9,8 @@ from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
 from companion.guidance.trajectory.figures import Hover, Laps, circle
 from companion.nmpc import Input, Request, Settings, Start, Status, Vehicle
-from companion.nmpc.planning import Planning
 from companion.nmpc.reference import node_of
+from companion.nmpc.worker import Worker
 
 DRAG = Drag(0.6, 0.08)
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))
@@ -45,7 +45,7 @@ def test_it_plans_for_when_the_answer_acts_on_where_the_vehicle_is_then():
     rates = BodyRates(*(2.0 * v / 1e-4 for v in turn))
     vehicle = Vehicle(0.0, node.position, node.velocity, q, rates, drag=DRAG)
     start = Start((0.0, 0.0, 0.0))
-    answer = Planning(SETTINGS, CIRCLE).answer(Request(1, vehicle, at, start, tuple(inputs)))
+    answer = Worker(SETTINGS, CIRCLE).answer(Request(1, vehicle, at, start, tuple(inputs)))
     assert answer.status is Status.SOLVED
     assert answer.time == SETTINGS.lead
     _, led = wanted(at + SETTINGS.lead + SETTINGS.dead_time)
@@ -59,7 +59,7 @@ def test_tilted_beyond_a_limit_that_it_cannot_return_to_at_once_it_still_plans()
     settings = Settings(max_tilt=0.4, max_tilt_rate=0.5)
     q = attitude(Coefficients(0.7, 0.0), 0.0)
     vehicle = Vehicle(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), q, STILL)
-    answer = Planning(settings, Hover(9.0)).answer(
+    answer = Worker(settings, Hover(9.0)).answer(
         Request(1, vehicle, 1.0, Start((0.0, 0.0, 0.0)), ())
     )
     assert answer.status is Status.SOLVED
@@ -71,7 +71,7 @@ def test_a_held_heading_is_laid_out_from_the_start_and_found_the_short_way(turne
     settings = replace(SETTINGS, dead_time=0.0, max_yaw_rate=5.0)
     q = attitude(Coefficients(0.0, 0.0), turned + radians(3.0))
     vehicle = Vehicle(0.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0), q, STILL)
-    answer = Planning(settings, Hover(9.0)).answer(
+    answer = Worker(settings, Hover(9.0)).answer(
         Request(1, vehicle, 1.0, Start((1.0, 2.0, -3.0), turned), ())
     )
     back = (answer.heading - turned - radians(3.0) + radians(180.0)) % radians(360.0)
@@ -85,6 +85,6 @@ def test_wind_is_leant_against():
         0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), attitude(Coefficients(-0.1, 0.0), 0.0), STILL
     )
     blown = vehicle._replace(disturbance=(0.1 * 9.80665, 0.0, 0.0))
-    planning, start = Planning(Settings(), Hover(9.0)), Start((0.0, 0.0, 0.0))
-    answer = planning.answer(Request(1, blown, 1.0, start, ()))
+    worker, start = Worker(Settings(), Hover(9.0)), Start((0.0, 0.0, 0.0))
+    answer = worker.answer(Request(1, blown, 1.0, start, ()))
     assert answer.north == pytest.approx(-0.1, abs=0.01)
