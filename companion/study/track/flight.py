@@ -120,7 +120,7 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
         },
         "guidance": {"kind": task.guidance, "lead": task.lead},
         "flight": {
-            "programme": ("hover", "trajectory"),
+            "maneuvers": ("hover", "trajectory"),
             "trajectory": course,
             "takeoff_height_m": _HEIGHT_M,
             "arm": True,

@@ -14,12 +14,12 @@ _PERIOD = 0.02
 """Between two questions, s of vehicle time; half a millimetre of a curved way lies between."""
 _PATIENCE = 1.0
 """For an answer, s of wall time; it takes some 0.1 ms."""
-_WATCHED = "programme"
+_WATCHED = "maneuvers"
 """The phase of the flight."""
 
 
 class TruthWatch(Silent):
-    """Asks the vehicle's control channel for the truth, over and over, while the programme flies.
+    """Asks the vehicle's control channel for the truth, over and over, while the maneuver flies.
 
     In lockstep the vehicle stands still until its sample is answered. So a question may block our
     event loop, and its answer belongs to this very moment of vehicle time.
@@ -34,7 +34,7 @@ class TruthWatch(Silent):
         self._asking: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Begin with the programme, end with whatever comes after it."""
+        """Begin with the maneuver, end with whatever comes after it."""
         if name == _WATCHED:
             self._asking = asyncio.create_task(self._ask())
         elif self._asking is not None:
