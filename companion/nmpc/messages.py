@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Quaternion
 from companion.drag import NO_DRAG, Drag
+from companion.guidance.trajectory.sample import Vector
 from companion.nmpc.reference import Start
-from companion.trajectory.sample import Vector
 
 READY = b"ready"
 """First message of the solver's process, once it takes requests."""

@@ -20,10 +20,10 @@ from typing import NamedTuple
 
 from companion.attitude.kinematics import tilt_products
 from companion.extras import require
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
 from companion.nmpc.settings import Settings
 from companion.realtime import schedule_as_usual
-from companion.trajectory.sample import Trajectory
 
 _LARGEST_MESSAGE = 4096
 _EXIT_TIME = 0.02

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.attitude import wrap_angle
 from companion.drag import Drag
-from companion.trajectory.sample import Sample, Vector
+from companion.guidance.trajectory.sample import Sample, Vector
 
 _LEAST_LIFT = 0.2
 """Least upward part of the reference thrust, share of gravity, however fast the descent."""

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from time import monotonic, perf_counter
 
 from companion.attitude import BodyRates, InvalidQuaternionError, wrap_angle
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.coefficient_model import coefficient_model
 from companion.nmpc.messages import (
     READY,
@@ -30,7 +31,6 @@ from companion.nmpc.prediction import Predictor, TiltedTooFarError
 from companion.nmpc.receding_horizon import Plan, RecedingHorizon
 from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
-from companion.trajectory.sample import Trajectory
 
 _WARM_UP = 5
 """Solves before the first that counts: they fill caches and allocate memory."""

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from companion import yaml_file
 from companion.attitude.reference import FirstOrderReference
+from companion.files import yaml_file
 from companion.study.custom_case import Case
 from companion.study.drawing import (
     draw,

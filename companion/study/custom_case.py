@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 from pydantic import Field, StrictBool, model_validator
 
 from companion.attitude import LAW_NAMES, Coefficients, Limits
+from companion.files.yaml_file import Section
 from companion.study.step import Step
-from companion.yaml_file import Section
 
 Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]

@@ -17,12 +17,12 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from companion.files.yaml_file import ConfigError
 from companion.study import registry
 from companion.study.drawing import STYLE
 from companion.study.outcome import Job
 from companion.study.registry import Study
 from companion.study.report import write_outcome, write_page
-from companion.yaml_file import ConfigError
 
 
 class Written(NamedTuple):

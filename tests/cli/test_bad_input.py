@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from companion.cli import main
+from companion.cli.main import main
 from tests.flight.fly import free_port
 
 

@@ -5,10 +5,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from companion.drag import Drag
+from companion.guidance.trajectory.figures import Laps, helix
 from companion.nmpc.model import Conditions, Motion
 from companion.nmpc.receding_horizon import plan_on_reference
 from companion.nmpc.reference import Start, node_of
-from companion.trajectory.figures import Laps, helix
 
 GRAVITY, DRAG = 9.80665, Drag(0.8, 0.1)
 WIND = np.array([0.4, -0.3, 0.2])

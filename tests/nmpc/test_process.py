@@ -16,6 +16,7 @@ import pytest
 from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
 from companion.extras import MissingExtraError
+from companion.guidance.trajectory.figures import Hover, Laps, circle
 from companion.nmpc import Input, Request, Settings, Solver, Start, Trouble, Vehicle, process
 from companion.nmpc.messages import (
     Answer,
@@ -26,7 +27,6 @@ from companion.nmpc.messages import (
     unpack_request,
 )
 from companion.nmpc.worker import Worker
-from companion.trajectory.figures import Hover, Laps, circle
 
 SETTINGS = Settings(dead_time=0.045, deadline=2.0)
 DRAG = Drag(0.6, 0.08)
@@ -242,7 +242,7 @@ def test_it_is_less_urgent_than_the_flight_and_goes_with_it():
 def test_a_solver_whose_flight_vanished_ends():
     program = (
         "import os, time; from companion.nmpc import Settings, Solver;"
-        "from companion.trajectory.figures import Hover;"
+        "from companion.guidance.trajectory.figures import Hover;"
         "s = Solver(Settings(), Hover(1.0), print);\n"
         "while not s.ready: time.sleep(0.01)\n"
         "print(s.pid, flush=True); os._exit(0)"

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from companion.drag import Drag
+from companion.guidance.trajectory.figures import Laps, circle
 from companion.nmpc import Settings, Start, Weights
 from companion.nmpc.coefficient_model import coefficient_model
 from companion.nmpc.model import Conditions, Motion
 from companion.nmpc.problem import parameters_of, transcribe
 from companion.nmpc.receding_horizon import RecedingHorizon, plan_on_reference, shifted_plan
 from companion.nmpc.reference import node_of
-from companion.trajectory.figures import Laps, circle
 from tests.attitude.independent import attitudes
 
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))

@@ -7,10 +7,10 @@ import pytest
 
 from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
+from companion.guidance.trajectory.figures import Hover, Laps, circle
 from companion.nmpc import Input, Request, Settings, Start, Status, Vehicle
 from companion.nmpc.reference import node_of
 from companion.nmpc.worker import Worker
-from companion.trajectory.figures import Hover, Laps, circle
 
 DRAG = Drag(0.6, 0.08)
 CIRCLE = circle(5.0, Laps(5.0, laps=4.0))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import Target, make_planner
-from companion.cli import main
+from companion.cli.main import main
 from companion.study.lag import flights
 from tests.attitude.independent import attitudes
 from tests.attitude.lag_plant import LagPlant, fly

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import Target
-from companion.cli import main
+from companion.cli.main import main
 from companion.study import registry
 from companion.study.nmpc import contest, exchange, findings
 from companion.study.nmpc.contest import CIRCLE, EIGHT, Flight

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.study import registry
 from companion.study.registry import STUDIES, Study
 
@@ -120,7 +120,7 @@ def test_every_entry_names_a_module_that_has_what_it_promises(study):
 
 def test_the_command_line_knows_the_studies_without_their_extras():
     code = (
-        "import sys, companion.command_line;"
+        "import sys, companion.cli.command_line;"
         " loaded = {'matplotlib', 'jinja2', 'tabulate', 'casadi'} & set(sys.modules);"
         " raise SystemExit(str(loaded) if loaded else 0)"
     )

@@ -12,12 +12,12 @@ import pytest
 import yaml
 from rich.console import Console
 
-from companion.cli import main
+from companion.cli.main import main
+from companion.files.yaml_file import ConfigError
 from companion.study import registry, runner
 from companion.study.custom_case import Case
 from companion.study.paper import fig2, fig3, fig4, fig5_flights, kmax, rates
 from companion.study.registry import STUDIES
-from companion.yaml_file import ConfigError
 
 ROOT = Path(__file__).parents[2]
 PARTS = {

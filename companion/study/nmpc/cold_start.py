@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
+from companion.guidance.trajectory.sample import Vector
 from companion.nmpc import Request, Start, Status, Vehicle
 from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contest import CIRCLE
 from companion.study.nmpc.contestants import MODELS, Contestant
 from companion.study.nmpc.models import ModelName
-from companion.trajectory.sample import Vector
 
 MOST_ITERATIONS = 60
 

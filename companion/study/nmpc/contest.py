@@ -8,13 +8,13 @@ import numpy as np
 from companion.attitude import Target
 from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
+from companion.guidance.trajectory.figures import Laps, circle, gerono_eight
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc import Input, Request, Start, Status, Vehicle
 from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contestants import MODELS, PAPERS, RATE_HZ, SQP_ITERATIONS, Contestant
 from companion.study.outcome import Tick
 from companion.study.step import Floats
-from companion.trajectory.figures import Laps, circle, gerono_eight
-from companion.trajectory.sample import Trajectory
 
 SECONDS = 6
 SETTLED = 4.0

@@ -2,12 +2,12 @@
 
 from typing import NamedTuple
 
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc import Settings
 from companion.nmpc.worker import Worker
 from companion.study.methods import Line, Method
 from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.models import MAKERS, ModelName
-from companion.trajectory.sample import Trajectory
 
 RATE_HZ = 50.0
 SQP_ITERATIONS = 20
