@@ -40,7 +40,7 @@ MOST_INCLUDED = 32
 """Files that one configuration may include, those of its includes among them."""
 
 FORMER_KEYS = {
-    "flight.programme": "is now called `flight.maneuvers`",
+    "flight.maneuvers": "is now called `flight.maneuvers`",
     "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
     " no key of its own, only the extra `nmpc`",
 }
