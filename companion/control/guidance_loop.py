@@ -24,8 +24,8 @@ from companion.guidance import (
     VehicleMotion,
 )
 from companion.guidance.follow import Follow
-from companion.guidance.horizontal import limited
 from companion.guidance.linear import ReferenceAt
+from companion.guidance.reference import limited
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import LocalPosition
