@@ -6,18 +6,22 @@ import os
 import signal
 import sys
 import threading
+import time
+from math import degrees
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.autopilot.motion_telemetry import euler
+from sitl_mock.config.section import ConfigError
 from sitl_mock.server import Server
 from sitl_mock.settings import MockSettings, load_settings
-from sitl_mock.status import StatusLine
+from sitl_mock.simulation import Autopilot
 
 EXIT_OK = 0
 EXIT_USAGE = 2
+_STATUS_PERIOD_S = 0.25
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -86,7 +90,7 @@ def _servers(settings: MockSettings, options: argparse.Namespace) -> list[Server
         raise ConfigError(f"--count must be 1 to 100, not {options.count}")
     shown = not options.headless and options.count == 1 and sys.stderr.isatty()
     return [
-        Server(settings.for_vehicle(index), 1 + index, StatusLine() if shown else None)
+        Server(settings.for_vehicle(index), 1 + index, StatusLine().show if shown else None)
         for index in range(options.count)
     ]
 
@@ -126,6 +130,32 @@ def _end_with_stdin() -> None:
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt
+
+
+class StatusLine:
+    """Writes the line to standard error, at most four times a second."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def show(self, autopilot: Autopilot) -> None:
+        """Write the line if it is time again."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + _STATUS_PERIOD_S
+        state, truth = autopilot.state, autopilot.vehicle.truth
+        north, east, down = truth.position_ned
+        roll, pitch, heading = (degrees(angle) for angle in euler(truth.q))
+        text = (
+            f"{state.time_s:8.1f} s  {state.mode.name:<9} {'armed' if state.armed else 'disarmed'}"
+            f"{' FAILSAFE' if state.failsafe else ''}"
+            f"  N {north:7.2f}  E {east:7.2f}  up {0.0 - down:6.2f} m"
+            f"  roll {roll:4.0f}  pitch {pitch:4.0f}  heading {heading % 360:4.0f} deg"
+            f"  setpoints {autopilot.stream.received}"
+        )
+        sys.stderr.write(f"\r{text}\x1b[K")
+        sys.stderr.flush()
 
 
 if __name__ == "__main__":

@@ -2,13 +2,13 @@
 
 import os
 import time
+from collections.abc import Callable
 from math import ceil
 
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import Message, decode
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Autopilot
-from sitl_mock.status import StatusLine
 from sitl_mock.wires import Arrived, Wires
 
 BEACON_FIRST_S = 0.05
@@ -36,14 +36,17 @@ class Server:
     Args:
         settings: this vehicle's own (see `MockSettings.for_vehicle`).
         system_id: MAVLink system id.
-        status: shown while running, None = headless.
+        status: shows the running vehicle after each slot, None = headless.
 
     Raises:
         ConfigError: a port is in use.
     """
 
     def __init__(
-        self, settings: MockSettings, system_id: int = 1, status: StatusLine | None = None
+        self,
+        settings: MockSettings,
+        system_id: int = 1,
+        status: Callable[[Autopilot], None] | None = None,
     ) -> None:
         self._settings = settings
         self._status = status
@@ -95,7 +98,7 @@ class Server:
         else:
             self._wires.flush()
         if self._status is not None:
-            self._status.show(self._autopilot)
+            self._status(self._autopilot)
 
     # Lockstep
 

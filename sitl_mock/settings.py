@@ -6,55 +6,34 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from sitl_mock.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from sitl_mock.ardupilot.settings import with_ardupilot_defaults
+from sitl_mock.ardupilot.defaults import ARDUPILOT_PARAMETERS, with_ardupilot_defaults
 from sitl_mock.autopilot.parameters import Parameter, ParameterRefusedError, ParameterTable
-from sitl_mock.config.airframe import (
-    AirframeConfig,
-    BatteryConfig,
-    RateLoopConfig,
-    SensorConfig,
-    SigningConfig,
-    WindConfig,
-)
-from sitl_mock.config.errors import ConfigError, explain, suggestion
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.config.faults import Fault
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section
+from sitl_mock.config.rate_loop import RateLoopConfig
+from sitl_mock.config.section import (
+    ConfigError,
+    Finite,
+    NonNegative,
+    Section,
+    explain,
+    suggestion,
+)
+from sitl_mock.config.sensors import SensorConfig
+from sitl_mock.config.settings import (
+    GCS_PORT_OFFSET,
+    PORT_OFFSET,
+    HomeConfig,
+    LockstepConfig,
+    Port,
+    SigningConfig,
+)
 from sitl_mock.config.wiring import for_vehicle, parse_wiring
 from sitl_mock.config.yaml_file import load_yaml
 from sitl_mock.px4.parameters import PX4_PARAMETERS
 
-PORT_OFFSET = 40
-"""The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
-GCS_PORT_OFFSET = 4020
-"""The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
-
 _PARAMETERS = {"px4": PX4_PARAMETERS, "ardupilot": ARDUPILOT_PARAMETERS}
-
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
-
-Port = Annotated[int, Field(ge=0, le=65535)]
-
-
-class HomeConfig(Section):
-    """Where the vehicle stands at boot."""
-
-    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
-    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
-    altitude_m: Finite = 489.4
-    """Above mean sea level."""
-    heading_deg: Finite = 0.0
-
-
-class LockstepConfig(Section):
-    """The vehicle waits for an answer to each step."""
-
-    enabled: bool = False
-    period_ms: Annotated[int, Field(ge=1, le=100)] = 4
-    bundle: bool = True
-    """Send the frames of a step in one datagram (PX4 sends one each); the beacon stays alone."""
-    patience_s: Positive = 2.0
-    """Wall time without an answer after which the vehicle runs on in paced time."""
 
 
 class MockSettings(Section):

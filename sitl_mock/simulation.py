@@ -5,12 +5,11 @@ from math import radians
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.fault_effects import FaultEffects
-from sitl_mock.autopilot.fault_schedule import FaultSchedule
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.faults import FaultEffects, FaultSchedule
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.personality import Parts
 from sitl_mock.autopilot.receiver import Receiver
+from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link

@@ -2,6 +2,7 @@
 
 import select
 
+from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.config.wiring import SerialLine, TcpIn, parse_wiring
 from sitl_mock.control_channel import reply
 from sitl_mock.link.endpoint import Endpoint, bundles
@@ -11,7 +12,7 @@ from sitl_mock.link.pipe import DatagramPipe
 from sitl_mock.link.serial_endpoint import SerialEndpoint
 from sitl_mock.link.tcp_endpoint import TcpEndpoint
 from sitl_mock.link.udp_endpoint import UdpEndpoint
-from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET, MockSettings
+from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Autopilot
 
 Arrived = tuple[bytes, list[Message]]

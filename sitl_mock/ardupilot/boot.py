@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
-from sitl_mock.ardupilot.texts import INFO
+from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6

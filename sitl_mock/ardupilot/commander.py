@@ -3,20 +3,16 @@
 from math import isfinite, isnan
 
 from sitl_mock.ardupilot.boot import Boot, Voice
-from sitl_mock.ardupilot.checks import arming_problem
 from sitl_mock.ardupilot.failsafe import ArduPilotFailsafe
-from sitl_mock.ardupilot.guided import Guided, Task
+from sitl_mock.ardupilot.guided import FatalSetpointError, Guided, Task, attitude_setpoint
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
-from sitl_mock.ardupilot.modes import NEEDS_POSITION, STICKS_HOLD
-from sitl_mock.ardupilot.setpoints import FatalSetpointError, attitude_setpoint
+from sitl_mock.ardupilot.modes import NEEDS_POSITION, STICKS_HOLD, arming_problem
 from sitl_mock.ardupilot.texts import CRITICAL, INFO
 from sitl_mock.autopilot.commander import ACCEPTED, FAILED
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.occasions import Occasion
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.setpoints import position_setpoint
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.setpoints import OffboardStream, position_setpoint
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 

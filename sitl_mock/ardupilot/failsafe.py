@@ -3,11 +3,9 @@
 from typing import Protocol
 
 from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOTED
-from sitl_mock.autopilot.commander import Announce
-from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.occasions import Announce, Occasion
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import BatteryWarning, State
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 

@@ -3,17 +3,15 @@
 from collections.abc import Callable
 from math import cos, isnan, radians
 
-from sitl_mock.ardupilot.climb import approach
 from sitl_mock.ardupilot.guided import Guided, Task
-from sitl_mock.ardupilot.hold import PositionHold
+from sitl_mock.ardupilot.hold import PositionHold, approach
 from sitl_mock.ardupilot.return_home import Leg, Return
 from sitl_mock.ardupilot.thrust import asked_climb, asked_thrust, boosted, specific_thrust
 from sitl_mock.autopilot.attitude_control import AttitudeGains, attitude_rates, body_z
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import PositionDemand, PositionOutput
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 

@@ -5,27 +5,26 @@ from collections.abc import Collection, Iterable, Mapping
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
 from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
 from sitl_mock.ardupilot.commander import ArduPilotCommander
 from sitl_mock.ardupilot.commands import ArduPilotCommands
+from sitl_mock.ardupilot.defaults import ARDUPILOT_TYPES
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
 from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
-from sitl_mock.ardupilot.parameters import ARDUPILOT_TYPES
 from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
-from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS
+from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
 from sitl_mock.autopilot.commands import Commands
 from sitl_mock.autopilot.land_detector import LandDetector
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import Builder
+from sitl_mock.autopilot.occasions import Event, Occasion
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
-from sitl_mock.link.link import Link
-from sitl_mock.link.streams import StreamSchedule
+from sitl_mock.autopilot.personality import Identity, Parts, Rules
+from sitl_mock.autopilot.state import Mode
+from sitl_mock.link.link import Link, StreamSchedule
 from sitl_mock.settings import MockSettings
 
 LANDED_AFTER_US = 1_000_000

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 
-from sitl_mock.autopilot.commander import Announce
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import Landed, State
+from sitl_mock.autopilot.occasions import Announce, Occasion
+from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
 """Little thrust: below this share of the hover thrust."""

@@ -5,8 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.errors import suggestion
-from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section
+from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, suggestion
 
 _MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
 

@@ -5,7 +5,7 @@ import select
 import tty
 from pathlib import Path
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.airframe import SigningConfig
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
+from sitl_mock.config.settings import SigningConfig
 from sitl_mock.link.framing import SIGNED, Message
 
 _EPOCH_UNIX_S = 1420070400

@@ -2,7 +2,7 @@
 
 import socket
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 
 

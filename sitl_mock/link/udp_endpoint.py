@@ -3,7 +3,7 @@
 import contextlib
 import socket
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 
 HOST = "127.0.0.1"
 _MAX_DATAGRAM = 2048

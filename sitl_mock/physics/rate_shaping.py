@@ -6,9 +6,9 @@ ArduPilot's way with a body-rate setpoint. What comes out is the setpoint of the
 from math import atan2, copysign, inf, isnan, sqrt
 from typing import NamedTuple
 
-from sitl_mock.config.airframe import AxisShaping
+from sitl_mock.config.rate_loop import AxisShaping
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise, to_body
-from sitl_mock.physics.setpoint_delay import SetpointDelay
+from sitl_mock.physics.rate_loop import SetpointDelay
 
 AT_REST: Vector = (0.0, 0.0, 0.0)
 

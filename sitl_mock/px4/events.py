@@ -6,7 +6,7 @@ the numbers of those that were recorded agree. Texts end in a tab.
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.personality import Event, Occasion
+from sitl_mock.autopilot.occasions import Event, Occasion
 
 _INFO = dialect.MAV_SEVERITY_INFO
 _WARNING = dialect.MAV_SEVERITY_WARNING

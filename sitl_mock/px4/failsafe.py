@@ -1,27 +1,22 @@
 """What PX4 does when a link, the position or the battery is lost."""
 
-import struct
 from collections.abc import Callable
-from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.occasions import Occasion
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import BatteryWarning, State
+from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.px4.failsafe_actions import (
-    DISARM,
-    HOLD,
     LAND,
-    LINK_ACTIONS,
     OFFBOARD_ACTIONS,
     POSITION,
     RETURN,
-    TERMINATE,
-    Action,
+    Announce,
     Cause,
+    EnterMode,
+    FailsafeActions,
 )
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 
@@ -29,8 +24,6 @@ _NO_MANUAL_CONTROL = 4
 """COM_RC_IN_MODE: nobody expects a pilot."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT."""
-_ENTER_HOLD = struct.Struct("<IBHB")
-_ENTER = struct.Struct("<IBB")
 _GCS_MARGIN_US = 2_000_000
 """A lost ground station is noticed this much after COM_DL_LOSS_T (measured 12 s for 10 s)."""
 _ACTED = -1
@@ -43,19 +36,7 @@ _WARNINGS = {
 }
 
 
-class Announce(Protocol):
-    """Tells the outside of what happens."""
-
-    def __call__(self, occasion: Occasion, detail: str, arguments: bytes = b"", /) -> None:
-        """Tell of an occasion, with a detail for its text and the values of its event."""
-
-
-class _Enter(Protocol):
-    def __call__(self, mode: Mode) -> None: ...
-
-
 _AUTO_MODES = frozenset({Mode.LOITER, Mode.TAKEOFF, Mode.RTL, Mode.LAND})
-_DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 
 
 class Failsafe:
@@ -76,7 +57,7 @@ class Failsafe:
         parameters: ParameterTable,
         stream: OffboardStream,
         announce: Announce,
-        enter: _Enter,
+        enter: EnterMode,
         stop: Callable[[Occasion], None],
     ) -> None:
         self._state = state
@@ -84,13 +65,11 @@ class Failsafe:
         self._stream = stream
         self._announce = announce
         self._enter = enter
-        self._stop = stop
+        self._actions = FailsafeActions(state, parameters, announce, enter, stop)
         self._pilot = False
         self._pilot_optional = True
         self._pilot_lost_us: int | None = None
         self._warned = False
-        self._told: tuple[Cause, Action] | None = None
-        self._cause: Cause | None = None
         self._gcs_us: int | None = None
         self._gcs_lost_us: int | None = None
         self._companion_us: int | None = None
@@ -98,8 +77,7 @@ class Failsafe:
 
     def clear(self) -> None:
         """End any failsafe: a mode was commanded, or the vehicle disarmed."""
-        self._cause = self._told = None
-        self._state.failsafe = False
+        self._actions.clear()
         # What was already acted on acts again only after being regained.
         if self._gcs_lost_us is not None:
             self._gcs_lost_us = _ACTED
@@ -136,57 +114,7 @@ class Failsafe:
     @property
     def holds_before_acting(self) -> bool:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
-        return self._told is not None and self._told[1] is HOLD and self._cause in _DELAYED
-
-    def _act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
-        """Do something for a cause, unless a graver one acts; tell of it when it is new.
-
-        Args:
-            cause: why.
-            action: what is done now.
-            then: what is done after COM_FAIL_ACT_T, when that is not it yet.
-        """
-        if self._cause is not None and self._cause.rank > cause.rank:
-            return
-        state = self._state
-        if not state.position_valid and action.mode in NEEDS_POSITION:
-            action = LAND
-        if self._told != (cause, action):
-            self._tell(cause, action, then)
-        self._cause, self._told = cause, (cause, action)
-        state.failsafe = True
-        mode = action.mode
-        if mode is None:
-            self._stop(Occasion.DISARMED_BY_FAILSAFE)
-            return
-        if state.landed:
-            mode = Mode.LOITER  # stays where it stands, and disarms
-        if state.mode is not mode:
-            self._enter(mode)
-
-    def _tell(self, cause: Cause, action: Action, then: Action | None) -> None:
-        intended = custom_mode(self._state.intended_mode)
-        if then is not None:
-            delay = round(self._parameters["COM_FAIL_ACT_T"])
-            values = _ENTER_HOLD.pack(intended, then.number, delay, cause.number)
-            self._announce(Occasion.FAILSAFE_HOLD, str(delay), values)
-        elif cause.number:
-            values = _ENTER.pack(intended, action.number, cause.number)
-            self._announce(Occasion.FAILSAFE, "", values)
-        else:
-            values = _ENTER.pack(intended, action.number, 0)
-            self._announce(Occasion.FAILSAFE_UNNAMED, "", values)
-
-    def _act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Hold for COM_FAIL_ACT_T, then do what a parameter says."""
-        action = LINK_ACTIONS.get(int(self._parameters[parameter]))
-        if action is None:
-            return
-        waited = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
-        if waited or action in (HOLD, DISARM, TERMINATE):
-            self._act(cause, action)
-        else:
-            self._act(cause, HOLD, then=action)
+        return self._actions.holds_before_acting
 
     def _excepted(self, parameter: str) -> bool:
         """Whether a loss is of no matter in the intended mode."""
@@ -213,7 +141,7 @@ class Failsafe:
         if self._pilot_lost_us is None:
             self._pilot_lost_us = state.time_us
         if self._pilot_lost_us != _ACTED or state.mode in PILOTED:
-            self._act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
+            self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
     def _watch_offboard(self) -> None:
         state = self._state
@@ -224,8 +152,8 @@ class Failsafe:
             action = OFFBOARD_ACTIONS.get(int(self._parameters["COM_OBL_RC_ACT"]), POSITION)
             if action.mode in PILOTED and not self._pilot:
                 action = RETURN
-            self._act(Cause.OFFBOARD_LOST, action)
-        elif alive and self._cause is Cause.OFFBOARD_LOST:
+            self._actions.act(Cause.OFFBOARD_LOST, action)
+        elif alive and self._actions.cause is Cause.OFFBOARD_LOST:
             self.clear()
             self._enter(Mode.OFFBOARD)
 
@@ -253,7 +181,7 @@ class Failsafe:
             self._announce(Occasion.GCS_LOST, "")
         ignored = state.intended_mode is Mode.LAND or self._excepted("COM_DLL_EXCEPT")
         if state.armed and not ignored and self._gcs_lost_us != _ACTED:
-            self._act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
+            self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
         if self._companion_us is None:
@@ -267,7 +195,7 @@ class Failsafe:
     def _watch_position(self) -> None:
         state = self._state
         if not state.position_valid and state.mode in NEEDS_POSITION:
-            self._act(Cause.POSITION_LOST, LAND)
+            self._actions.act(Cause.POSITION_LOST, LAND)
 
     def _watch_battery(self) -> None:
         state, parameters = self._state, self._parameters
@@ -288,4 +216,4 @@ class Failsafe:
         if not state.armed or action not in (2, 3) or warning < BatteryWarning.CRITICAL:
             return
         lands = action == 2 or warning is BatteryWarning.EMERGENCY
-        self._act(Cause.BATTERY, LAND if lands else RETURN)
+        self._actions.act(Cause.BATTERY, LAND if lands else RETURN)

@@ -6,16 +6,17 @@ from random import Random
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.land_detector import LandDetector
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
+from sitl_mock.autopilot.occasions import Event, Occasion
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
-from sitl_mock.link.streams import StreamSchedule
-from sitl_mock.px4.announcer import Announcer
+from sitl_mock.autopilot.personality import Identity, Parts, Rules
+from sitl_mock.autopilot.state import Mode
+from sitl_mock.link.link import StreamSchedule
+from sitl_mock.px4.arming import ArmingChecks
 from sitl_mock.px4.commander import Px4Commander
 from sitl_mock.px4.commands import Px4Commands
-from sitl_mock.px4.event_log import EventLog
+from sitl_mock.px4.event_log import Announcer, EventLog
 from sitl_mock.px4.events import PX4_EVENTS
 from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.mode_control import Px4ModeControl
@@ -116,14 +117,15 @@ class Px4:
         events = EventLog(state, parts.links)
         announce = Announcer(self, parts.links, events)
         control = Px4ModeControl(state, parameters, parts.stream)
+        health = HealthReport(state, events, parts.ready_us)
+        checks = ArmingChecks(state, parameters, parts.stream, health, parts.ready_us)
         commander = Px4Commander(
             state,
             parameters,
             control,
             parts.stream,
             announce,
-            HealthReport(state, events, parts.ready_us),
-            ready_us=parts.ready_us,
+            checks,
         )
         builders = {
             **MotionTelemetry(state, vehicle, parts.origin).builders(),

@@ -5,8 +5,8 @@ from math import cos, inf, nan, radians
 
 import pytest
 
-from sitl_mock.ardupilot.climb import Climb, approach
-from sitl_mock.ardupilot.settings import AIRFRAME
+from sitl_mock.ardupilot.defaults import AIRFRAME
+from sitl_mock.ardupilot.hold import Climb, approach
 from sitl_mock.ardupilot.thrust import (
     GRAVITY,
     asked_climb,

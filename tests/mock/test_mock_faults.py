@@ -6,7 +6,7 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pydantic import ValidationError
 
-from sitl_mock.autopilot.fault_schedule import FaultSchedule
+from sitl_mock.autopilot.faults import FaultSchedule
 from sitl_mock.config.faults import fault_adapter
 from sitl_mock.link.pipe import DatagramPipe
 

@@ -6,8 +6,8 @@ import pytest
 from mock_rig import Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.airframe import SigningConfig
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
+from sitl_mock.config.settings import SigningConfig
 from sitl_mock.link.framing import decode
 from sitl_mock.link.signing import Signing, key_from_passphrase, link_signing
 

@@ -9,7 +9,7 @@ import pytest
 from mock_process import HOST, ask, free_port, is_free, mock_process
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 from sitl_mock.link.framing import Framer, decode, split
 from sitl_mock.link.serial_endpoint import SerialEndpoint

@@ -12,7 +12,8 @@ from scipy.optimize import curve_fit
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.__main__ import main
-from sitl_mock.config.airframe import AirframeConfig, AxisShaping, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 from sitl_mock.physics.rate_shaping import RateShaping, closing
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle

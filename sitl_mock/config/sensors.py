@@ -1,10 +1,10 @@
-"""How far an autopilot's navigation filter is off, as measured on the real ones."""
+"""Errors of what the autopilot measures and estimates."""
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, meaning
 
 Gains = tuple[NonNegative, NonNegative]
 """Of a state: per position innovation, and per velocity innovation."""
@@ -85,3 +85,24 @@ EKFS: dict[str, EkfConfig | None] = {
     ),
 }
 """What the words that may stand for a whole navigation filter mean."""
+
+
+class SensorConfig(Section):
+    """Errors of what the autopilot believes: white noise (standard deviations) and delays."""
+
+    ekf: EkfConfig | None = None
+    """Errors of the navigation filter, added to the rest: px4, ardupilot, none, or keys."""
+    attitude_noise_deg: NonNegative = 0.02
+    rate_noise_rad_s: NonNegative = 0.002
+    position_noise_m: NonNegative = 0.01
+    velocity_noise_m_s: NonNegative = 0.01
+    acceleration_noise_m_s2: NonNegative = 0.05
+    attitude_delay_ms: NonNegative = 2.0
+    """Age of the estimated attitude, body rates and specific force."""
+    position_delay_ms: NonNegative = 10.0
+    """Age of the estimated position and velocity."""
+
+    @field_validator("ekf", mode="before")
+    @classmethod
+    def _named(cls, value: object) -> object:
+        return meaning(EKFS, value, "navigation filters")
