@@ -17,7 +17,7 @@ from sitl_mock.autopilot.motion_telemetry import euler
 from sitl_mock.config.section import ConfigError
 from sitl_mock.server import Server
 from sitl_mock.settings import MockSettings, load_settings
-from sitl_mock.simulation import Autopilot
+from sitl_mock.simulation import Simulation
 
 EXIT_OK = 0
 EXIT_USAGE = 2
@@ -138,13 +138,13 @@ class StatusLine:
     def __init__(self) -> None:
         self._next = 0.0
 
-    def show(self, autopilot: Autopilot) -> None:
+    def show(self, simulation: Simulation) -> None:
         """Write the line if it is time again."""
         now = time.monotonic()
         if now < self._next:
             return
         self._next = now + _STATUS_PERIOD_S
-        state, truth = autopilot.state, autopilot.vehicle.truth
+        state, truth = simulation.state, simulation.vehicle.truth
         north, east, down = truth.position_ned
         roll, pitch, heading = (degrees(angle) for angle in euler(truth.q))
         text = (
@@ -152,7 +152,7 @@ class StatusLine:
             f"{' FAILSAFE' if state.failsafe else ''}"
             f"  N {north:7.2f}  E {east:7.2f}  up {0.0 - down:6.2f} m"
             f"  roll {roll:4.0f}  pitch {pitch:4.0f}  heading {heading % 360:4.0f} deg"
-            f"  setpoints {autopilot.stream.received}"
+            f"  setpoints {simulation.stream.received}"
         )
         sys.stderr.write(f"\r{text}\x1b[K")
         sys.stderr.flush()

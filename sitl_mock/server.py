@@ -8,7 +8,7 @@ from math import ceil
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import Message, decode
 from sitl_mock.settings import MockSettings
-from sitl_mock.simulation import Autopilot
+from sitl_mock.simulation import Simulation
 from sitl_mock.wires import Arrived, Wires
 
 BEACON_FIRST_S = 0.05
@@ -46,12 +46,12 @@ class Server:
         self,
         settings: MockSettings,
         system_id: int = 1,
-        status: Callable[[Autopilot], None] | None = None,
+        status: Callable[[Simulation], None] | None = None,
     ) -> None:
         self._settings = settings
         self._status = status
-        self._autopilot = Autopilot(settings, system_id)
-        self._wires = Wires(settings, self._autopilot)
+        self._simulation = Simulation(settings, system_id)
+        self._wires = Wires(settings, self._simulation)
         self._companion = self._wires.companion
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
@@ -59,7 +59,7 @@ class Server:
         self._collected: list[Arrived] = []
         self._base_wall = 0.0
         self._base_us = 0
-        self._autopilot.set_clock(self._clock_ns)
+        self._simulation.set_clock(self._clock_ns)
 
     @property
     def where(self) -> str:
@@ -73,7 +73,7 @@ class Server:
                 self._await_answer_to_first_beacon()
             else:
                 self._await_client()
-                self._autopilot.boot()
+                self._simulation.boot()
                 self._wires.flush()
             self._rebase()
             while True:
@@ -90,7 +90,7 @@ class Server:
         if not self._lockstep:
             self._wait_for_time()
         self._handle_collected()
-        self._autopilot.tick()
+        self._simulation.tick()
         if self._settings.lockstep.enabled:
             self._wires.flush(self._new_beacon())
             if self._lockstep:
@@ -98,12 +98,12 @@ class Server:
         else:
             self._wires.flush()
         if self._status is not None:
-            self._status(self._autopilot)
+            self._status(self._simulation)
 
     # Lockstep
 
     def _new_beacon(self) -> bytes:
-        self._beacon = self._autopilot.beacon()
+        self._beacon = self._simulation.beacon()
         self._answered = False
         return self._beacon
 
@@ -175,7 +175,7 @@ class Server:
                 self._answered = True
 
     def _is_answer(self, messages: list[Message]) -> bool:
-        now_ms = self._autopilot.time_us // 1000
+        now_ms = self._simulation.time_us // 1000
         return any(
             message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
             for message in messages
@@ -195,7 +195,7 @@ class Server:
 
     def _rebase(self) -> None:
         self._base_wall = time.monotonic()
-        self._base_us = self._autopilot.time_us
+        self._base_us = self._simulation.time_us
 
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
@@ -203,8 +203,8 @@ class Server:
         Faster than the machine can, or after a pause, the time lost is not caught up; nor is what
         the clock slipped.
         """
-        self._base_wall += self._autopilot.effects.take_slip()
-        elapsed_s = self._elapsed_us(self._autopilot.next_us) / 1e6
+        self._base_wall += self._simulation.effects.take_slip()
+        elapsed_s = self._elapsed_us(self._simulation.next_us) / 1e6
         due = self._base_wall + in_burst(
             elapsed_s, self._settings.burst_ms * 1e-3 / self._settings.speed
         )
@@ -235,9 +235,9 @@ class Server:
 
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC: between slots it goes with the wall clock."""
-        autopilot = self._autopilot
-        if self._lockstep or autopilot.effects.clock_frozen:
-            return autopilot.state.shown_us * 1000
+        simulation = self._simulation
+        if self._lockstep or simulation.effects.clock_frozen:
+            return simulation.state.shown_us * 1000
         wall_us = (time.monotonic() - self._base_wall) * 1e6 * self._settings.speed
-        now_us = min(self._base_us + wall_us, autopilot.next_us)
-        return round(max(now_us, autopilot.time_us) * 1000)
+        now_us = min(self._base_us + wall_us, simulation.next_us)
+        return round(max(now_us, simulation.time_us) * 1000)

@@ -14,7 +14,7 @@ from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
 from sitl_mock.link.signing import link_signing
-from sitl_mock.personalities import personality_of
+from sitl_mock.personalities import PERSONALITIES
 from sitl_mock.physics.geodesy import Origin
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.settings import MockSettings
@@ -23,7 +23,7 @@ COMMANDER_PERIOD_US = 50_000
 """The rules of state run this often, vehicle time."""
 
 
-class Autopilot:
+class Simulation:
     """One vehicle with its autopilot.
 
     Args:
@@ -32,9 +32,9 @@ class Autopilot:
     """
 
     def __init__(self, settings: MockSettings, system_id: int = 1) -> None:
-        personality = personality_of(settings)
+        personality = PERSONALITIES[settings.autopilot]
         overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}
-        self.parameters = ParameterTable(settings.known_parameters, overrides)
+        self.parameters = ParameterTable(personality.parameters, overrides)
         home = settings.home
         self.vehicle = Vehicle(
             settings.airframe,

@@ -1,6 +1,7 @@
 """ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
@@ -8,7 +9,11 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
 from sitl_mock.ardupilot.commander import ArduPilotCommander
 from sitl_mock.ardupilot.commands import ArduPilotCommands
-from sitl_mock.ardupilot.defaults import ARDUPILOT_TYPES
+from sitl_mock.ardupilot.defaults import (
+    ARDUPILOT_PARAMETERS,
+    ARDUPILOT_TYPES,
+    with_ardupilot_defaults,
+)
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
@@ -24,8 +29,8 @@ from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
 from sitl_mock.autopilot.personality import Identity, Parts, Rules
 from sitl_mock.autopilot.state import Mode
+from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
-from sitl_mock.settings import MockSettings
 
 LANDED_AFTER_US = 1_000_000
 """Contact with little thrust for this long is a landing."""
@@ -73,6 +78,7 @@ class ArduPilot:
     any_component = True
     system_id_parameter = "MAV_SYSID"
     unsigned_links: Collection[str] = ("companion",)
+    parameters = ARDUPILOT_PARAMETERS
     identity = Identity(
         capabilities=64495,
         flight_sw_version=0x04070000,
@@ -81,11 +87,15 @@ class ArduPilot:
         flight_custom_version=tuple(b"12f6aa4e"),
     )
 
-    def slot_us(self, settings: MockSettings) -> int:
+    def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
+        """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
+        return with_ardupilot_defaults(section)
+
+    def slot_us(self, settings: VehicleSettings) -> int:
         """Return a turn of the main loop."""
         return self._loop_us(settings)
 
-    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+    def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the streams of a link: silent but for the boot's until it is asked."""
         silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
@@ -148,7 +158,7 @@ class ArduPilot:
         return motion.builders() | system.builders()
 
     @staticmethod
-    def _loop_us(settings: MockSettings) -> int:
+    def _loop_us(settings: VehicleSettings) -> int:
         rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
         return round(1e6 / rate)
 

@@ -4,28 +4,23 @@ A personality has numbers and words of its own, and puts its family's rules toge
 what every vehicle has (`Parts`). Nothing else of the mock knows a family.
 """
 
-from __future__ import annotations
+from collections.abc import Callable, Collection, Mapping
+from typing import Any, NamedTuple, Protocol
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
-
+from sitl_mock.autopilot.commander import Commander, ModeControl
+from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.land_detector import LandDetector
+from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.occasions import Event, Occasion
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
-
-    from sitl_mock.autopilot.commander import Commander, ModeControl
-    from sitl_mock.autopilot.commands import Commands
-    from sitl_mock.autopilot.land_detector import LandDetector
-    from sitl_mock.autopilot.motion_telemetry import Builder
-    from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
-    from sitl_mock.autopilot.parameters import ParameterTable
-    from sitl_mock.autopilot.setpoints import OffboardStream
-    from sitl_mock.autopilot.state import Mode, State
-    from sitl_mock.link.framing import Message
-    from sitl_mock.link.link import Link, StreamSchedule
-    from sitl_mock.physics.geodesy import Origin
-    from sitl_mock.physics.vehicle import Vehicle
-    from sitl_mock.settings import MockSettings
+from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
+from sitl_mock.autopilot.parameters import Parameter, ParameterTable
+from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.state import Mode, State
+from sitl_mock.config.settings import VehicleSettings
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link, StreamSchedule
+from sitl_mock.physics.geodesy import Origin
+from sitl_mock.physics.vehicle import Vehicle
 
 
 class Identity(NamedTuple):
@@ -81,11 +76,16 @@ class Personality(Protocol):
     """Whether messages to any component of this system are taken."""
     unsigned_links: Collection[str]
     """Links on which frames without a signature are obeyed though signing is on."""
+    parameters: tuple[Parameter, ...]
+    """All parameters with their defaults."""
 
-    def slot_us(self, settings: MockSettings) -> int:
+    def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
+        """Return the ``mock:`` section, completed by the defaults of this autopilot."""
+
+    def slot_us(self, settings: VehicleSettings) -> int:
         """Return the period of the turns in which telemetry leaves, us."""
 
-    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+    def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the streams of a link (``companion`` or ``gcs``) as they are at boot."""
 
     def mode_of(self, custom_mode: int) -> Mode | None:

@@ -40,8 +40,8 @@ def test_what_it_signs_pymavlink_accepts(tmp_path):
     rig = Rig(boot=False, signing={"passphrase_file": tmp_path / "phrase", "link_id": 5})
     judge = dialect.MAVLink(None)
     judge.signing.secret_key = KEY
-    rig.autopilot.boot()
-    frames = rig.autopilot.companion.take()
+    rig.simulation.boot()
+    frames = rig.simulation.companion.take()
     assert len(frames) > 5
     for frame in frames:
         assert judge.decode(bytearray(frame)).get_link_id() == 5
@@ -89,7 +89,7 @@ def test_only_what_is_signed_arms_the_vehicle(tmp_path):
     (tmp_path / "phrase").write_text(PASSPHRASE)
     rig = Rig(boot=False, prearm_delay_s=0.2, signing={"passphrase_file": tmp_path / "phrase"})
     rig.run(0.4)
-    clock = rig.autopilot.companion.signing._clock
+    clock = rig.simulation.companion.signing._clock
     ticks = int((clock() - 1420070400) * 100_000)
     for mav, armed in (
         (dialect.MAVLink(None, srcSystem=255, srcComponent=190), False),
@@ -97,7 +97,7 @@ def test_only_what_is_signed_arms_the_vehicle(tmp_path):
         (signer(ticks=ticks), True),
     ):
         [message] = decode(bytes(ARM.pack(mav)))
-        rig.autopilot.handle(message, rig.autopilot.companion)
+        rig.simulation.handle(message, rig.simulation.companion)
         assert rig.state.armed is armed
 
 
@@ -109,7 +109,7 @@ def test_ardupilot_obeys_what_is_unsigned_on_its_first_link_only(tmp_path):
         rig = Rig(boot=False, autopilot="ardupilot", gcs_port=14550, signing=signing)
         unsigned = ARM.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
         [message] = decode(bytes(unsigned))
-        assert [link.signing.admits(message) for link in rig.autopilot.links] == obeyed
+        assert [link.signing.admits(message) for link in rig.simulation.links] == obeyed
 
 
 def test_a_passphrase_that_cannot_be_used_is_one_clear_error(tmp_path):
