@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+from companion.files.yaml_file import ConfigError
 from companion.mavlink.endpoint import SerialPort, TcpClient, TcpServer, parse_endpoint
-from companion.yaml_file import ConfigError
 
 _LOCAL_PORT_OFFSET = 40
 """The vehicle sends from this many ports above the one it sends to."""

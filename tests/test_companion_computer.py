@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from companion.config import Config
-from companion.config_sections import RealtimeConfig
-from companion.yaml_file import parse
+from companion.config.sections import RealtimeConfig
+from companion.files.yaml_file import parse
 
 DOCS = Path(__file__).parents[1] / "docs"
 UNIT = (DOCS / "companion.service").read_text()

@@ -3,8 +3,8 @@
 import sys
 
 from companion.bench.companion_program import answer
-from companion.mavlink import LinkSettings
 from companion.mavlink import loop as link_loop
+from companion.mavlink.settings import LinkSettings
 from companion.mavsdk_link.link import MavsdkLink
 
 

@@ -6,12 +6,13 @@ from typing import NoReturn
 
 from companion.attitude import Target
 from companion.config import Config
+from companion.control.command import Command
+from companion.control.control_loop import ControlLoop, Deadlines
 from companion.flight.assembly import hover_thrust, planner, rate_limits
-from companion.flight.command import Command
-from companion.flight.control_loop import ControlLoop, Deadlines
-from companion.mavlink import Link, LinkSettings
 from companion.mavlink import loop as link_loop
+from companion.mavlink.settings import LinkSettings
 from companion.recording.trace import FlightTrace
+from companion.vehicle.link import Link
 
 _GUIDANCE_PERIOD_S = 0.02
 

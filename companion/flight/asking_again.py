@@ -3,10 +3,10 @@
 import asyncio
 from collections.abc import Callable
 
-from companion.config_sections import LinkConfig
-from companion.flight.safety.snapshot import Health
+from companion.config.sections import LinkConfig
 from companion.mavlink.errors import LinkError
-from companion.mavlink.link import Link
+from companion.safety.snapshot import Health
+from companion.vehicle.link import Link
 
 _COUNTED = 0.1
 """`set_rates` counts what arrives for so long, s; nobody waits for it."""

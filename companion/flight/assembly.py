@@ -9,27 +9,25 @@ from pathlib import Path
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
-from companion.config_sections import AxisKeys
+from companion.config.known_drag import drag_prior
+from companion.config.sections import AxisKeys
+from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.ground_contact import GroundContact
+from companion.control.guidance_loop import Guide
+from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.asking_again import AskingAgain
-from companion.flight.control_loop import ControlLoop, Deadlines
+from companion.flight.context import Rig
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
-from companion.flight.follow import Follow
-from companion.flight.ground_contact import GroundContact
-from companion.flight.guide import Guide
+from companion.flight.judgement import Preflight
+from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
-from companion.flight.outer_loop import linear_guidance, motion_estimate, predictive
-from companion.flight.preflight import Preflight
-from companion.flight.programmes import unbegun
-from companion.flight.rig import Rig
-from companion.flight.safety import Lookout, SafetyLadder, monitors
 from companion.flight.same_vehicle import SameVehicle
+from companion.flight.snapshot_builder import Lookout
 from companion.flight.vehicle_memory import VehicleMemory
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, Sequence, ThrustSettings
-from companion.known_drag import drag_prior
-from companion.mavlink.inbox import Notice
-from companion.mavlink.link import Link
+from companion.guidance.follow import Follow
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
@@ -37,6 +35,9 @@ from companion.mavlink.transport import Tap
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
+from companion.safety import SafetyLadder, monitors
+from companion.vehicle.inbox import Notice
+from companion.vehicle.link import Link
 
 _MS = 1e-3
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.flight.ending import internal
 from companion.identification import dead_time_by_correlation
 from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
+from companion.safety.ending import internal
 
 _PERIOD = 2.0
 """Between two looks, s. Each is at one axis, so every axis has its turn after three."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from companion.guidance.fence import Breach, Fence, Place
 from companion.guidance.reference import Vector
-from companion.trajectory.demand import Floats, Motion
-from companion.trajectory.feasibility import Violation
+from companion.guidance.trajectory.demand import Floats, Motion
+from companion.guidance.trajectory.feasibility import Violation
 
 MARGIN = 0.5
 """Kept between the reference and the fence, m: for the tracking error, that of the speed included,

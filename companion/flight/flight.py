@@ -4,13 +4,13 @@ import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from typing import Any
 
-from companion.flight.ending import Exit, FlightEnded, internal
+from companion.flight.context import Rig
 from companion.flight.observer import Observer
 from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
-from companion.flight.rig import Rig
 from companion.flight.same_vehicle import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
+from companion.safety.ending import Exit, FlightEnded, internal
 
 AskLanding = Callable[[], Awaitable[bool]]
 

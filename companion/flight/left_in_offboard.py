@@ -7,12 +7,12 @@ OFFBOARD, by our command or by its failsafe, that is OFFBOARD, and without setpo
 checks fail there for ever (measured).
 """
 
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.context import Rig
+from companion.flight.mode_roles import in_role, require_role, roles_of
 from companion.flight.orders import enter
-from companion.flight.rig import Rig
-from companion.flight.roles import in_role, require_role, roles_of
 from companion.mavlink.errors import CommandRefused, CommandTimeout
-from companion.mavlink.roles import Role
+from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.roles import Role
 
 _OFFBOARD = frozenset({Role.OFFBOARD})
 

@@ -3,11 +3,11 @@
 import asyncio
 from collections.abc import Callable
 
-from companion.flight.ending import Exit, FlightEnded
-from companion.flight.rig import Rig
+from companion.flight.context import Rig
 from companion.mavlink.command import Command
 from companion.mavlink.commands import command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.safety.ending import Exit, FlightEnded
 
 _TRIES = 4
 _SHOWS = 3.0

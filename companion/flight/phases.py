@@ -4,12 +4,12 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from companion.config_sections import FlightConfig
-from companion.flight import departure, preparation, procedures
-from companion.flight.ending import Exit
-from companion.flight.rig import Rig
-from companion.mavlink.family import AutopilotFamily
-from companion.mavlink.roles import Role
+from companion.config.sections import FlightConfig
+from companion.flight import control_phases, preflight_phases, takeoff
+from companion.flight.context import Rig
+from companion.safety.ending import Exit
+from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.roles import Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
@@ -50,8 +50,8 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases before anything is asked of the vehicle but its telemetry, in order."""
     return (
         # A second more than the link waits: its own words on why nothing came are the better ones.
-        Phase("connect", "a heartbeat", preparation.connect, config.connect_timeout_s + 1.0),
-        Phase("checks", "the vehicle to be ready", preparation.checks, config.ready_timeout_s),
+        Phase("connect", "a heartbeat", preflight_phases.connect, config.connect_timeout_s + 1.0),
+        Phase("checks", "the vehicle to be ready", preflight_phases.checks, config.ready_timeout_s),
     )
 
 
@@ -59,14 +59,16 @@ def flight_phases(
     config: FlightConfig, programme_duration: float, family: AutopilotFamily
 ) -> tuple[Phase, ...]:
     """The phases from there on, in the family's order; `programme_duration` in s."""
-    stream = Phase("stream", "setpoints to flow", preparation.stream, _SHORT)
+    stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _SHORT)
     return (
         *(() if family.take_over() is None else (stream,)),
-        Phase("arm", "the vehicle to arm", preparation.arm, config.arming_timeout_s, Exit.DISARM),
+        Phase(
+            "arm", "the vehicle to arm", preflight_phases.arm, config.arming_timeout_s, Exit.DISARM
+        ),
         Phase(
             "takeoff",
             "the height",
-            departure.takeoff,
+            takeoff.takeoff,
             config.takeoff_timeout_s,
             Exit.LAND,
             on_failure_landed=Exit.DISARM,
@@ -75,7 +77,7 @@ def flight_phases(
         Phase(
             "offboard",
             "the autopilot to take our rates",
-            departure.offboard,
+            takeoff.offboard,
             _TAKE_OVER,
             Exit.LAND,
             modes=_RISING | {Role.OFFBOARD},
@@ -84,7 +86,7 @@ def flight_phases(
         Phase(
             "programme",
             "the programme to end",
-            procedures.programme,
+            control_phases.programme,
             programme_duration + 10.0,
             Exit.LAND,
             modes=frozenset({Role.OFFBOARD}),
@@ -111,7 +113,7 @@ def _hand_back() -> Phase:
     return Phase(
         "hand back",
         "the autopilot to hold",
-        procedures.hand_back,
+        control_phases.hand_back,
         _SHORT,
         Exit.LAND,
         modes=_AIRBORNE | {Role.OFFBOARD},
@@ -122,7 +124,7 @@ def _land(config: FlightConfig) -> Phase:
     return Phase(
         "land",
         "touchdown",
-        procedures.land,
+        control_phases.land,
         config.landing_timeout_s,
         modes=_AIRBORNE | {Role.OFFBOARD, Role.LAND},
     )
@@ -130,8 +132,8 @@ def _land(config: FlightConfig) -> Phase:
 
 def _undo_arming() -> Phase:
     """Where it is refused, the vehicle flies after all; on the ground a landing does no harm."""
-    return Phase("disarm", "the motors to stop", preparation.undo_arming, _SHORT, Exit.LAND)
+    return Phase("disarm", "the motors to stop", preflight_phases.undo_arming, _SHORT, Exit.LAND)
 
 
 def _disarm() -> Phase:
-    return Phase("disarm", "the motors to stop", procedures.disarm, 20.0)
+    return Phase("disarm", "the motors to stop", control_phases.disarm, 20.0)

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from companion.doctor.evidence import Identity
-from companion.flight.ending import Exit, FlightEnded
-from companion.mavlink.link import Link
+from companion.preflight.evidence import Identity
+from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
 """A vehicle that is there sends something within this time, s, on the worst link that is flown."""

@@ -5,17 +5,18 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from companion import bounded_yaml, realtime
+from companion import realtime
 from companion.config import Config
+from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
-from companion.flight.chronicle import Chronicle
 from companion.flight.flight import AskLanding
+from companion.flight.maneuvers import programme
 from companion.flight.observer import Observer
-from companion.flight.programmes import programme
-from companion.mavlink.link import Link
-from companion.mavlink.samples import AttitudeSample
+from companion.flight.state_logger import Chronicle
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
+from companion.vehicle.link import Link
+from companion.vehicle.samples import AttitudeSample
 
 
 class Session:

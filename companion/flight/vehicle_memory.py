@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.doctor.evidence import Identity
+from companion.config.known_drag import prior_of
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
-from companion.known_drag import prior_of
+from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
 
 

@@ -5,14 +5,14 @@ from collections.abc import Callable
 from math import inf
 
 from companion.flight.asking_again import AskingAgain
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.context import Rig
+from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import Phase
-from companion.flight.rig import Rig
-from companion.flight.roles import require_role, roles_of
-from companion.flight.safety import Action, SafetyLadder
-from companion.flight.safety.monitor import EXITS
-from companion.mavlink.records import outdated
-from companion.mavlink.roles import Role
+from companion.safety import Action, SafetyLadder
+from companion.safety.ending import Exit, FlightEnded
+from companion.safety.monitor import EXITS
+from companion.vehicle.records import outdated
+from companion.vehicle.roles import Role
 
 _STATUS_PERIOD = 0.45
 """PX4 sends CURRENT_MODE every 0.5 s while nothing changes; one that comes sooner is news."""

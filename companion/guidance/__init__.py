@@ -7,8 +7,8 @@ from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
 from companion.guidance.linear import LinearCommand, LinearGuidance, LinearSettings, Situation
 from companion.guidance.lqr import Weights, chain_gains
+from companion.guidance.maneuvers import Circle, Corners, Hover, Programme, Sequence, Steps
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
-from companion.guidance.programmes import Circle, Corners, Hover, Programme, Sequence, Steps
 from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
 from companion.guidance.thrust import height_first, specific_thrust
 

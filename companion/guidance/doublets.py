@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from companion.attitude import BodyRates
-from companion.guidance.programmes import spread
+from companion.guidance.maneuvers import spread
 from companion.guidance.reference import Pose, Reference
 
 _SMALL = 0.5

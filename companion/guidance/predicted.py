@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.horizontal import Horizontal, rotated
-from companion.guidance.programmes import Programme
+from companion.guidance.maneuvers import Programme
 from companion.guidance.reference import GRAVITY, Pose, Reference, Vector
 
 _LARGEST_TILT = 1.4

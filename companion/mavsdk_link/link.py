@@ -12,11 +12,11 @@ import logging
 
 from companion.mavlink.endpoint import Endpoint, UdpIn
 from companion.mavlink.errors import LinkError
-from companion.mavlink.inbox import Notice
-from companion.mavlink.link import Link
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport import Lost, Receiver, Tap, Transport
 from companion.mavsdk_link.transport import MavsdkTransport
+from companion.vehicle.inbox import Notice
+from companion.vehicle.link import Link
 
 _LOG = logging.getLogger(__name__)
 

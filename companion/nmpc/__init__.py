@@ -1,25 +1,24 @@
-"""Nonlinear model predictive control of the outer loop, in a process of its own.
+"""Nonlinear model predictive control (NMPC) of the outer loop, in a process of its own.
 
-`Solver` is what a flight needs, and imports no CasADi: that lives in the process (`worker`). There,
-`Planning` works a request off: `prediction` carries the motion on to when the answer acts,
-`reference` says what the trajectory takes, and `Problem` solves for one of the `models` by one of
-two backends: CasADi's SQP (extra `nmpc`) or acados' (extra `acados`). `solvers` says which of them
-can be had.
+A flight uses `Solver`, which starts that process and does not import CasADi (extra `nmpc`). In the
+process, `Worker` answers each request:
+
+1. `prediction` integrates the motion to the time at which the answer takes effect.
+2. `reference` computes the attitude and thrust that the trajectory needs.
+3. `RecedingHorizon` solves the optimal control `problem` of the `coefficient_model`.
 """
 
 from companion.nmpc.messages import Answer, Input, Request, Status, Vehicle
 from companion.nmpc.process import Solver, Trouble
 from companion.nmpc.reference import Start
-from companion.nmpc.settings import ModelName, Settings, SolverName, Weights
+from companion.nmpc.settings import Settings, Weights
 
 __all__ = [
     "Answer",
     "Input",
-    "ModelName",
     "Request",
     "Settings",
     "Solver",
-    "SolverName",
     "Start",
     "Status",
     "Trouble",

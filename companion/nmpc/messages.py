@@ -1,4 +1,4 @@
-"""What goes between a flight and its solver, and how it looks on the way: struct-packed floats."""
+"""Requests to the solver's process and its answers, and their packed form (`struct`)."""
 
 import struct
 from enum import IntEnum
@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Quaternion
 from companion.drag import NO_DRAG, Drag
+from companion.guidance.trajectory.sample import Vector
 from companion.nmpc.reference import Start
-from companion.trajectory.sample import Vector
 
 READY = b"ready"
-"""The solver's first word, once it is warm."""
+"""First message of the solver's process, once it takes requests."""
 
 _HEAD = struct.Struct("<q24d")
 _INPUT = struct.Struct("<5d")
@@ -18,16 +18,16 @@ _ANSWER = struct.Struct("<2q9d")
 
 
 class Vehicle(NamedTuple):
-    """What is known of the vehicle.
+    """State of the vehicle.
 
     Attributes:
-        time: for which it is known, s.
+        time: to which the state belongs, s.
         position: m, NED.
         velocity: m/s, NED.
         q: attitude, body → world; must be a unit quaternion.
         body_rates: rad/s, FRD.
-        disturbance: acceleration by wind and what else is not modelled, m/s², NED.
-        drag: as far as it is known by now.
+        disturbance: acceleration by wind and whatever else is not modelled, m/s², NED.
+        drag: as estimated so far.
     """
 
     time: float
@@ -40,10 +40,10 @@ class Vehicle(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What was asked of the vehicle from a time on, whoever computed it.
+    """Control input of the vehicle from a time on, by predictive control or by linear guidance.
 
     Attributes:
-        time: when it was given out, on the clock of `Vehicle.time`, s.
+        time: when it was commanded, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
         heading: rad.
         thrust: specific, m/s².
@@ -60,12 +60,12 @@ class Request(NamedTuple):
     """A problem to solve.
 
     Attributes:
-        number: of the request; the answer bears it.
-        vehicle: what is known of it.
-        at: where on the trajectory it ought to be at `vehicle.time`, s after its beginning.
+        number: of the request; its answer has the same.
+        vehicle: its state.
+        at: time along the trajectory that belongs to `vehicle.time`, s.
         start: of the trajectory.
-        inputs: the latest, in order of time. They have to reach back a dead time and a lead: what
-            was asked before the first of them is taken to be the same.
+        inputs: the latest, in order of time. They must reach back by dead time plus lead; before
+            the first one, the same input is assumed.
     """
 
     number: int
@@ -81,23 +81,23 @@ class Status(IntEnum):
     SOLVED = 0
     FAILED = 1
     """The solver gave no plan."""
-    TOPPLED = 2
-    """The vehicle is tilted further than the models reach."""
+    TILTED_TOO_FAR = 2
+    """The vehicle is tilted further than the models cover."""
 
 
 class Answer(NamedTuple):
-    """What came of a request.
+    """Answer to a request.
 
     Attributes:
         number: of the request.
-        status: the rest means something only where it is `SOLVED`.
-        given_at: when, on the machine's monotonic clock, s.
-        time: from when on it is to be used, on the clock of `Vehicle.time`, s.
+        status: the rest is meaningful only if it is `SOLVED`.
+        given_at: when it was computed, on the machine's monotonic clock, s.
+        time: when to use it, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
         heading: rad, in (−π, π].
         thrust: specific, m/s².
-        seconds: that it took, prediction and reference included.
-        solving: processor time of the solver itself, s: what others take does not count.
+        seconds: computing time, prediction and reference included.
+        solving: processor time of the solver alone, s.
         iterations: of the SQP.
     """
 
@@ -115,7 +115,7 @@ class Answer(NamedTuple):
 
 
 def pack_request(request: Request) -> bytes:
-    """As it is sent."""
+    """The bytes of a request."""
     vehicle, start = request.vehicle, request.start
     head = _HEAD.pack(
         request.number,
@@ -134,7 +134,7 @@ def pack_request(request: Request) -> bytes:
 
 
 def unpack_request(message: bytes) -> Request:
-    """As it was asked."""
+    """The request in these bytes."""
     number, at, *v = _HEAD.unpack_from(message)
     vehicle = Vehicle(
         v[4],
@@ -150,11 +150,11 @@ def unpack_request(message: bytes) -> Request:
 
 
 def pack_answer(answer: Answer) -> bytes:
-    """As it is sent."""
+    """The bytes of an answer."""
     return _ANSWER.pack(*answer)
 
 
 def unpack_answer(message: bytes) -> Answer:
-    """As it was given."""
+    """The answer in these bytes."""
     number, status, *rest = _ANSWER.unpack(message)
     return Answer(number, Status(status), *rest)

@@ -1,113 +1,225 @@
-"""One model's problem, planned again and again from the plan before."""
+"""The optimal control problem: multiple shooting and least squares, solved by CasADi's SQP."""
 
 from collections.abc import Sequence
-from time import thread_time
-from typing import NamedTuple
+from math import sqrt
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from companion.nmpc.backend import Backend
-from companion.nmpc.casadi_backend import CasadiBackend
-from companion.nmpc.model import Given, Model, Motion
-from companion.nmpc.models import make_model
+from companion.nmpc.model import Model, integrator
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
-from companion.nmpc.transcription import parameters_of
-from companion.nmpc.warm_start import Floats, moved_on, on_reference
+
+Floats = NDArray[np.float64]
+
+_ITERATION_LIMIT = "SOLVER_RET_LIMITED"
+_SQP: dict[str, Any] = {
+    "qpsol": "hpipm",
+    "tol_pr": 1e-6,
+    "tol_du": 1e-3,
+    "error_on_fail": False,
+    "print_header": False,
+    "print_iteration": False,
+    "print_status": False,
+    "print_time": False,
+    "show_eval_warnings": False,  # a plan that is not finite is refused; nobody reads our output
+}
 
 
-class Plan(NamedTuple):
-    """What one solve came to.
+class Program(NamedTuple):
+    """min ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps.
 
     Attributes:
-        solved: whether the plan may be flown; the rest is meaningless where it may not.
-        converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
-        iterations: of the SQP.
-        seconds: of processor time that the solver itself took.
-        north, east, heading: the first target for the planner: coefficients, rad.
-        thrust: specific, m/s².
+        unknown: w, (x_0, u_0, x_1, u_1, …, x_N).
+        parameters: p; `parameters_of` fills it.
+        residual: r.
+        constraints: g, for each step the gap to the next state and then the bounds of the model:
+            the order that HPIPM requires.
+        lower, upper: bounds on w; the caller sets the first n to the state at the start.
+        g_lower, g_upper: bounds on g.
     """
 
+    unknown: ca.SX
+    parameters: ca.SX
+    residual: ca.SX
+    constraints: ca.SX
+    lower: Floats
+    upper: Floats
+    g_lower: Floats
+    g_upper: Floats
+
+
+def transcribe(model: Model, settings: Settings) -> Program:
+    """Write the problem of this model out over the horizon."""
+    node = ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
+    advance = integrator(model)
+    running = ca.Function(
+        "r", [model.state, model.control, node], [_running_residual(model, node, settings)]
+    )
+    bounded = ca.Function("b", [model.state, model.control, model.constants], [model.bounded])
+    constants = ca.SX.sym("constants", model.constants.numel())
+    nodes = [ca.SX.sym(f"node_{k}", node.numel()) for k in range(settings.steps + 1)]
+    x = ca.SX.sym("x_0", model.state.numel())
+    unknown, residual, constraints = [x], [], []
+    for k in range(settings.steps):
+        u = ca.SX.sym(f"u_{k}", model.control.numel())
+        after = ca.SX.sym(f"x_{k + 1}", model.state.numel())
+        unknown += [u, after]
+        residual.append(running(x, u, nodes[k]))
+        constraints.append(advance(x, u, constants, settings.step) - after)
+        constraints.append(bounded(x, u, constants))
+        x = after
+    residual.append(_final_residual(x, nodes[-1], settings))
+    return Program(
+        ca.vertcat(*unknown),
+        ca.vertcat(constants, *nodes),
+        ca.vertcat(*residual),
+        ca.vertcat(*constraints),
+        *_bounds_of_unknown(model, settings),
+        *_bounds_of_constraints(model, settings),
+    )
+
+
+def parameters_of(
+    constants: Sequence[float], nodes: Sequence[Node], aims: Sequence[Sequence[float]]
+) -> Floats:
+    """The numbers for `Program.parameters`: the constants, then each node with its aim."""
+    values = [*constants]
+    for node, aim in zip(nodes, aims, strict=True):
+        values += [*node.position, *node.velocity, node.thrust, *aim]
+    return np.array(values)
+
+
+def _running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
+    """Contribution of one step to the residual r."""
+    weights = settings.weights
+    scaled = (
+        (weights.position, model.state[0:3] - node[0:3]),
+        (weights.velocity, model.state[3:6] - node[3:6]),
+        (weights.heading, model.heading_error),
+        (weights.turning, model.turning_error),
+        (weights.thrust, model.control[-1] - node[6]),
+    )
+    residual: ca.SX = ca.vertcat(
+        *(sqrt(settings.step * weight) * error for weight, error in scaled)
+    )
+    return residual
+
+
+def _final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
+    """Contribution of the state x at the end of the horizon."""
+    weights = settings.weights
+    residual: ca.SX = ca.vertcat(
+        sqrt(weights.final * weights.position) * (x[0:3] - node[0:3]),
+        sqrt(weights.final * weights.velocity) * (x[3:6] - node[3:6]),
+    )
+    return residual
+
+
+def _bounds_of_unknown(model: Model, settings: Settings) -> tuple[Floats, Floats]:
+    free_state = np.full(model.state.numel(), np.inf)
+    control = np.full(model.control.numel(), np.inf)
+    lowest, highest = -control, control.copy()
+    lowest[-1], highest[-1] = settings.min_thrust, settings.max_thrust
+    lower = np.concatenate([-free_state, *[lowest, -free_state] * settings.steps])
+    upper = np.concatenate([free_state, *[highest, free_state] * settings.steps])
+    return lower, upper
+
+
+def _bounds_of_constraints(model: Model, settings: Settings) -> tuple[Floats, Floats]:
+    gap, bounded = np.zeros(model.state.numel()), np.ones(model.bounded.numel())
+    upper = np.concatenate([gap, bounded] * settings.steps)
+    return -upper, upper
+
+
+class Solution(NamedTuple):
+    """Result of one solve.
+
+    Attributes:
+        unknown: (x_0, u_0, x_1, …, x_N), as `Program.unknown`.
+        solved: whether the plan may be flown, if it is finite.
+        converged: whether the iterations reached the tolerance.
+        iterations: of the SQP.
+    """
+
+    unknown: Floats
     solved: bool
     converged: bool
     iterations: int
-    seconds: float
-    north: float
-    east: float
-    heading: float
-    thrust: float
 
 
-_NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-class Problem:
-    """Plans again and again, each time from the plan before.
-
-    The cost is the same for all models: errors of position, velocity and heading, the turning and
-    the thrust against what the reference takes; see `Weights`.
+class SqpSolver:
+    """CasADi's SQP with HPIPM for the quadratic programs; nothing is compiled.
 
     Args:
-        settings: vehicle, horizon and solver.
-
-    Raises:
-        ValueError: there is no model of that name.
-        BuildError: acados' solver cannot be compiled.
+        model: predicts the motion.
+        settings: horizon, cost and iterations.
     """
 
-    def __init__(self, settings: Settings) -> None:
-        self._settings = settings
-        self._model = make_model(settings)
-        self._backend = _backend(self._model, settings)
-        inputs = [self._model.state, self._model.control, self._model.given]
-        self._target = ca.Function("target", inputs, [self._model.target])
-        self._plan: Floats | None = None
-        self._time = 0.0
+    def __init__(self, model: Model, settings: Settings) -> None:
+        self._start = model.state.numel()
+        self._program = transcribe(model, settings)
+        self._solver = _sqp_function(self._program, settings.iterations)
 
-    def forget(self) -> None:
-        """Begin the next solve from its reference."""
-        self._plan = None
-
-    def solve(self, time: float, motion: Motion, nodes: Sequence[Node], given: Given) -> Plan:
-        """Plan from `motion` on.
+    def solve(self, guess: Floats, parameters: Floats) -> Solution:
+        """Solve from a guess, whose first state is kept: the vehicle starts there.
 
         Args:
-            time: of `motion`, s; it says how far the last plan has to be moved on.
-            motion: at the beginning of the horizon.
-            nodes: the reference at the ends of the steps: one more than these.
-            given: what is the same over the horizon.
+            guess: as `Program.unknown`.
+            parameters: as `parameters_of` makes them.
         """
-        model = self._model
-        start = np.array(model.state_of(motion))
-        guess = self._guess(time, nodes)
-        guess[: len(start)] = start
-        parameters = parameters_of(given, nodes, [model.aim_of(node) for node in nodes])
-        if not (np.isfinite(start).all() and np.isfinite(parameters).all()):
-            self.forget()
-            return _NO_PLAN
-        began = thread_time()
-        found = self._backend.solve(guess, parameters)
-        seconds = thread_time() - began
-        if not (found.solved and np.isfinite(found.plan).all()):
-            self.forget()
-            return _NO_PLAN
-        plan = self._plan = found.plan
-        self._time = time
-        control = plan[len(start) : len(start) + model.control.numel()]
-        target = np.asarray(self._target(start, control, list(given)), dtype=np.float64).ravel()
-        return Plan(True, found.converged, found.iterations, seconds, *(float(v) for v in target))
-
-    def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
-        if self._plan is None or not time >= self._time:
-            return on_reference(self._model, nodes, self._settings)
-        return moved_on(self._model, self._plan, (time - self._time) / self._settings.step)
+        program, start = self._program, self._start
+        program.lower[:start] = program.upper[:start] = guess[:start]
+        found = self._solver(
+            x0=guess,
+            p=parameters,
+            lbx=program.lower,
+            ubx=program.upper,
+            lbg=program.g_lower,
+            ubg=program.g_upper,
+        )
+        stats = self._solver.stats()
+        converged = bool(stats["success"])
+        return Solution(
+            np.asarray(found["x"], dtype=np.float64).ravel(),
+            converged or stats["unified_return_status"] == _ITERATION_LIMIT,
+            converged,
+            int(stats["iter_count"]),
+        )
 
 
-def _backend(model: Model, settings: Settings) -> Backend:
-    """The one that the settings name."""
-    if settings.solver == "acados":
-        from companion.nmpc.acados_backend import AcadosBackend  # noqa: PLC0415  seldom installed
-
-        return AcadosBackend(model, settings)
-    return CasadiBackend(model, settings)
+def _sqp_function(program: Program, iterations: int) -> ca.Function:
+    """`sqpmethod` with the Gauss–Newton Hessian; a single iteration takes the whole step."""
+    jacobian = ca.jacobian(program.residual, program.unknown)
+    factor = ca.SX.sym("lam_f")
+    multipliers = ca.SX.sym("lam_g", program.constraints.numel())
+    hessian = ca.Function(
+        "gauss_newton",
+        [program.unknown, program.parameters, factor, multipliers],
+        [factor * ca.mtimes(jacobian.T, jacobian)],
+        ["x", "p", "lam_f", "lam_g"],
+        ["hess_gamma_x_x"],
+    )
+    single = iterations == 1
+    options = {
+        "hess_lag": hessian,
+        "max_iter": iterations,
+        "max_iter_ls": 0 if single else 10,  # line search in every iteration
+        "qpsol_options": {
+            # A single iteration needs no quadratic program to the last digit: a fifth longer.
+            "hpipm": {"mode": "speed_abs" if single else "speed"},
+            # HPIPM knows no infinite bound, so CasADi passes large ones. Its default, 1e8, loses
+            # so many digits that ten times as many iterations are needed.
+            "inf": 1e4,
+            "error_on_fail": False,
+        },
+    }
+    problem = {
+        "x": program.unknown,
+        "p": program.parameters,
+        "f": 0.5 * ca.sumsqr(program.residual),
+        "g": program.constraints,
+    }
+    return ca.nlpsol("nmpc", "sqpmethod", problem, _SQP | options)

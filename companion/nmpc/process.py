@@ -1,7 +1,7 @@
-"""The solver as a flight sees it: a process that is asked, and answers when it can.
+"""The flight's side of the solver's process: sends requests and takes the answers.
 
-Nothing here blocks and nothing computes: a busy thread in our own process would keep the control
-loop from its samples for milliseconds.
+Nothing here blocks or computes: a busy thread in our own process would delay the control loop by
+milliseconds.
 """
 
 import os
@@ -15,26 +15,25 @@ from collections.abc import Callable
 from contextlib import suppress
 from enum import Enum
 from math import hypot, isfinite, sin
-from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
 from companion.attitude.kinematics import tilt_products
+from companion.extras import require
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
 from companion.nmpc.settings import Settings
-from companion.nmpc.solvers import check
 from companion.realtime import schedule_as_usual
-from companion.trajectory.sample import Trajectory
 
 _LARGEST_MESSAGE = 4096
-_LAST_MOMENT = 0.02
-"""Between the end of a process's socket and that of the process, s; usually well below 1 ms."""
+_EXIT_TIME = 0.02
+"""Time allowed to a process to exit after its socket has closed, s; usually well below 1 ms."""
 _TOLERANCE = 0.02
-"""By which share an answer may be beyond a limit and count as rounding."""
+"""Share by which an answer may exceed a limit through rounding."""
 
 
 class Trouble(Enum):
-    """Why there is no solution to fly."""
+    """Why there is no answer to fly."""
 
     DIED = "died"
     LATE = "late"
@@ -43,16 +42,16 @@ class Trouble(Enum):
 
 
 Report = Callable[[Trouble, str], None]
-"""Takes what went wrong, and the whole of it in words."""
+"""Called with the kind of trouble and a description."""
 
 
-class _Asked(NamedTuple):
-    """The request that is out.
+class _Pending(NamedTuple):
+    """The request that has no answer yet.
 
     Attributes:
-        number: its own.
+        number: of the request.
         at: when it was sent, on the machine's monotonic clock, s.
-        longest: the longest coefficients that an answer may have.
+        longest: largest |c| that an answer may have.
     """
 
     number: int
@@ -61,104 +60,96 @@ class _Asked(NamedTuple):
 
 
 class Solver:
-    """Starts the process, sends requests, hands out answers that may be flown.
+    """Starts the process, sends requests, returns answers that may be flown.
 
-    An answer that is late, failed or absurd is reported and not handed out; so is the death of the
-    process, at the next call or, for who watches `fileno`, at once.
+    An answer that is late, failed or absurd is reported and not returned. The death of the process
+    is reported at the next call; watch `fileno` to learn of it at once.
 
     Args:
         settings: vehicle, horizon and solver.
-        trajectory: what is followed; one solver follows one. It is pickled.
+        trajectory: the one to follow; it is pickled.
         report: called for each trouble, from within the method that notices it.
-        python: the interpreter of the process; None is ours.
 
     Attributes:
-        alive: whether the process has not been found dead, nor closed.
+        alive: False once the process was closed or found dead.
         pid: of the process.
 
     Raises:
-        MissingExtraError: the solver is not installed there.
+        MissingExtraError: CasADi is not installed.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        trajectory: Trajectory,
-        report: Report,
-        python: Path | None = None,
-    ) -> None:
-        check(settings.solver, python)
+    def __init__(self, settings: Settings, trajectory: Trajectory, report: Report) -> None:
+        require("casadi", "nmpc", "Predictive control")
         self._settings = settings
         self._report = report
-        self._asked: _Asked | None = None
+        self._pending: _Pending | None = None
         self._ready = False
         self._ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._ours.setblocking(False)
-        # Files, not pipes: the process takes its time to read, and nobody reads its last words
-        # before it ends.
-        self._words = tempfile.TemporaryFile()  # noqa: SIM115  closed by close()
-        with theirs, tempfile.TemporaryFile() as told:
-            pickle.dump((settings, trajectory), told)
-            told.seek(0)
+        # Files, not pipes: the process reads late, and its output is read only after it ended.
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by close()
+        with theirs, tempfile.TemporaryFile() as job:
+            pickle.dump((settings, trajectory), job)
+            job.seek(0)
             self._process = subprocess.Popen(
-                [python or sys.executable, "-m", "companion.nmpc.worker", str(theirs.fileno())],
-                stdin=told,
-                stdout=self._words,
-                stderr=self._words,
+                [sys.executable, "-m", "companion.nmpc.worker", str(theirs.fileno())],
+                stdin=job,
+                stdout=self._output,
+                stderr=self._output,
                 pass_fds=[theirs.fileno()],
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
-        schedule_as_usual(self.pid)  # it computes all the time, and must not have our priority
+        schedule_as_usual(self.pid)  # it computes all the time: not with our real-time priority
         self.alive = True
 
     @property
     def ready(self) -> bool:
-        """Whether it is warm, and takes requests."""
+        """Whether the process is warmed up and takes requests."""
         if not self._ready and self.alive:
             self._ready = self._receive() == READY
         return self._ready and self.alive
 
     def fileno(self) -> int:
-        """Readable when an answer has come or the process has ended; `take` then."""
+        """Readable when an answer has come or the process has ended; call `take` then."""
         return self._ours.fileno()
 
     def request(self, request: Request) -> None:
-        """Ask, and do not wait. What was asked before and not answered yet is late with this.
+        """Send a request without waiting. An earlier one without an answer counts as late.
 
-        Nothing is asked of a process that is not `ready`.
+        Nothing is sent to a process that is not `ready`.
         """
         if not self.ready:
             return
-        self._give_up("was not answered before the next one")
+        self._drop_pending("was not answered before the next one")
         try:
             self._ours.send(pack_request(request))
         except BlockingIOError:
             self._report(Trouble.LATE, "the solver does not read its requests")
         except (BrokenPipeError, ConnectionResetError):
-            self._bury()
+            self._handle_exit()
         else:
             _, ax, ay = tilt_products(*request.vehicle.q)
             longest = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
-            self._asked = _Asked(request.number, monotonic(), longest)
+            self._pending = _Pending(request.number, monotonic(), longest)
 
     def take(self, wait: float = 0.0) -> Answer | None:
         """The answer to the last request, once, if it has come and may be flown.
 
         Args:
-            wait: for so long for it, s. In a flight in real time 0: this call then never blocks.
+            wait: time to wait for it, s. With 0, as in real time, this call never blocks.
         """
         until = monotonic() + wait
         while self.ready:
-            message = self._receive(max(0.0, until - monotonic()) if self._asked else 0.0)
+            message = self._receive(max(0.0, until - monotonic()) if self._pending else 0.0)
             if not message:
                 break
             answer = unpack_answer(message)
-            if self._asked is not None and answer.number == self._asked.number:
-                asked, self._asked = self._asked, None
-                return self._checked(asked, answer)
-        if self._asked is not None and monotonic() - self._asked.at > self._settings.deadline:
-            self._give_up(f"has no answer after {1e3 * self._settings.deadline:.0f} ms")
+            if self._pending is not None and answer.number == self._pending.number:
+                pending, self._pending = self._pending, None
+                return self._checked(pending, answer)
+        if self._pending is not None and monotonic() - self._pending.at > self._settings.deadline:
+            self._drop_pending(f"has no answer after {1e3 * self._settings.deadline:.0f} ms")
         return None
 
     def close(self) -> None:
@@ -168,10 +159,10 @@ class Solver:
             self._ours.close()
             self._process.kill()
             self._process.wait()
-            self._words.close()
+            self._output.close()
 
     def _receive(self, wait: float = 0.0) -> bytes:
-        """The next message; empty if there is none, or none any more."""
+        """The next message; empty if there is none, or if the process has ended."""
         if wait > 0.0:
             select.select([self._ours], [], [], wait)
         try:
@@ -181,50 +172,52 @@ class Solver:
         except ConnectionResetError:
             message = b""
         if not message:
-            self._bury()
+            self._handle_exit()
         return message
 
-    def _checked(self, asked: _Asked, answer: Answer) -> Answer | None:
-        took = answer.given_at - asked.at
+    def _checked(self, pending: _Pending, answer: Answer) -> Answer | None:
+        took = answer.given_at - pending.at
         if took > self._settings.deadline:
-            self._report(Trouble.LATE, f"request {asked.number} took {1e3 * took:.1f} ms")
+            self._report(Trouble.LATE, f"request {pending.number} took {1e3 * took:.1f} ms")
         elif answer.status is not Status.SOLVED:
-            words = f"request {asked.number} was not solved: {answer.status.name.lower()}"
+            reason = answer.status.name.lower().replace("_", " ")
+            words = f"request {pending.number} was not solved: {reason}"
             self._report(Trouble.FAILED, words)
-        elif absurd := _absurdity(answer, asked.longest, self._settings):
-            self._report(Trouble.ABSURD, f"the answer to request {asked.number} has {absurd}")
+        elif absurd := _absurdity(answer, pending.longest, self._settings):
+            self._report(Trouble.ABSURD, f"the answer to request {pending.number} has {absurd}")
         else:
             return answer
         return None
 
-    def _give_up(self, why: str) -> None:
-        """Wait no more for the request that is out, if there is one."""
-        if self._asked is not None:
-            self._report(Trouble.LATE, f"request {self._asked.number} {why}")
-            self._asked = None
+    def _drop_pending(self, why: str) -> None:
+        """Report the pending request as late, if there is one."""
+        if self._pending is not None:
+            self._report(Trouble.LATE, f"request {self._pending.number} {why}")
+            self._pending = None
 
-    def _bury(self) -> None:
-        """The other end is closed: see why."""
-        with suppress(subprocess.TimeoutExpired):  # it closed its end, so it is as good as gone
-            self._process.wait(_LAST_MOMENT)
+    def _handle_exit(self) -> None:
+        """The socket was closed by the process: report how it ended."""
+        with suppress(subprocess.TimeoutExpired):  # if it hangs, `close` kills it
+            self._process.wait(_EXIT_TIME)
         code = self._process.returncode
-        self._words.seek(0)
-        words = self._words.read().decode(errors="replace").strip().splitlines()
+        self._output.seek(0)
+        words = self._output.read().decode(errors="replace").strip().splitlines()
         self.close()
-        self._asked = None
+        self._pending = None
         how = f"was ended by signal {-code}" if code is not None and code < 0 else "has ended"
         self._report(Trouble.DIED, f"the solver {how}" + (f": {words[-1]}" if words else ""))
 
 
 def _absurdity(answer: Answer, longest: float, settings: Settings) -> str | None:
-    """What no vehicle can fly of an answer, in words; None if there is nothing."""
+    """Why no vehicle can fly this answer; None if it can."""
     values = (answer.north, answer.east, answer.heading, answer.thrust, answer.time)
     if not all(isfinite(value) for value in values):
         return "a number that is not finite"
     length = hypot(answer.north, answer.east)
     if length > (1.0 + _TOLERANCE) * longest:
-        return f"coefficients of length {length:.3f}, at most {longest:.3f} can be flown"
+        return f"coefficients of length {length:.3f}, more than the limit {longest:.3f}"
     slack = _TOLERANCE * settings.gravity
     if not settings.min_thrust - slack <= answer.thrust <= settings.max_thrust + slack:
-        return f"a thrust of {answer.thrust:.2f} m/s²"
+        limits = f"{settings.min_thrust:.2f} to {settings.max_thrust:.2f}"
+        return f"a thrust of {answer.thrust:.2f} m/s², outside {limits}"
     return None

@@ -1,14 +1,14 @@
-"""What the vehicle has to do to be on its trajectory: the reference of a prediction."""
+"""Attitude and thrust that keep the vehicle on its trajectory: the reference of the horizon."""
 
 from math import sqrt
 from typing import NamedTuple
 
 from companion.attitude import wrap_angle
 from companion.drag import Drag
-from companion.trajectory.sample import Sample, Vector
+from companion.guidance.trajectory.sample import Sample, Vector
 
 _LEAST_LIFT = 0.2
-"""The reference thrust points up with this share of gravity at least, however quick the descent."""
+"""Least upward part of the reference thrust, share of gravity, however fast the descent."""
 
 
 class Node(NamedTuple):
@@ -18,9 +18,9 @@ class Node(NamedTuple):
         position: m, NED.
         velocity: m/s, NED.
         north, east: acceleration coefficients.
-        speed_north, speed_east: their speed, 1/s.
+        speed_north, speed_east: their time derivative, 1/s.
         thrust: specific, m/s².
-        heading: tilt-yaw heading, rad; not wrapped, so that neighbours are near each other.
+        heading: tilt-yaw heading, rad; unwrapped, so that neighbouring nodes stay close.
         heading_rate: rad/s.
     """
 
@@ -36,11 +36,11 @@ class Node(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where and how a trajectory is laid out.
+    """Where a trajectory begins, and by how much it is turned.
 
     Attributes:
         position: where it begins, m, NED.
-        turned: added to its headings, rad: the heading at the start, where it holds that.
+        turned: added to its headings, rad: the initial heading for a trajectory that holds it.
     """
 
     position: Vector
@@ -50,11 +50,11 @@ class Start(NamedTuple):
 def node_of(
     sample: Sample, start: Start, near: float, drag: Drag, gravity: float, disturbance: Vector
 ) -> Node:
-    """The attitude and thrust that a sample takes: differential flatness of a point mass with drag.
+    """Attitude and thrust of a sample: differential flatness of a point mass with drag.
 
-    The rotors have to give f = a + d − w − g, d the deceleration by drag; its length is the
-    specific thrust, its horizontal part over that the coefficients, and with ḟ = jerk + ḋ follows
-    their speed.
+    The rotors must provide f = a + d − w − g, with d the deceleration by drag. |f| is the specific
+    thrust, the horizontal part of f/|f| the coefficients, and ḟ = jerk + ḋ gives their time
+    derivative.
 
     Args:
         sample: of the trajectory.
@@ -62,7 +62,7 @@ def node_of(
         near: the heading is given within π of this, rad.
         drag: of the vehicle.
         gravity: m/s².
-        disturbance: w, acceleration by wind and what else is not modelled, m/s².
+        disturbance: w, acceleration by wind and whatever else is not modelled, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
     slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)

@@ -1,11 +1,7 @@
-"""What the predictive controller knows of the vehicle, and what it is asked to weigh."""
+"""What the predictive controller knows of the vehicle, and the weights of its cost."""
 
 from dataclasses import dataclass, fields
 from math import isfinite, pi
-from typing import Literal
-
-ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion"]
-SolverName = Literal["hpipm", "acados"]
 
 
 def _check_positive(name: str, value: float) -> None:
@@ -21,8 +17,7 @@ class Weights:
         position: 1/m².
         velocity: s²/m².
         heading: 1/rad².
-        turning: of how fast the attitude is told to turn, against how fast the reference does,
-            s²/rad².
+        turning: of the commanded attitude rate against that of the reference, s²/rad².
         thrust: of the specific thrust against that of the reference, s⁴/m².
         final: factor on position and velocity at the end of the horizon, s.
     """
@@ -44,30 +39,27 @@ class Settings:
     """Vehicle, horizon and solver.
 
     Attributes:
-        model: which prediction model; see `companion.nmpc.models`.
         gain: p of the planner that flies the targets, 1/s.
-        yaw_gain: of its heading, 1/s.
+        yaw_gain: heading gain of that planner, 1/s.
         lag: τ of its response τ·c̈ + ċ = p·(c_d − c), s.
-        dead_time: from an answer's use to the beginning of its effect, s.
+        dead_time: from the use of an answer to the first response of the vehicle, s.
         gravity: m/s².
-        max_tilt: rad; of the planner.
-        max_tilt_rate: W_M of the planner, rad/s.
-        max_yaw_rate: of the planner, rad/s.
+        max_tilt: tilt limit of the planner, rad.
+        max_tilt_rate: tilt rate limit W_M of the planner, rad/s.
+        max_yaw_rate: yaw rate limit of the planner, rad/s.
         min_thrust, max_thrust: specific thrust, m/s².
         weights: of the cost.
-        horizon: s.
-        steps: of the horizon; each is one control.
-        iterations: most SQP iterations of a solve; 1 is the real-time iteration.
-        solver: `hpipm` is CasADi's SQP with HPIPM, `acados` is acados' with the same.
-        lead: an answer is for so long after the time of its request, s.
-        deadline: an answer that takes longer is late, s.
-        niceness: of the solver's process, 0 (as ours) to 19.
+        horizon: length of the prediction, s.
+        steps: of the horizon; the control is constant over each.
+        iterations: SQP iterations per solve at most; 1 is the real-time iteration.
+        lead: from the time of a request to the time at which its answer is used, s.
+        deadline: time allowed for an answer, s.
+        niceness: of the solver's process relative to ours, 0 to 19.
 
     Raises:
-        ValueError: a value is out of range, or `lag` is too short to be integrated in these steps.
+        ValueError: a value is out of range, or `lag` is too short for the step of the horizon.
     """
 
-    model: ModelName = "limited"
     gain: float = 5.0
     yaw_gain: float = 2.0
     lag: float = 0.05
@@ -82,7 +74,6 @@ class Settings:
     horizon: float = 1.0
     steps: int = 20
     iterations: int = 1
-    solver: SolverName = "hpipm"
     lead: float = 0.02
     deadline: float = 0.02
     niceness: int = 5

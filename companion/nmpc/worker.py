@@ -1,7 +1,7 @@
 """The solver's process: `python -m companion.nmpc.worker FD`, started by `process.Solver`.
 
-FD is a socket that keeps messages apart (SOCK_SEQPACKET). Settings and trajectory come pickled on
-standard input. The process ends when the socket does.
+FD is a SOCK_SEQPACKET socket, which keeps messages apart. Settings and trajectory arrive pickled on
+standard input. The process ends when the socket is closed.
 """
 
 import gc
@@ -10,37 +10,148 @@ import pickle
 import signal
 import socket
 import sys
+from collections.abc import Callable
+from time import monotonic, perf_counter
 
-from companion.nmpc.messages import READY, pack_answer, unpack_request
-from companion.nmpc.planning import Planning
+from companion.attitude import BodyRates, InvalidQuaternionError, wrap_angle
+from companion.guidance.trajectory.sample import Trajectory
+from companion.nmpc.coefficient_model import coefficient_model
+from companion.nmpc.messages import (
+    READY,
+    Answer,
+    Input,
+    Request,
+    Status,
+    Vehicle,
+    pack_answer,
+    unpack_request,
+)
+from companion.nmpc.model import Conditions, Model
+from companion.nmpc.prediction import Predictor, TiltedTooFarError
+from companion.nmpc.receding_horizon import Plan, RecedingHorizon
+from companion.nmpc.reference import Node, Start, node_of
+from companion.nmpc.settings import Settings
 
+_WARM_UP = 5
+"""Solves before the first that counts: they fill caches and allocate memory."""
 _LARGEST_MESSAGE = 65536
+
+
+class Worker:
+    """Answers requests about one trajectory.
+
+    The dead time is not part of the problem: the motion is predicted past it with the inputs that
+    are still to act, and the plan starts there. So the prediction works for every model.
+
+    Args:
+        settings: vehicle, horizon and solver.
+        trajectory: the one to follow.
+        make_model: makes the prediction model of the problem; only studies use another one.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        trajectory: Trajectory,
+        make_model: Callable[[Settings], Model] = coefficient_model,
+    ) -> None:
+        self._settings = settings
+        self._trajectory = trajectory
+        self._predictor = Predictor(settings)
+        self._horizon = RecedingHorizon(settings, make_model)
+        self._ahead = settings.lead + settings.dead_time
+
+    def warm_up(self) -> None:
+        """Solve a few times and discard the answers."""
+        level = Vehicle(0.0, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0))
+        hover = Input(0.0, 0.0, 0.0, 0.0, self._settings.gravity)
+        for number in range(_WARM_UP):
+            self.answer(Request(number, level, 0.0, Start((0.0, 0.0, 0.0)), (hover,)))
+        self.forget()
+
+    def forget(self) -> None:
+        """Start the next solve from its reference instead of the previous plan."""
+        self._horizon.forget()
+
+    def answer(self, request: Request) -> Answer:
+        """Solve for the time at which the answer is used."""
+        began = perf_counter()
+        use = request.vehicle.time + self._settings.lead
+        try:
+            plan = self._plan(request)
+        except (InvalidQuaternionError, TiltedTooFarError):
+            self.forget()
+            return _no_answer(request, Status.TILTED_TOO_FAR, use, perf_counter() - began)
+        if not plan.solved:
+            return _no_answer(request, Status.FAILED, use, perf_counter() - began)
+        return Answer(
+            request.number,
+            Status.SOLVED,
+            monotonic(),
+            use,
+            plan.north,
+            plan.east,
+            wrap_angle(plan.heading),
+            plan.thrust,
+            perf_counter() - began,
+            plan.seconds,
+            plan.iterations,
+        )
+
+    def _plan(self, request: Request) -> Plan:
+        vehicle = request.vehicle
+        until = vehicle.time + self._ahead
+        motion = self._predictor.predict(vehicle, request.inputs, until)
+        conditions = Conditions(*vehicle.disturbance, *vehicle.drag)
+        nodes = self._nodes(request, motion.heading)
+        return self._horizon.solve(until, motion, nodes, conditions)
+
+    def _nodes(self, request: Request, heading: float) -> list[Node]:
+        """The reference over the horizon; its headings are unwrapped from the vehicle's."""
+        settings, nodes = self._settings, list[Node]()
+        for k in range(settings.steps + 1):
+            sample = self._trajectory.at(request.at + self._ahead + k * settings.step)
+            node = node_of(
+                sample,
+                request.start,
+                heading,
+                request.vehicle.drag,
+                settings.gravity,
+                request.vehicle.disturbance,
+            )
+            nodes.append(node)
+            heading = node.heading
+        return nodes
+
+
+def _no_answer(request: Request, status: Status, use: float, seconds: float) -> Answer:
+    return Answer(request.number, status, monotonic(), use, 0.0, 0.0, 0.0, 0.0, seconds, 0.0, 0)
 
 
 def main() -> None:
     """Answer one request after the other."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is meant for the flight, which closes us
-    asked = socket.socket(fileno=int(sys.argv[1]))
+    connection = socket.socket(fileno=int(sys.argv[1]))
     settings, trajectory = pickle.load(sys.stdin.buffer)  # from our own parent
     os.nice(settings.niceness)
-    planning = Planning(settings, trajectory)
-    planning.warm_up()
+    worker = Worker(settings, trajectory)
+    worker.warm_up()
     gc.freeze()
-    gc.disable()  # nothing here makes cycles, and a collection in a solve would make it late
+    gc.disable()  # nothing here makes reference cycles, and a collection would delay an answer
     try:
-        asked.send(READY)
-        while message := _newest(asked):
-            asked.send(pack_answer(planning.answer(unpack_request(message))))
+        connection.send(READY)
+        while message := _newest_request(connection):
+            connection.send(pack_answer(worker.answer(unpack_request(message))))
     except (BrokenPipeError, ConnectionResetError):
         pass  # the flight is over
 
 
-def _newest(asked: socket.socket) -> bytes:
-    """The last request there is, waiting for one; empty once the other end is closed."""
-    message = asked.recv(_LARGEST_MESSAGE)
+def _newest_request(connection: socket.socket) -> bytes:
+    """Wait for a request and skip to the newest; empty once the other end is closed."""
+    message = connection.recv(_LARGEST_MESSAGE)
     while message:
         try:
-            newer = asked.recv(_LARGEST_MESSAGE, socket.MSG_DONTWAIT)
+            newer = connection.recv(_LARGEST_MESSAGE, socket.MSG_DONTWAIT)
         except BlockingIOError:
             break
         message = newer

@@ -6,8 +6,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from companion.bounded_file import FileRefusedError, read_text
 from companion.drag import Drag
+from companion.files.bounded_file import FileRefusedError, read_text
 
 _MOST_BYTES = 10_000
 _MOST_FILES = 1000

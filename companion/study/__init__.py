@@ -1,5 +1,5 @@
-"""The paper's experiments, and a user's own: responses, figures, tables and one page.
+"""The paper's experiments and our own: responses, figures, tables, and one page with all of them.
 
-Everything here flies the planners of `companion.attitude` as they fly a vehicle; nothing is a copy
-of a law. The room needs the extra `study`; `companion.study.needs` says so before it is imported.
+The studies fly the planners of `companion.attitude`, the same code that flies a vehicle. They need
+the extra `study`; `registry` lists them and checks that the extra is installed.
 """

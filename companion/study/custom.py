@@ -1,13 +1,16 @@
-"""The same comparison on a case of one's own."""
+"""The study `custom`: the methods compared on a step of the user's own."""
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude.reference import FirstOrderReference
-from companion.study.case import Case
+from companion.files import yaml_file
+from companion.study.custom_case import Case
 from companion.study.drawing import (
     draw,
     draw_plane,
@@ -27,18 +30,22 @@ from companion.study.measures import (
     time_to,
 )
 from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
-from companion.study.outcome import Outcome, Tick
+from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
-from companion.study.table import Cell, Table
 
 
-def parts(case: Case) -> int:
-    """How many times `run` ticks."""
-    return len(case.methods) * len(case.rates_hz)
+def prepare(case_file: Path) -> Job:
+    """Read a case, ready to be flown.
+
+    Raises:
+        ConfigError: the file cannot be read, or the case does not make sense.
+    """
+    case = yaml_file.load(case_file, Case)
+    return Job(partial(_run, case), len(case.methods) * len(case.rates_hz))
 
 
-def run(case: Case, tick: Tick) -> Outcome:
-    """Fly the case with all of its methods at all of its rates."""
+def _run(case: Case, tick: Tick) -> Outcome:
+    """Fly the case with each of its methods at each of its rates."""
     flown: dict[tuple[Method, float], Response] = {}
     for hz in case.rates_hz:
         for method in (m for name, m in BY_PLANNER.items() if name in case.methods):

@@ -1,8 +1,23 @@
-"""How good is a response: the numbers that stand in the tables, one per heading."""
+"""How good a response is: the numbers in the tables, and the second-order model fitted to it."""
+
+from math import exp, log
+from typing import NamedTuple
 
 import numpy as np
 
-from companion.study.step import Floats, Response
+from companion.attitude import Coefficients
+from companion.attitude.reference import SecondOrderReference
+from companion.fitting import minimise
+from companion.study.step import Floats, Response, Step
+
+FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
+"""Titles of `SecondOrderFit.cells`."""
+
+_THINNING = 10
+_REST = Coefficients(0.0, 0.0)
+_LOWEST = np.array([log(0.1), log(0.01), 0.0])
+_HIGHEST = np.array([log(1000.0), log(100.0), 0.5])
+"""Bounds of log ω (rad/s), log ζ and the dead time (s) in the fit."""
 
 
 def deviation(response: Response, reference: Floats) -> Floats:
@@ -30,7 +45,7 @@ def cross_track(response: Response) -> Floats:
 
 
 def time_to(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) time in s after which no more than `share` of the step is left; inf if never."""
+    """(headings,) s until no more than `share` of the step is left for good; inf if never."""
     start, target = np.array(response.step.start), np.array(response.step.target)
     left = response.coefficients - target[:, None]
     beyond = np.hypot(left[:, 0], left[:, 1]) > share * np.hypot(*(target - start))
@@ -46,7 +61,7 @@ def largest_tilt_rate(response: Response) -> float:
 
 
 def heading_effect(response: Response) -> float:
-    """Largest difference between the paths at any two headings: 0 where heading does not matter."""
+    """Largest difference between the paths at any two headings; 0 if heading has no effect."""
     c = response.coefficients
     return float((c.max(axis=2) - c.min(axis=2)).max())
 
@@ -54,7 +69,51 @@ def heading_effect(response: Response) -> float:
 def best_and_worst(values: Floats) -> tuple[int, int]:
     """Indices of the least and the largest of (headings,) values.
 
-    Opposite headings are equal but for rounding: of those the first counts.
+    Opposite headings differ by rounding alone, so of equal values the first counts.
     """
     ranked = np.round(values, 9)
     return int(ranked.argmin()), int(ranked.argmax())
+
+
+class SecondOrderFit(NamedTuple):
+    """A second-order model with a dead time.
+
+    Attributes:
+        model: frequency ω and damping ζ.
+        dead_time: the model begins to move this long after the step, s.
+    """
+
+    model: SecondOrderReference
+    dead_time: float
+
+    @property
+    def cells(self) -> tuple[float, float, float]:
+        """The cells of a table under `FIT_COLUMNS`."""
+        return 1e3 * self.dead_time, self.model.frequency, self.model.damping
+
+
+def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
+    """(n, 2) coefficients of the model, from rest, at the times (n,) in s after the step."""
+    moving = np.maximum(time - fit.dead_time, 0.0)
+    return np.array([fit.model.after(step.start, _REST, step.target, float(t))[0] for t in moving])
+
+
+def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
+    """Least squares over frequency, damping and dead time.
+
+    Args:
+        step: what was flown.
+        path: (samples + 1, 2) coefficients.
+    """
+    time, measured = step.time[::_THINNING], path[::_THINNING]
+
+    def residual(unknown: Floats) -> tuple[Floats, Floats]:
+        return np.empty(0), (measured - second_order_path(step, _fit(unknown), time)).ravel()
+
+    start = np.array([log(2.0 * step.gain), 0.0, 1.0 / step.rate_hz])
+    return _fit(minimise(residual, start, _LOWEST, _HIGHEST).unknown)
+
+
+def _fit(unknown: Floats) -> SecondOrderFit:
+    frequency, damping, dead_time = (float(value) for value in unknown)
+    return SecondOrderFit(SecondOrderReference(exp(frequency), exp(damping)), dead_time)

@@ -1,7 +1,7 @@
-"""`companion study`: which studies there are, and running them with a progress bar."""
+"""Runs studies with a progress bar, and writes their files and the page."""
 
-from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any, NamedTuple
@@ -17,90 +17,70 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from companion import yaml_file
-from companion.study import custom, fig2, fig3, fig4, fig5, kmax, lag, rates, track
-from companion.study.case import Case
+from companion.files.yaml_file import ConfigError
+from companion.study import registry
 from companion.study.drawing import STYLE
-from companion.study.names import TRACK
-from companion.study.outcome import Outcome, Tick
+from companion.study.outcome import Job
+from companion.study.registry import Study
 from companion.study.report import write_outcome, write_page
-from companion.yaml_file import ConfigError
 
 
-class _Study(NamedTuple):
-    run: Callable[[Tick], Outcome]
-    parts: int  # how many times it ticks
-
-
-_STUDIES = {
-    "fig2": _Study(fig2.run, fig2.PARTS),
-    "fig3": _Study(fig3.run, fig3.PARTS),
-    "fig4": _Study(fig4.run, fig4.PARTS),
-    "fig5": _Study(fig5.run, fig5.PARTS),
-    "rates": _Study(rates.run, rates.PARTS),
-    "kmax": _Study(kmax.run, kmax.PARTS),
-    "lag": _Study(lag.run, lag.PARTS),
-}
-
-
-class Studied(NamedTuple):
-    """What was written, and what came of it.
+class Written(NamedTuple):
+    """The results of a run.
 
     Attributes:
-        page: everything, in one file.
-        rows: those of all studies, for `--json`.
+        page: path of the page that shows all studies of the run.
+        rows: of all studies, for `--json`.
     """
 
     page: Path
     rows: list[dict[str, Any]]
 
 
-def run(name: str, case_file: Path | None, out: Path, console: Console) -> Studied:
-    """Run one study, `all` of them, or `custom` from a case file.
+def run(name: str, case_file: Path | None, out: Path, console: Console) -> Written:
+    """Run one study of the registry, or `all`.
 
     Raises:
-        ConfigError: `out` or the case cannot be used, or a case is missing or not asked for.
+        ConfigError: `out` or the case cannot be used, a case is missing, or the study takes none.
         OSError: a result cannot be written.
         VehicleStoppedError: the bundled vehicle ended before its flight did.
     """
-    chosen = _chosen(name, case_file)
-    page = _prepared(out, "study" if name == "all" else name)
+    jobs = {study.name: _job(study, case_file) for study in registry.chosen(name)}
+    page = _prepared(out, "study" if name == registry.ALL else name)
     outcomes = []
     with mpl.rc_context(), _progress(console) as progress:
-        mpl.rcdefaults()  # whatever matplotlibrc lies about, the same numbers give the same files
+        mpl.rcdefaults()  # the files must not depend on the user's matplotlibrc
         mpl.rcParams.update(STYLE)
-        total = sum(study.parts + 1 for study in chosen.values()) + 1
+        total = sum(job.parts + 1 for job in jobs.values()) + 1
         task = progress.add_task("", total=total, study="")
-        for key, study in chosen.items():
-            outcome = study.run(partial(_tick, progress, task, key))
+        for key, job in jobs.items():
+            outcome = job.run(partial(_tick, progress, task, key))
             write_outcome(outcome, out)
             progress.advance(task)
             outcomes.append(outcome)
         progress.update(task, description=page.name, study="")
         write_page(outcomes, page)
         progress.update(task, advance=1, description="done")
-    return Studied(page, [row for outcome in outcomes for row in outcome.rows])
+    return Written(page, [row for outcome in outcomes for row in outcome.rows])
 
 
-def _chosen(name: str, case_file: Path | None) -> dict[str, _Study]:
-    if name == "custom":
-        if case_file is None:
-            raise ConfigError("study custom needs a case: --case FILE")
-        case = yaml_file.load(case_file, Case)
-        return {name: _Study(partial(custom.run, case), custom.parts(case))}
-    if case_file is not None:
-        raise ConfigError(f"--case goes with study custom; study {name} has its own case")
-    if name == "nmpc":
-        from companion.study import nmpc  # noqa: PLC0415  needs an extra of its own
-
-        return {name: _Study(nmpc.run, nmpc.PARTS)}
-    if name == TRACK:
-        return {name: _Study(track.run, track.PARTS)}
-    return _STUDIES if name == "all" else {name: _STUDIES[name]}
+def _job(study: Study, case_file: Path | None) -> Job:
+    """Import a study, and give it its case if it takes one."""
+    if study.takes_case and case_file is None:
+        raise ConfigError(f"study {study.name} needs a case: --case FILE")
+    if case_file is not None and not study.takes_case:
+        raise ConfigError(
+            f"--case goes with study {registry.names_with_case()}; study {study.name} takes none"
+        )
+    module = import_module(study.module)
+    if study.takes_case:
+        job: Job = module.prepare(case_file)
+        return job
+    return Job(module.run, module.PARTS)
 
 
 def _prepared(out: Path, name: str) -> Path:
-    """Make the folder, and find out before the work whether it takes files."""
+    """Make the folder, and check before the work starts that files can be written there."""
     page = out / f"{name}.html"
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -109,7 +89,7 @@ def _prepared(out: Path, name: str) -> Path:
     except OSError as error:
         raise ConfigError(f"--out: cannot write to {out}: {error.strerror}") from error
     if page.is_dir():
-        raise ConfigError(f"--out: {page} is a folder; the page is to have that name")
+        raise ConfigError(f"--out: {page} is a folder, but the page needs that name")
     return page
 
 

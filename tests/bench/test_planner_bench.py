@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from companion import cli
 from companion.attitude import LAW_NAMES
 from companion.bench import planner
+from companion.cli.main import main
 
 ROWS = {"baseline", *LAW_NAMES}
 
@@ -40,14 +40,14 @@ def test_without_numba_the_batches_are_in_python_and_it_is_said(monkeypatch, cap
 @pytest.mark.slow
 def test_json_is_one_object_of_the_same_figures(capsys):
     pytest.importorskip("numba")
-    assert cli.main(["bench", "planner", "--json", "--seconds", "0.01"]) == 0
+    assert main(["bench", "planner", "--json", "--seconds", "0.01"]) == 0
     check(json.loads(capsys.readouterr().out), compiled=True)
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "soon"])
 def test_senseless_arguments_are_refused(seconds, capsys):
     with pytest.raises(SystemExit) as ending:
-        cli.main(["bench", "planner", "--seconds", seconds])
+        main(["bench", "planner", "--seconds", seconds])
     assert ending.value.code == 2
     assert "--seconds" in capsys.readouterr().err
 

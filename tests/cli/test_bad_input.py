@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from companion.cli import main
+from companion.cli.main import main
 from tests.flight.fly import free_port
 
 
@@ -171,11 +171,18 @@ def test_a_missing_extra_is_one_sentence(capsys, monkeypatch, module, extra, arg
     assert f"needs {module}; install it with: pip install 'mavlink-companion[{extra}]'" in err
 
 
-def test_a_backend_that_is_not_installed_is_named(capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("link: {backend: mavsdk}", "link.backend: mavsdk needs mavsdk"),
+        ("guidance: {kind: nmpc}\nvehicle: {lag_ms: 25.0}", "guidance.kind: nmpc needs casadi"),
+    ],
+)
+def test_a_key_whose_extra_is_not_installed_is_named(capsys, tmp_path, monkeypatch, text, words):
     monkeypatch.setattr(importlib.util, "find_spec", lambda *_: None)
-    code, _, err = run(capsys, "fly", "--config", config(tmp_path, "link: {backend: mavsdk}"))
+    code, _, err = run(capsys, "fly", "--config", config(tmp_path, text))
     assert code == 2
-    assert "link.backend: mavsdk needs mavsdk; install it with: pip install" in err
+    assert f"{words}; install it with: pip install" in err
 
 
 def test_lockstep_on_the_command_line_does_not_go_with_mavsdk(capsys, tmp_path):

@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import EndpointError
 from sitl_mock.__main__ import main as start_vehicle

@@ -12,12 +12,13 @@ from typing import ClassVar
 import pytest
 import yaml
 
-from companion import bounded_yaml
-from companion.bounded_yaml import MOST_BYTES, YamlError
-from companion.cli import main
-from companion.config import FORMER_KEYS, Config
-from companion.config_file import load
-from companion.yaml_file import ConfigError, Section, parse
+from companion.cli.main import main
+from companion.config import Config
+from companion.config.files import load
+from companion.config.root import FORMER_KEYS
+from companion.files import bounded_yaml
+from companion.files.bounded_yaml import MOST_BYTES, YamlError
+from companion.files.yaml_file import ConfigError, Section, parse
 from sitl_mock.config import errors as config_errors
 from sitl_mock.settings import load_settings
 

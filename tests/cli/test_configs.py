@@ -6,10 +6,10 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.config import Config
-from companion.config_file import json_schema, load
-from companion.config_sections import VehicleConfig
+from companion.config.files import json_schema, load
+from companion.config.sections import VehicleConfig
 from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from companion import demo
-from companion.cli import main
+from companion.cli.main import main
 from tests.flight.fly import QUICK_PARAMETERS, merged
 
 

@@ -12,11 +12,11 @@ import pytest
 import yaml
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.mavlink import lockstep
-from tests.doctor.patients import FAMILIES, config_file, configured, met, shipped_vehicle
 from tests.flight.fly import free_port
 from tests.mavlink.fakes import frames_of
+from tests.preflight.patients import FAMILIES, config_file, configured, met, shipped_vehicle
 
 WRONG = {
     "px4": {"COM_OF_LOSS_T": 5.0, "COM_OBL_RC_ACT": 7, "CBRK_SUPPLY_CHK": 894281},
@@ -202,8 +202,8 @@ def test_a_vehicle_that_answers_nothing_is_told_with_its_cause_first(
     capsys, tmp_path, monkeypatch, signed, armed, expected
 ):
     """One that signs and obeys only what is signed times out; the hint is what mends it."""
-    monkeypatch.setattr("companion.mavlink.streams._RETRIES", 0)
-    monkeypatch.setattr("companion.mavlink.streams._TIMEOUT_S", 0.1)
+    monkeypatch.setattr("companion.vehicle.streams._RETRIES", 0)
+    monkeypatch.setattr("companion.vehicle.streams._TIMEOUT_S", 0.1)
     port = free_port()
     with Neighbour(port, beat(armed=armed), signed=signed):
         config = far_away(tmp_path, port)

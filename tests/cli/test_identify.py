@@ -13,9 +13,9 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from companion.cli import main
-from companion.commands import identify
-from companion.config_file import load
+from companion.cli import identify
+from companion.cli.main import main
+from companion.config.files import load
 from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
 from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
 

@@ -5,10 +5,10 @@ import json
 import pytest
 import yaml
 
-from companion.cli import main
+from companion.cli.main import main
 from companion.config import Config
-from companion.config_file import changed, json_schema, load
-from companion.yaml_file import ConfigError
+from companion.config.files import changed, json_schema, load
+from companion.files.yaml_file import ConfigError
 
 
 @pytest.fixture

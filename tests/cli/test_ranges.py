@@ -3,9 +3,9 @@
 import pytest
 
 from companion.config import Config
-from companion.doctor.undo import Undo
-from companion.study.case import Case
-from companion.yaml_file import ConfigError, parse
+from companion.files.yaml_file import ConfigError, parse
+from companion.preflight.undo import Undo
+from companion.study.custom_case import Case
 
 _BELOW = {"minimum", "exclusiveMinimum"}
 _ABOVE = {"maximum", "exclusiveMaximum"}

@@ -6,13 +6,13 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from companion import bounded_yaml
 from companion.config import Config
 from companion.demo import free_port
+from companion.files import bounded_yaml
+from companion.files.yaml_file import parse
 from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
-from companion.yaml_file import parse
 from tests.flight import mock_start
 
 lockstep._SPIN_S = 0.0  # the cores are busy with other flights

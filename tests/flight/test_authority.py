@@ -6,9 +6,8 @@ from math import inf
 import pytest
 from pymavlink import mavutil
 
-from companion.flight import departure, procedures
-from companion.flight.ending import Exit
-from companion.flight.guide import Guide
+from companion.control.guidance_loop import Guide
+from companion.flight import control_phases, takeoff
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
 from companion.mavlink.command import (
@@ -19,10 +18,11 @@ from companion.mavlink.command import (
 )
 from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused
-from companion.mavlink.link import Link
-from companion.mavlink.px4 import Px4
-from companion.mavlink.records import Landed
-from companion.mavlink.state import VehicleState
+from companion.safety.ending import Exit
+from companion.vehicle.link import Link
+from companion.vehicle.px4.autopilot import Px4
+from companion.vehicle.records import Landed
+from companion.vehicle.state import VehicleState
 from tests.flight.fly import fly, mock_vehicle, session_for
 from tests.flight.others import When, station
 
@@ -279,14 +279,14 @@ def test_a_vehicle_that_does_not_say_it_stands_is_not_armed(tmp_path):
 
 
 def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
-    over, held = departure._Climb.over, []
+    over, held = takeoff._Climb.over, []
 
     def holding(climb):
         if climb._rig.link.state.height > 3.3 and not held:
             held.append(station(mock, SET_MODE, 1, 4, 3))
         return over(climb)
 
-    monkeypatch.setattr(departure._Climb, "over", holding)
+    monkeypatch.setattr(takeoff._Climb, "over", holding)
     with mock_vehicle(tmp_path, parameters={"MPC_TKO_SPEED": 1.0}) as mock:
         summary = fly(mock, tmp_path / "log", flight={"takeoff_height_m": 5.0})
         assert mock.state()["mode"] == "LOITER"
@@ -296,14 +296,14 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
 
 def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path, monkeypatch):
     """The newest heartbeat is a tenth of a second old, and we know better only if we ask."""
-    hand_back = procedures.hand_back
+    hand_back = control_phases.hand_back
 
     async def taking(rig):
         mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
         await asyncio.sleep(0.01)  # faults begin with the vehicle's next step
         await hand_back(rig)
 
-    monkeypatch.setattr(procedures, "hand_back", taking)
+    monkeypatch.setattr(control_phases, "hand_back", taking)
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert mock.state()["mode"] == "POSCTL"

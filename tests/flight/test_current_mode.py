@@ -8,7 +8,7 @@ import pytest
 
 from companion.flight.phases import Phase
 from companion.flight.watch import Watch
-from companion.mavlink.roles import Role
+from companion.vehicle.roles import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When, station
 

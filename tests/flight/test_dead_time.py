@@ -7,7 +7,7 @@ import pytest
 from pymavlink import mavutil
 
 from companion.attitude import BodyRates
-from companion.config_file import load
+from companion.config.files import load
 from companion.flight import assembly, dead_time_watch
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.recording.trace import FlightTrace

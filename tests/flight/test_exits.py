@@ -18,17 +18,10 @@ import pytest
 import yaml
 from pymavlink import mavutil
 
-from companion.commands.signals import HOW_TO_LEAVE, LEAVE_AFTER
-from companion.flight.guide import Guide
+from companion.cli.signals import HOW_TO_LEAVE, LEAVE_AFTER
+from companion.control.guidance_loop import Guide
 from companion.mavlink import lockstep
-from tests.flight.fly import (
-    OTHER_VEHICLES,
-    QUICK_FLIGHT,
-    fly,
-    merged,
-    mock_vehicle,
-    session_for,
-)
+from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, fly, merged, mock_vehicle, session_for
 from tests.flight.others import When
 
 

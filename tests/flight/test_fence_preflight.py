@@ -6,17 +6,17 @@ import yaml
 
 from companion.config import Config
 from companion.drag import Drag
+from companion.files.yaml_file import ConfigError, parse
 from companion.flight.fence_check import MARGIN, FenceCheck
-from companion.flight.programmes import programme, require_inside
-from companion.flight.safety.fence import braking
-from companion.flight.safety.snapshot import Motion as Now
-from companion.flight.safety.snapshot import Snapshot
-from companion.flight.safety.table import fence_of
+from companion.flight.maneuvers import programme, require_inside
 from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predicted
-from companion.trajectory.demand import Motion
-from companion.yaml_file import ConfigError, parse
+from companion.guidance.trajectory.demand import Motion
+from companion.safety.fence import braking
+from companion.safety.snapshot import Motion as Now
+from companion.safety.snapshot import Snapshot
+from companion.safety.table import fence_of
 from tests.flight.fly import fly, merged, mock_vehicle
 
 START = Pose((0.0, 0.0, 0.0), 0.0)

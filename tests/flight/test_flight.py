@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.ending import Exit
 from companion.flight.flight import Flight
 from companion.flight.observer import Silent
 from companion.flight.phases import Phase
 from companion.flight.same_vehicle import ChecksVoid
+from companion.safety.ending import Exit
 
 
 class Bench:

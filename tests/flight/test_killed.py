@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import pytest
 
-from companion.doctor.offboard_loss import worst_reach
-from companion.flight.programmes import programme
+from companion.flight.maneuvers import programme
 from companion.mavlink import lockstep
+from companion.preflight.offboard_loss import worst_reach
 from tests.flight.fly import mock_vehicle, session_for
 from tests.flight.others import When
 

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.control_phases import _require_landing
 from companion.flight.left_in_offboard import leave_offboard
-from companion.flight.procedures import _require_landing
-from companion.mavlink.ardupilot import ArduPilot
 from companion.mavlink.errors import CommandRefused
-from companion.mavlink.px4 import Px4
-from companion.mavlink.roles import Role
+from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.ardupilot.autopilot import ArduPilot
+from companion.vehicle.px4.autopilot import Px4
+from companion.vehicle.roles import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 

@@ -7,31 +7,32 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.ending import Exit, FlightEnded
+from companion.flight.mode_roles import in_roles
 from companion.flight.orders import enter, order
-from companion.flight.roles import in_roles
 from companion.mavlink.command import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout
-from companion.mavlink.roles import Role
+from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.roles import Role
 
 LAND = Command(21)
 LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
 
 
-FLIGHT = Path(__file__).parents[2] / "companion" / "flight"
+COMPANION = Path(__file__).parents[2] / "companion"
 
 
 def test_every_command_of_a_flight_goes_by_orders():
-    """`rig.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
+    """`context.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
     senders = {
         path.name
-        for path in FLIGHT.rglob("*.py")
+        for room in ("control", "safety", "flight")
+        for path in (COMPANION / room).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Attribute)
         and ast.unparse(node.func).endswith("link.command")
     }
-    assert senders == {"orders.py", "rig.py"}
+    assert senders == {"orders.py", "context.py"}
 
 
 class Vehicle:

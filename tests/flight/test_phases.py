@@ -2,12 +2,12 @@
 
 import pytest
 
-from companion.config_sections import FlightConfig
-from companion.flight.ending import Exit, FlightEnded
+from companion.config.sections import FlightConfig
+from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import exit_phases, flight_phases, ground_phases
-from companion.flight.roles import require_role, roles_of
-from companion.mavlink.families import FAMILIES, family_for
-from companion.mavlink.roles import Role
+from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.registry import FAMILIES, family_for
+from companion.vehicle.roles import Role
 
 QUADROTOR = 2
 PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, QUADROTOR)

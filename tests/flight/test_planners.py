@@ -18,7 +18,7 @@ from companion.attitude import (
     attitude,
     make_planner,
 )
-from companion.config_file import load
+from companion.config.files import load
 from companion.flight import assembly
 from companion.mavlink import loop
 from tests.flight.fly import fly, mock_vehicle, session_for

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from companion.attitude import BodyRates, Target
-from companion.flight.follow import Follow
-from companion.flight.predictive import Following, Predictive
+from companion.control.predictive import Following, Predictive
 from companion.guidance import GRAVITY, Pose
+from companion.guidance.follow import Follow
+from companion.guidance.trajectory import Laps, circle
 from companion.mavlink import lockstep
 from companion.nmpc import Answer, Status, Trouble, Vehicle
-from companion.trajectory import Laps, circle
 from tests.flight.fly import mock_vehicle, session_for
 from tests.flight.test_tracking import following
 

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.doctor.evidence import Identity
-from companion.flight.ending import Exit, FlightEnded
 from companion.flight.same_vehicle import ChecksVoid, SameVehicle
+from companion.preflight.evidence import Identity
+from companion.safety.ending import Exit, FlightEnded
 
 
 class Link(SimpleNamespace):

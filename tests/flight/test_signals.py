@@ -11,9 +11,9 @@ import sys
 import pytest
 import yaml
 
-from companion.commands.signals import HOW_TO_LEAVE, Signals, fly_interruptibly
+from companion.cli.signals import HOW_TO_LEAVE, Signals, fly_interruptibly
 from companion.mavlink import lockstep
-from companion.mavlink.link import Link
+from companion.vehicle.link import Link
 from tests.flight.fly import QUICK_FLIGHT, merged, mock_vehicle, session_for
 from tests.flight.others import When
 

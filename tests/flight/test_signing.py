@@ -6,15 +6,12 @@ from pathlib import Path
 import pytest
 
 from companion.demo import wire_like
-from companion.mavlink import (
-    Link,
-    LinkSettings,
-    LinkTimeout,
-    Signing,
-    key_from_passphrase_file,
-    lockstep,
-)
+from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import LinkTimeout
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.signing import Signing, key_from_passphrase_file
+from companion.vehicle.link import Link
 from tests.flight.fly import mock_vehicle, session_for
 
 

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from companion.flight.hover_learning import HoverLearning
+from companion.control.hover_learning import HoverLearning
 from companion.guidance import HoverThrust, ThrustSettings
-from companion.mavlink.records import Battery, LocalPosition, ToldThrust
+from companion.vehicle.records import Battery, LocalPosition, ToldThrust
 from tests.flight.fly import fly, mock_vehicle
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)

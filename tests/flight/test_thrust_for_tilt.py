@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from companion.config import Config
+from companion.files.yaml_file import ConfigError, parse
 from companion.guidance import GRAVITY
 from companion.guidance.thrust import FOR_TILT, largest_tilt
-from companion.yaml_file import ConfigError, parse
 from tests.flight.fly import fly, merged, mock_vehicle
 
 HEAVY = {"thrust_slope_m_s2": 12.95, "thrust_offset_m_s2": 0.22}

@@ -8,11 +8,11 @@ import yaml
 
 from companion.attitude.representation import wrap_angle
 from companion.config import Config
-from companion.flight import programmes
-from companion.flight.follow import Follow
+from companion.files.yaml_file import ConfigError, parse
+from companion.flight import maneuvers as programmes
 from companion.guidance import Pose
-from companion.trajectory import Laps, gerono_eight
-from companion.yaml_file import ConfigError, parse
+from companion.guidance.follow import Follow
+from companion.guidance.trajectory import Laps, gerono_eight
 from tests.flight.fly import fly, merged, mock_vehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -2,15 +2,15 @@
 
 import pytest
 
-from companion import bounded_yaml
 from companion.config import Config
-from companion.doctor.evidence import Identity
 from companion.drag import Drag
-from companion.flight.programmes import programme
+from companion.files import bounded_yaml
+from companion.files.yaml_file import ConfigError, parse
+from companion.flight.maneuvers import programme
 from companion.flight.vehicle_memory import VehicleMemory
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
+from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
-from companion.yaml_file import ConfigError, parse
 from tests.flight.fly import fly, mock_vehicle
 
 BUNDLED = f"{5283920058631409231:016x}"

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from companion import attitude
 from companion.attitude import BodyRates
-from companion.cli import main
+from companion.cli.main import main
 from companion.config import Config
-from companion.config_file import load
+from companion.config.files import load
+from companion.control.outer_loop import predictive_settings
+from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import assemble, link_settings, planner, rate_limits
+from companion.flight.maneuvers import programme
 from companion.flight.observer import Silent
-from companion.flight.outer_loop import predictive_settings
-from companion.flight.programmes import programme
-from companion.mavlink.link import Link
-from companion.yaml_file import ConfigError
+from companion.vehicle.link import Link
 from tests.fuzz import trajectories
 from tests.fuzz.target import Case, Target
 from tests.fuzz.texts import PATHS, SHIPPED, as_text, folder_of, mutated, numbers, scalars
@@ -42,7 +42,7 @@ def _check(case: Case) -> None:
         with (
             contextlib.redirect_stderr(errors),
             contextlib.redirect_stdout(io.StringIO()),
-            mock.patch("companion.commands.tools.check_mock"),  # a process of its own
+            mock.patch("companion.cli.tools.check_mock"),  # a process of its own
         ):
             code = main(["check-config", str(folder / "main.yaml")])
         said = errors.getvalue()

@@ -15,10 +15,10 @@ from pymavlink.generator.mavcrc import x25crc
 
 from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import Frame, FrameScanner
-from companion.mavlink.link import Link
-from companion.mavlink.samples import AttitudeSample
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing
+from companion.vehicle.link import Link
+from companion.vehicle.samples import AttitudeSample
 from tests.fuzz import virtual_time
 from tests.fuzz.target import Case, Target
 from tests.fuzz.wires import Wire

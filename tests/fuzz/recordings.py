@@ -13,9 +13,9 @@ from typing import Any
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from companion.cli import main
-from companion.doctor.undo import Undo
-from companion.yaml_file import ConfigError, load
+from companion.cli.main import main
+from companion.files.yaml_file import ConfigError, load
+from companion.preflight.undo import Undo
 from tests.fuzz.configuration import one_sentence
 from tests.fuzz.target import Case, Target
 from tests.fuzz.texts import folder_of, mutated, numbers, scalars

@@ -13,7 +13,7 @@ from unittest import mock
 
 from companion.config import Config
 from companion.flight.session import Session
-from companion.mavlink.link import Link
+from companion.vehicle.link import Link
 from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
 from tests.fuzz.family import ARDUPILOT, PX4

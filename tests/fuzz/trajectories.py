@@ -7,12 +7,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from companion import trajectory_file
-from companion.config import Config
-from companion.config_file import changed
-from companion.flight.programmes import programme
+from companion.config import Config, trajectory_file
+from companion.config.files import changed
+from companion.files.yaml_file import ConfigError
+from companion.flight.maneuvers import programme
 from companion.guidance import Pose
-from companion.yaml_file import ConfigError
 from tests.fuzz.target import Case, Target
 from tests.fuzz.texts import PATHS, SHIPPED, as_text, folder_of, mutated, numbers, scalars
 

@@ -7,11 +7,12 @@ from unittest.mock import patch
 import yaml
 
 from companion.config import Config
+from companion.files.yaml_file import parse
 from companion.flight.observer import Silent
 from companion.flight.session import Session
-from companion.mavlink import link, lockstep
-from companion.mavlink.vehicle_clock import VehicleClock
-from companion.yaml_file import parse
+from companion.mavlink import lockstep
+from companion.vehicle import link
+from companion.vehicle.clock import VehicleClock
 from tests.flight.fly import decline, merged
 from tests.hostile.autopilot import HostileAutopilot
 from tests.hostile.body import HOVER_THRUST

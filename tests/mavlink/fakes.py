@@ -9,7 +9,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink import Link, LinkSettings
+from companion.mavlink.settings import LinkSettings
+from companion.vehicle.link import Link
 
 PX4 = 12
 

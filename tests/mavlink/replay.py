@@ -17,15 +17,15 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SetpointEncoder
-from companion.mavlink.conversation import Conversation
 from companion.mavlink.errors import CommandRefused, CommandTimeout, UnknownParameter
-from companion.mavlink.inbox import Inbox
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.vehicle_clock import VehicleClock
+from companion.vehicle.client import Conversation
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.inbox import Inbox
+from companion.vehicle.state import VehicleState
 
 VEHICLE = (1, 1)
 STAMP, OVERHEAD, SIGNATURE, MAVLINK_2 = 8, 12, 13, 0xFD

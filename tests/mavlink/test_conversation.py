@@ -7,7 +7,8 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink import (
+from companion.mavlink.commands import command_name, result_name
+from companion.mavlink.errors import (
     CommandRefused,
     CommandTimeout,
     LinkLost,
@@ -17,8 +18,7 @@ from companion.mavlink import (
     UnknownMessage,
     UnknownParameter,
 )
-from companion.mavlink.commands import command_name, result_name
-from companion.mavlink.px4 import Px4
+from companion.vehicle.px4.autopilot import Px4
 from tests.mavlink.fakes import attitude, linked, until
 
 ARM = 400

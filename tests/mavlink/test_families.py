@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-from companion.mavlink import UnsupportedAutopilot, family_for
-from companion.mavlink.families import FAMILIES
-from companion.mavlink.readiness import Readiness
-from companion.mavlink.roles import Role
+from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
+from companion.vehicle.readiness import Readiness
+from companion.vehicle.registry import FAMILIES, family_for
+from companion.vehicle.roles import Role
 
 QUADROTOR, HEXAROTOR, FIXED_WING = 2, 13, 1
 PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, HEXAROTOR)

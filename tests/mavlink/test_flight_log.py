@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.identification import identify_vehicle
 from companion.mavlink.errors import LogError
-from companion.mavlink.flight_log import read_flight_log
+from companion.vehicle.flight_log import read_flight_log
 
 RECORDINGS = Path(__file__).parent / "recordings"
 PX4, ARDUPILOT = (12, 0x00060000), (3, 4)

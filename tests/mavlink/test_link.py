@@ -9,16 +9,16 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink import (
+from companion.mavlink.errors import (
     EndpointError,
-    Link,
     LinkError,
-    LinkSettings,
     LinkTimeout,
     NonFiniteSetpoint,
     NotConnected,
     UnsupportedAutopilot,
 )
+from companion.mavlink.settings import LinkSettings
+from companion.vehicle.link import Link
 from tests.mavlink.fakes import (
     FakeVehicle,
     attitude,

@@ -4,10 +4,10 @@ from math import inf, nan, radians
 
 import pytest
 
-from companion.mavlink.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from companion.mavlink.families import FAMILIES
-from companion.mavlink.parameter_rules import Setup, Verdict, judge
-from companion.mavlink.px4_parameters import PX4_PARAMETERS
+from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
+from companion.vehicle.parameter_rules import Setup, Verdict, judge
+from companion.vehicle.px4.parameters import PX4_PARAMETERS
+from companion.vehicle.registry import FAMILIES
 
 UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
 PX4_SETUP = Setup(

@@ -4,9 +4,9 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from companion.mavlink.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from companion.mavlink.parameter_survey import Patience, Survey, survey
-from companion.mavlink.px4_parameters import PX4_PARAMETERS
+from companion.preflight.parameter_survey import Patience, Survey, survey
+from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
+from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from tests.mavlink.fakes import linked
 
 OLD = {"SYSID_MYGCS": 255.0, "FS_OPTIONS": 16.0}

@@ -5,8 +5,8 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.px4_events import EventReader, event_id
 from companion.mavlink.texts import TextAssembler
+from companion.vehicle.px4.events import EventReader, event_id
 
 # Arguments as recorded (px4-flight-companion, px4-flight-gcs, px4-offboard-entry).
 RECORDED = [

@@ -7,18 +7,12 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink import (
-    Link,
-    LinkSettings,
-    LinkTimeout,
-    Signing,
-    SigningError,
-    key_from_hex,
-    key_from_passphrase_file,
-)
 from companion.mavlink.codec import CRC_EXTRA
+from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.signing import Verdict
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.signing import Signing, Verdict, key_from_hex, key_from_passphrase_file
+from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
 
 KEY = bytes(range(32))

@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink import Link, LinkSettings, Signing
 from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner, build_frame
-from companion.mavlink.signing import Verdict
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.signing import Signing, Verdict
 from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.stamp_judge import EPOCH_UNIX_S
 from companion.mavlink.stamp_keeper import StampKeeper
+from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, heartbeat, until
 
 KEY = bytes(range(32))

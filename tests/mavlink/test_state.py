@@ -8,10 +8,10 @@ from pymavlink.dialects.v20 import development
 
 from companion.mavlink.codec import decode
 from companion.mavlink.router import Router
-from companion.mavlink.state import VehicleState
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
-from companion.mavlink.vehicle_clock import VehicleClock
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.state import VehicleState
 from tests.mavlink.fakes import heartbeat
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.streams import StreamRate, set_rates
+from companion.vehicle.streams import StreamRate, set_rates
 
 WHOLE_MILLISECONDS = 1000
 DENIED, UNSUPPORTED = 2, 3

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.mavlink.vehicle_clock import Misfit, VehicleClock
+from companion.vehicle.clock import Misfit, VehicleClock
 
 RECORDINGS = Path(__file__).parent / "recordings"
 STALE = 0.1

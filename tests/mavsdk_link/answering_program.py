@@ -6,8 +6,8 @@ import sys
 import time
 
 from companion.attitude import BodyRates
-from companion.mavlink import LinkSettings
 from companion.mavlink import loop as link_loop
+from companion.mavlink.settings import LinkSettings
 from companion.mavsdk_link.link import MavsdkLink
 
 TROUBLES = {

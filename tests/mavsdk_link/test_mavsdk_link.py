@@ -12,8 +12,9 @@ import yaml
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink import EndpointError, InvalidSetpoint, LinkError, LinkSettings
 from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import EndpointError, InvalidSetpoint, LinkError
+from companion.mavlink.settings import LinkSettings
 from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
 
 pytest.importorskip("mavsdk")

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Coefficients, InvalidQuaternionError, attitude
 from companion.nmpc import Input, Settings, Vehicle
-from companion.nmpc.prediction import Predictor, ToppledError, motion_of
+from companion.nmpc.prediction import Predictor, TiltedTooFarError, motion_of
 from tests.nmpc import rigid
 
 SETTINGS = Settings(gravity=rigid.GRAVITY, dead_time=0.05, gain=4.0, lag=0.08, yaw_gain=1.5)
@@ -43,7 +43,7 @@ def late(time, x):
 
 
 def test_every_input_acts_one_dead_time_after_it_was_given():
-    found = Predictor(SETTINGS).ahead(VEHICLE, INPUTS, 10.07)
+    found = Predictor(SETTINGS).predict(VEHICLE, INPUTS, 10.07)
     start = motion_of(VEHICLE)
     exact = solve_ivp(late, (10.0, 10.07), start, rtol=1e-10, atol=1e-12, max_step=1e-3)
     assert found == pytest.approx(exact.y[:, -1], abs=2e-6)
@@ -66,7 +66,7 @@ def test_a_target_beyond_the_tilt_limit_acts_as_the_planner_shortens_it():
     settings = Settings(max_tilt=radians(30.0))
     level = VEHICLE._replace(q=(1.0, 0.0, 0.0, 0.0), body_rates=BodyRates(0.0, 0.0, 0.0))
     long, short = (
-        Predictor(settings).ahead(level, (Input(9.0, length, 0.0, 0.0, 9.8),), 10.3)
+        Predictor(settings).predict(level, (Input(9.0, length, 0.0, 0.0, 9.8),), 10.3)
         for length in (5.0, sin(radians(30.0)))
     )
     assert long == pytest.approx(short)
@@ -74,7 +74,7 @@ def test_a_target_beyond_the_tilt_limit_acts_as_the_planner_shortens_it():
 
 def test_without_inputs_the_attitude_is_taken_to_be_kept():
     still = VEHICLE._replace(body_rates=BodyRates(0.0, 0.0, 0.0))
-    found = Predictor(SETTINGS).ahead(still, (), 10.1)
+    found = Predictor(SETTINGS).predict(still, (), 10.1)
     assert (found.north, found.east, found.heading) == pytest.approx((0.2, -0.1, 0.4))
     assert found.v_d == pytest.approx(
         -0.5 + 0.1 * (0.2 + rigid.DRAG.per_velocity(3.2) * 0.5), abs=0.005
@@ -82,10 +82,10 @@ def test_without_inputs_the_attitude_is_taken_to_be_kept():
 
 
 def test_what_the_models_do_not_reach_is_refused():
-    with pytest.raises(ToppledError):
+    with pytest.raises(TiltedTooFarError):
         motion_of(VEHICLE._replace(q=(0.0, 1.0, 0.0, 0.0)))
     with pytest.raises(InvalidQuaternionError):
         motion_of(VEHICLE._replace(q=(1.0, 1.0, 0.0, 0.0)))
     tumbling = VEHICLE._replace(body_rates=BodyRates(25.0, 0.0, 0.0))
-    with pytest.raises(ToppledError):
-        Predictor(SETTINGS).ahead(tumbling, INPUTS, 10.1)
+    with pytest.raises(TiltedTooFarError):
+        Predictor(SETTINGS).predict(tumbling, INPUTS, 10.1)

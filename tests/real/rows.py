@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import common
 from tests.real.vehicle import Vehicle
 
 FROZEN_GUIDANCE = """
-from companion.flight.guide import Guide
+from companion.control.guidance_loop import Guide
 flown = Guide.step
 def freezing(guide):
     if guide.begun_at is None or guide._clock() < guide.begun_at + 5.0:

@@ -219,7 +219,7 @@ def started(vehicle, config: dict, folder: Path, command: str = "fly", prelude: 
     path.write_text(
         yaml.safe_dump(config | {"recording": {"directory": str(folder)}}, sort_keys=False)
     )
-    program = f"{prelude}\nfrom companion.cli import main\nraise SystemExit(main())"
+    program = f"{prelude}\nfrom companion.cli.main import main\nraise SystemExit(main())"
     process = subprocess.Popen(
         [sys.executable, "-c", program, command, "--config", str(path), "--json"],
         cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors.open("w"),

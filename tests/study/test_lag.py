@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from companion.attitude import Target, make_planner
-from companion.cli import main
-from companion.study.lag import figure, grid
+from companion.cli.main import main
+from companion.study.lag import flights
 from tests.attitude.independent import attitudes
 from tests.attitude.lag_plant import LagPlant, fly
 
@@ -26,10 +26,8 @@ DEAD_TIMES, LAGS, RATES = (0, 40, 80), (10, 25, 60), (50, 100, 250)
 def out(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lag")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(grid, "DEAD_TIMES_MS", DEAD_TIMES)
-        patch.setattr(grid, "LAGS_MS", LAGS)
-        patch.setattr(figure, "DEAD_TIMES_MS", DEAD_TIMES)
-        patch.setattr(figure, "LAGS_MS", LAGS)
+        patch.setattr(flights, "DEAD_TIMES_MS", DEAD_TIMES)
+        patch.setattr(flights, "LAGS_MS", LAGS)
         assert main(["study", "lag", "--out", str(folder)]) == 0
     return folder
 

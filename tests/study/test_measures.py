@@ -5,12 +5,14 @@ import pytest
 
 from companion.attitude import Coefficients
 from companion.attitude.reference import SecondOrderReference
-from companion.study.fit import SecondOrderFit, fit_second_order, second_order_path
 from companion.study.measures import (
+    SecondOrderFit,
     cross_track,
+    fit_second_order,
     heading_effect,
     largest_deviation,
     largest_tilt_rate,
+    second_order_path,
     time_to,
 )
 from companion.study.methods import BY_PLANNER, EXACT, planner_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from companion.attitude import Target
-from companion.cli import main
-from companion.study import runner
+from companion.cli.main import main
+from companion.study import registry
 from companion.study.nmpc import contest, exchange, findings
 from companion.study.nmpc.contest import CIRCLE, EIGHT, Flight
 from companion.study.nmpc.contestants import LOOKS, MODELS, PAPERS, RATE_HZ, Contestant
@@ -189,7 +189,7 @@ def test_a_verdict_is_made_of_the_numbers(words, flown, counts, timed, holds):
 
 
 def test_the_studies_of_every_machine_go_without_it(tmp_path, monkeypatch, capsys):
-    assert "nmpc" not in runner._chosen("all", None)
+    assert "nmpc" not in [study.name for study in registry.chosen("all")]
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "casadi" else found(name)

@@ -12,14 +12,23 @@ import pytest
 import yaml
 from rich.console import Console
 
-from companion.cli import main
-from companion.study import fig2, fig3, fig4, fig5, runner
-from companion.study.case import Case
-from companion.study.names import PAPER_STUDIES
-from companion.yaml_file import ConfigError
+from companion.cli.main import main
+from companion.files.yaml_file import ConfigError
+from companion.study import registry, runner
+from companion.study.custom_case import Case
+from companion.study.paper import fig2, fig3, fig4, fig5_flights, kmax, rates
+from companion.study.registry import STUDIES
 
 ROOT = Path(__file__).parents[2]
-PAPER = {name: runner._STUDIES[name] for name in PAPER_STUDIES}
+PARTS = {
+    "fig2": fig2.PARTS,
+    "fig3": fig3.PARTS,
+    "fig4": fig4.PARTS,
+    "fig5": fig5_flights.PARTS,
+    "rates": rates.PARTS,
+    "kmax": kmax.PARTS,
+}
+"""The studies of the paper, and how often each should tick."""
 CASE = ROOT / "configs" / "study-case.yaml"
 EIGHT = tuple(k * math.pi / 4.0 for k in range(-3, 5))
 """Headings, best and worst of Euler angles among them; figure 3 alone flies all 72."""
@@ -38,11 +47,12 @@ def results(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "_tick", counting)
-        patch.setattr(runner, "_STUDIES", PAPER)
+        patch.setattr(registry, "STUDIES", {name: STUDIES[name] for name in PARTS})
         patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT))
         patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=1.0))
         patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
-        patch.setattr(fig5, "STEP", replace(fig5.STEP, headings=EIGHT[3:6:2], seconds=1.5))
+        step = replace(fig5_flights.STEP, headings=EIGHT[3:6:2], seconds=1.5)
+        patch.setattr(fig5_flights, "STEP", step)
         page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
 
@@ -127,7 +137,7 @@ def test_a_slow_inner_loop_takes_the_straight_line_from_the_proposed_method(resu
 def test_every_study_writes_its_figure_and_its_tables(results):
     out, page, _ = results
     names = {path.name for path in out.iterdir()}
-    for study in PAPER_STUDIES:
+    for study in PARTS:
         assert {f"{study}.{ending}" for ending in ("svg", "png", "csv", "md")} <= names
         assert (out / f"{study}.png").read_bytes().startswith(b"\x89PNG")
         assert f'id="{study}"' in page.read_text()
@@ -150,7 +160,7 @@ def test_the_page_stands_alone_and_states_what_did_not_hold(results):
 
 
 def test_the_progress_bar_ends_full(results):
-    assert dict(results[2]) == {name: study.parts for name, study in PAPER.items()}
+    assert dict(results[2]) == PARTS
 
 
 def test_the_same_study_gives_the_same_files(results, tmp_path):

@@ -17,12 +17,12 @@ import yaml
 
 from companion import demo
 from companion.attitude import PLANNER_NAMES
-from companion.cli import main
+from companion.cli.main import main
+from companion.files.yaml_file import ConfigError
 from companion.study.track import fleet, flight, study
 from companion.study.track.findings import find
 from companion.study.track.flight import Off, Tracked
 from companion.study.track.task import WINDY, Course, Task, tasks
-from companion.yaml_file import ConfigError
 
 OURS = "model-following"
 BRIEF = Course("figure-eight", 4.0, 1.0)
@@ -224,7 +224,7 @@ def test_json_goes_with_this_study_alone(tmp_path, capsys):
 
 SHORT = """
 import sys
-from companion.cli import main
+from companion.cli.main import main
 from companion.study.track import study, task
 arcs = [task.Task(task.Course(task.CIRCLE, 2.0, 0.1), name) for name in task.PLANNER_NAMES]
 study.tasks = lambda: arcs

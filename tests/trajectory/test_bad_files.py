@@ -9,18 +9,18 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from companion import bounded_file
-from companion.bounded_file import FileRefusedError, read_text
+from companion.config.trajectory_file import load
 from companion.drag import Drag
-from companion.trajectory import Envelope, csv_file, curves, slow_down, violations
-from companion.trajectory.csv_file import table
-from companion.trajectory.curves import MOST_LOOKS
-from companion.trajectory.from_samples import SampleOptions, from_samples
-from companion.trajectory.sample import TrajectoryError
-from companion.trajectory_file import load
-from companion.yaml_file import ConfigError
+from companion.files import bounded_file
+from companion.files.bounded_file import FileRefusedError, read_text
+from companion.files.yaml_file import ConfigError
+from companion.guidance.trajectory import Envelope, csv_file, curves, slow_down, violations
+from companion.guidance.trajectory.csv_file import table
+from companion.guidance.trajectory.curves import MOST_LOOKS
+from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
+from companion.guidance.trajectory.sample import TrajectoryError
 
-fitted = importlib.import_module("companion.trajectory.from_samples")
+fitted = importlib.import_module("companion.guidance.trajectory.from_samples")
 """The module; the package has a function of this name."""
 
 ENVELOPE = Envelope(1.0, 2.0, 1.0, 1.0, 20.0, 2.0, 1.0, 15.0, drag=Drag(0.5))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.drag import Drag
-from companion.trajectory import (
+from companion.guidance.trajectory import (
     Envelope,
     Hover,
     Laps,
@@ -22,10 +22,10 @@ from companion.trajectory import (
     violations,
     waypoints,
 )
-from companion.trajectory.csv_file import Table
-from companion.trajectory.curves import MOST_LOOKS, PATH_STEP
-from companion.trajectory.demand import demand, sampled
-from companion.trajectory.from_samples import SampleOptions, from_samples
+from companion.guidance.trajectory.csv_file import Table
+from companion.guidance.trajectory.curves import MOST_LOOKS, PATH_STEP
+from companion.guidance.trajectory.demand import demand, sampled
+from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
 from tests.trajectory.finite_differences import evenly
 
 DRAG, G = Drag(0.6), 9.80665

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.drag import NO_DRAG, Drag
-from companion.trajectory import (
+from companion.guidance.trajectory import (
     Envelope,
     Hover,
     Laps,
@@ -21,7 +21,7 @@ from companion.trajectory import (
     violations,
     waypoints,
 )
-from companion.trajectory.demand import demand, sampled
+from companion.guidance.trajectory.demand import demand, sampled
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,

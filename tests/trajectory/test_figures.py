@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.trajectory import (
+from companion.guidance.trajectory import (
     Hover,
     Laps,
     TrajectoryError,

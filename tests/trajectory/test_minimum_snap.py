@@ -5,8 +5,13 @@ import pytest
 from numpy.polynomial import Polynomial
 from scipy.linalg import null_space
 
-from companion.trajectory.minimum_snap import Fixed, Observations, minimum_snap
-from companion.trajectory.septic_spline import FROM_ENDS, ORDER, SepticSpline, derivative_rows
+from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
+from companion.guidance.trajectory.septic_spline import (
+    FROM_ENDS,
+    ORDER,
+    SepticSpline,
+    derivative_rows,
+)
 
 
 def test_rest_to_rest_is_the_septic_of_the_literature():

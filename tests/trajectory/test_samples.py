@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from companion.trajectory import (
+from companion.guidance.trajectory import (
     Frame,
     HeadingFrom,
     Laps,
@@ -17,7 +17,7 @@ from companion.trajectory import (
     gerono_eight,
     read_csv,
 )
-from companion.trajectory.csv_file import table
+from companion.guidance.trajectory.csv_file import table
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,

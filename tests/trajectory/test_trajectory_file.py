@@ -10,10 +10,10 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
+from companion.config.trajectory_file import TrajectoryFile, load
 from companion.drag import Drag
-from companion.trajectory.demand import demand, sampled
-from companion.trajectory_file import TrajectoryFile, load
-from companion.yaml_file import ConfigError
+from companion.files.yaml_file import ConfigError
+from companion.guidance.trajectory.demand import demand, sampled
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,

@@ -1,40 +1,235 @@
-"""The study put together: what is flown, and the page's section made of it."""
+"""The study `lag`: what is flown, its tables, and its section of the page."""
 
-from companion.study.lag import case, complete, grid
+from itertools import product
+from typing import NamedTuple
+
 from companion.study.lag.figure import CAPTION, draw_figure
 from companion.study.lag.findings import find
-from companion.study.outcome import Outcome, Tick
+from companion.study.lag.flights import (
+    COMPLETE_HZ,
+    DEAD_TIMES_MS,
+    EXAMPLE_ERRORS_HZ,
+    EXAMPLE_LOOP,
+    FINE_ERRORS,
+    LAGS_MS,
+    METHODS,
+    RATES_HZ,
+    Cell,
+    Complete,
+    Example,
+    Grid,
+    Score,
+    TimesError,
+    fly_complete,
+    fly_example,
+    fly_grid,
+    in_percent,
+    score,
+)
+from companion.study.measures import (
+    FIT_COLUMNS,
+    SecondOrderFit,
+    fit_second_order,
+    largest_deviation,
+    largest_tilt_rate,
+    second_order_path,
+)
+from companion.study.methods import Method
+from companion.study.outcome import Cell as TableCell
+from companion.study.outcome import Outcome, Table, Tick
+from companion.study.step import Response
 
-PARTS = grid.PARTS + 1 + complete.PARTS
+PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
+
+_SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
+
+
+class _Fitted(NamedTuple):
+    """The second-order model fitted to a response."""
+
+    fit: SecondOrderFit
+    deviation: float  # largest, of the response from the model
 
 
 def run(tick: Tick) -> Outcome:
-    """Fly the step of figure 2 over dead times, lags and rates, with right and wrong knowledge."""
-    over_grid = grid.fly_grid(tick)
-    tick("the case in full")
-    in_full = case.fly_case()
-    inner_loop = complete.fly_complete(tick)
-    fitted = complete.fit_all(inner_loop)
+    """Fly the step of figure 2 over dead times, lags and sample rates, with right and wrong times.
+
+    Args:
+        tick: called `PARTS` times.
+    """
+    grid = fly_grid(tick)
+    tick("the example")
+    example = fly_example()
+    complete = fly_complete(tick)
+    fitted = {method: _fitted(response) for method, response in complete.shown.items()}
     return Outcome(
         name="lag",
         title="Lag: behind a rate loop with dead time and lag",
         conditions=(
             "The step of figure 2, p = 5 s⁻¹, through a rate loop with a dead time of 0 to 80 ms"
-            " and a first-order lag of 10 to 60 ms, planners at 50 to 250 Hz. The case in full has"
-            f" {case.LOOP.dead_time_ms} and {case.LOOP.lag_ms} ms. model-following knows both"
-            " times, rightly or with the errors given. Below, the complete inner loop of figure 5"
-            " with 20 ms of transport delay, of which it knows the first-order fit."
+            " and a first-order lag of 10 to 60 ms, planners at 50 to 250 Hz. The example has a"
+            f" dead time of {EXAMPLE_LOOP.dead_time_ms} ms and a lag of {EXAMPLE_LOOP.lag_ms} ms."
+            " model-following is given both times, either right or with the errors stated. Further"
+            " below is the complete inner loop of figure 5 with 20 ms of transport delay; there"
+            " model-following is given a first-order fit."
         ),
-        figure=draw_figure(over_grid, in_full, inner_loop),
+        figure=draw_figure(grid, example, complete),
         caption=CAPTION,
         tables=(
-            case.case_table(in_full),
-            case.wrong_table(in_full),
-            grid.worst_table(over_grid),
-            complete.fit_table(fitted),
-            complete.rates_table(inner_loop),
-            complete.wrong_table(inner_loop),
+            _example_table(example),
+            _errors_table(
+                "lag-wrong-knowledge",
+                f"Cross-track of model-following at {EXAMPLE_ERRORS_HZ:.0f} Hz in the example, by"
+                " the error of the assumed lag (rows) and dead time (columns).",
+                example.wrong,
+            ),
+            _worst_table(grid),
+            _fit_table(complete, fitted),
+            _rates_table(complete),
+            _errors_table(
+                "lag-inner-loop-wrong-knowledge",
+                "Cross-track of model-following with the complete inner loop at"
+                f" {COMPLETE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
+                " against those fitted to the inner loop.",
+                complete.by_rate[COMPLETE_HZ].wrong,
+            ),
         ),
-        findings=find(over_grid, in_full, inner_loop, fitted),
-        series=(*grid.series(over_grid), complete.series(inner_loop)),
+        findings=find(
+            grid, example, complete, {method: fit.deviation for method, fit in fitted.items()}
+        ),
+        series=(*_grid_series(grid), _complete_series(complete)),
+    )
+
+
+def _fitted(response: Response) -> _Fitted:
+    fit = fit_second_order(response.step, response.at(0))
+    model = second_order_path(response.step, fit, response.step.time)
+    return _Fitted(fit, float(largest_deviation(response, model)[0]))
+
+
+def _example_table(example: Example) -> Table:
+    """Every method by rate, and model-following with the rate limit."""
+    rows: list[tuple[TableCell, ...]] = []
+    for rate, responses in example.free.items():
+        flown = [(method.label, response) for method, response in responses.items()]
+        flown.append(("model-following, W_M = π/2", example.limited[rate]))
+        rows += [
+            (label, round(rate), *score(response), largest_tilt_rate(response))
+            for label, response in flown
+        ]
+    return Table(
+        "lag",
+        f"The example: dead time {EXAMPLE_LOOP.dead_time_ms} ms, lag {EXAMPLE_LOOP.lag_ms} ms.",
+        ("method", "rate, Hz", *_SCORE_COLUMNS, "largest √(ω_x²+ω_y²), rad/s"),
+        tuple(rows),
+    )
+
+
+def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> Table:
+    """Cross-track by the error of the lag (rows) and of the dead time (columns)."""
+    return Table(
+        name,
+        caption,
+        ("lag", *(f"dead time {in_percent(error)}" for error in FINE_ERRORS)),
+        tuple(
+            (
+                in_percent(lag),
+                *(scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
+            )
+            for lag in FINE_ERRORS
+        ),
+    )
+
+
+def _worst_table(grid: Grid) -> Table:
+    """The worst error of the times beside the best other method, a row for each rate and lag."""
+    dead_times = sorted({cell.dead_time_ms for cell in grid})
+    rows: list[tuple[TableCell, ...]] = []
+    for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
+        places = [grid[Cell(rate, dead_time, lag)] for dead_time in dead_times]
+        others = [place.right[place.best_other].cross_track for place in places]
+        rows.append((f"{rate:.0f} Hz, {lag} ms", *(place.worst for place in places), *others))
+    return Table(
+        "lag-worst-knowledge",
+        "Cross-track over the grid, by rate and lag (rows) and dead time (columns): model-following"
+        " with lag and dead time wrong by ±50 %, the worst combination, and the best of the other"
+        " methods, which use neither.",
+        (
+            "rate, lag",
+            *(f"worst, {dead_time} ms" for dead_time in dead_times),
+            *(f"best other, {dead_time} ms" for dead_time in dead_times),
+        ),
+        tuple(rows),
+    )
+
+
+def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
+    """Score and fitted model of every method at `COMPLETE_HZ`."""
+    scores = complete.by_rate[COMPLETE_HZ].right
+    return Table(
+        "lag-inner-loop",
+        f"The complete inner loop with 20 ms of transport delay, {COMPLETE_HZ:.0f} Hz, heading 0,"
+        " and the second-order model with dead time fitted to each response.",
+        ("method", *_SCORE_COLUMNS, *FIT_COLUMNS, "largest deviation from it"),
+        tuple(
+            (method.label, *scores[method], *flown.fit.cells, flown.deviation)
+            for method, flown in fitted.items()
+        ),
+    )
+
+
+def _rates_table(complete: Complete) -> Table:
+    """Cross-track of every method by rate, and of model-following with the worst errors."""
+    by_rate = complete.by_rate
+    rows: list[tuple[TableCell, ...]] = [
+        (m.label, *(at.right[m].cross_track for at in by_rate.values())) for m in METHODS
+    ]
+    rows.append(("model-following, worst knowledge", *(at.worst for at in by_rate.values())))
+    return Table(
+        "lag-inner-loop-rates",
+        "Cross-track with the complete inner loop by sample rate. In the last row both times of"
+        " model-following are wrong by up to ±50 %; the worst combination is shown.",
+        ("method", *(f"{rate:.0f} Hz" for rate in by_rate)),
+        tuple(rows),
+    )
+
+
+def _grid_series(grid: Grid) -> tuple[Table, Table]:
+    """Every flight of the grid: with the right times, and with wrong ones."""
+    place = ("dead time, ms", "lag, ms", "rate, Hz")
+    return (
+        Table(
+            "lag-grid",
+            "All methods over the grid, model-following with the right times.",
+            ("method", *place, *_SCORE_COLUMNS),
+            tuple(
+                (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *flown)
+                for cell, at in grid.items()
+                for method, flown in at.right.items()
+            ),
+        ),
+        Table(
+            "lag-grid-wrong-knowledge",
+            "model-following over the grid, with wrong times.",
+            (*place, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
+            tuple(
+                (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *flown)
+                for cell, at in grid.items()
+                for error, flown in at.wrong.items()
+            ),
+        ),
+    )
+
+
+def _complete_series(complete: Complete) -> Table:
+    """Every error at every rate."""
+    return Table(
+        "lag-inner-loop-beliefs",
+        "Cross-track of model-following with the complete inner loop, by rate and error.",
+        ("rate, Hz", "error of the lag", "error of the dead time", "cross-track"),
+        tuple(
+            (rate, *error, flown.cross_track)
+            for rate, at in complete.by_rate.items()
+            for error, flown in at.wrong.items()
+        ),
     )

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
-from companion.nmpc import ModelName, Request, Start, Status, Vehicle
-from companion.nmpc.planning import Planning
+from companion.guidance.trajectory.sample import Vector
+from companion.nmpc import Request, Start, Status, Vehicle
 from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contest import CIRCLE
 from companion.study.nmpc.contestants import MODELS, Contestant
-from companion.trajectory.sample import Vector
+from companion.study.nmpc.models import ModelName
 
 MOST_ITERATIONS = 60
 
@@ -55,11 +55,11 @@ def count_iterations() -> Counts:
     """Solve every state with every model, each from its reference, to the end."""
     counts: Counts = {}
     for model in MODELS:
-        planning = Planning(Contestant(model, MOST_ITERATIONS).settings, CIRCLE.trajectory)
+        solver = Contestant(model, MOST_ITERATIONS).solver(CIRCLE.trajectory)
         counts[model] = {}
         for name, state in STATES.items():
-            planning.forget()
-            answer = planning.answer(_request(state))
+            solver.forget()
+            answer = solver.answer(_request(state))
             reached = answer.status is Status.SOLVED and answer.iterations < MOST_ITERATIONS
             counts[model][name] = answer.iterations if reached else inf
     return counts

@@ -8,14 +8,13 @@ import numpy as np
 from companion.attitude import Target
 from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
+from companion.guidance.trajectory.figures import Laps, circle, gerono_eight
+from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc import Input, Request, Start, Status, Vehicle
-from companion.nmpc.planning import Planning
 from companion.study.nmpc import vehicle as plant
 from companion.study.nmpc.contestants import MODELS, PAPERS, RATE_HZ, SQP_ITERATIONS, Contestant
 from companion.study.outcome import Tick
 from companion.study.step import Floats
-from companion.trajectory.figures import Laps, circle, gerono_eight
-from companion.trajectory.sample import Trajectory
 
 SECONDS = 6
 SETTLED = 4.0
@@ -62,8 +61,8 @@ class Flight:
         self.iterations: list[float] = []
         self.failures = 0
         self._task = task
-        self._planning = Planning(contestant.settings, task.trajectory)
-        self._planning.warm_up()
+        self._solver = contestant.solver(task.trajectory)
+        self._solver.warm_up()
         self._vehicle = plant.Vehicle()
         north, east, down = task.trajectory.at(task.begin).position
         self._start = Start((-north, -east, -down))
@@ -82,7 +81,7 @@ class Flight:
             drag=Drag(plant.DRAG),
         )
         at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS:])
-        answer = self._planning.answer(Request(self._periods, known, at, self._start, inputs))
+        answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
         self.seconds.append(answer.solving)
         self.iterations.append(answer.iterations)
         if answer.status is Status.SOLVED:

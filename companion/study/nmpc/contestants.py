@@ -2,9 +2,12 @@
 
 from typing import NamedTuple
 
-from companion.nmpc import ModelName, Settings
+from companion.guidance.trajectory.sample import Trajectory
+from companion.nmpc import Settings
+from companion.nmpc.worker import Worker
 from companion.study.methods import Line, Method
 from companion.study.nmpc import vehicle as plant
+from companion.study.nmpc.models import MAKERS, ModelName
 
 RATE_HZ = 50.0
 SQP_ITERATIONS = 20
@@ -28,7 +31,6 @@ class Contestant(NamedTuple):
     def settings(self) -> Settings:
         """The vehicle as it is; only the dead time may be kept from it."""
         return Settings(
-            model=self.model,
             gain=plant.GAIN,
             yaw_gain=plant.YAW_GAIN,
             lag=max(0.25 / plant.GAIN, 1e-3 * plant.LAG_MS),  # of the planner's reference model
@@ -41,6 +43,10 @@ class Contestant(NamedTuple):
             iterations=self.iterations,
             lead=1.0 / RATE_HZ,
         )
+
+    def solver(self, trajectory: Trajectory) -> Worker:
+        """The solver of this model, in this process."""
+        return Worker(self.settings, trajectory, MAKERS[self.model])
 
     @property
     def label(self) -> str:

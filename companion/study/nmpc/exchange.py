@@ -23,7 +23,7 @@ class Exchange(NamedTuple):
 
     Attributes:
         whole_ms: (n,), from before a request is packed until its answer is unpacked.
-        solve_ms: (n,), of that in `Planning`.
+        solve_ms: (n,), of that in `Worker.answer`.
         troubles: how many requests came to nothing.
     """
 

@@ -6,7 +6,6 @@ from typing import Literal
 
 import numpy as np
 
-from companion.nmpc import ModelName
 from companion.study.nmpc.cold_start import STATES, Counts
 from companion.study.nmpc.contest import CIRCLE, EIGHT, Contest
 from companion.study.nmpc.contestants import (
@@ -18,6 +17,7 @@ from companion.study.nmpc.contestants import (
     Contestant,
 )
 from companion.study.nmpc.exchange import Exchange
+from companion.study.nmpc.models import ModelName
 from companion.study.outcome import Finding
 
 _SETTLED_M = 0.1

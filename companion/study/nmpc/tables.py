@@ -6,7 +6,7 @@ from companion.study.nmpc.cold_start import STATES, Counts
 from companion.study.nmpc.contest import CIRCLE, EIGHT, Contest
 from companion.study.nmpc.contestants import LOOKS, MODELS, SQP_ITERATIONS, Contestant
 from companion.study.nmpc.exchange import Exchange
-from companion.study.table import Cell, Table
+from companion.study.outcome import Cell, Table
 
 
 def time_table(contest: Contest) -> Table:

@@ -5,8 +5,8 @@ from math import radians
 from companion.attitude import Limits, Quaternion, Target, make_planner
 from companion.attitude.kinematics import cos_tilt, tilt_products
 from companion.guidance.reference import GRAVITY
-from companion.study.lag.loop import STEP_HZ, LagBody
-from companion.trajectory.sample import Vector
+from companion.guidance.trajectory.sample import Vector
+from companion.study.lag_loop import STEP_HZ, LagBody
 
 GAIN, YAW_GAIN = 5.0, 2.0
 """Of the planner, 1/s."""

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion import bounded_yaml, demo
+from companion import demo
 from companion.config import Config
-from companion.config_file import changed, load
+from companion.config.files import changed, load
+from companion.files import bounded_yaml
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.study.step import Floats

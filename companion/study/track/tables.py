@@ -5,7 +5,7 @@ from typing import Any
 
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
-from companion.study.table import Cell, Table
+from companion.study.outcome import Cell, Table
 from companion.study.track.fleet import Flown
 from companion.study.track.flight import Off
 from companion.study.track.task import (

@@ -1,0 +1,184 @@
+"""`companion doctor`."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.terminal import read_line
+from companion.config import Config
+from companion.config.files import changed, load
+from companion.files.yaml_file import ConfigError
+from companion.files.yaml_file import load as load_yaml
+from companion.flight.assembly import open_link
+from companion.flight.maneuvers import programme
+from companion.guidance import Sequence
+from companion.mavlink import lockstep
+from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import LinkLost, LinkTimeout
+from companion.preflight.apply_fixes import Answer, Outcome, mend, require_disarmed, restore
+from companion.preflight.evidence import Evidence
+from companion.preflight.examination import examine
+from companion.preflight.finding import Finding, Key
+from companion.preflight.gathering import identify
+from companion.preflight.parameter_survey import survey
+from companion.preflight.report import as_dict, outcome_as_dict, outcome_line, tables
+from companion.preflight.session import Patient, patient
+from companion.preflight.undo import Undo, UndoFile
+from companion.vehicle.inbox import Notice
+from companion.vehicle.link import Link
+from companion.vehicle.parameter_rules import Verdict
+
+_ANSWERS = {answer.value[0]: answer for answer in Answer}
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Find what is wrong with a vehicle before it flies, and mend it if asked to."""
+    config = _as_told(load(options.config), options)
+    if options.yes and not options.fix:
+        raise ConfigError("--yes answers the questions of --fix, and goes with it alone")
+    if options.fix and not options.yes and not sys.stdin.isatty():
+        raise ConfigError(
+            "--fix asks before each change, and standard input is no terminal; add --yes"
+        )
+    undo = None if options.undo is None else load_yaml(options.undo, Undo)
+    run: Callable[..., int] = lockstep.run if config.link.lockstep else link_loop.run
+    visit = _Visit(config, Console(stderr=options.json, highlight=False))
+    try:
+        if undo is None:
+            code = run(visit.examine(options.wait, fix=options.fix, unasked=options.yes))
+        else:
+            code = run(visit.restore(undo, options.undo))
+    except KeyboardInterrupt:
+        visit.say("Interrupted; every parameter that was set is told above.")
+        return EXIT_FLIGHT
+    if options.json:
+        print(json.dumps(visit.result, allow_nan=False))
+    return code
+
+
+def _as_told(config: Config, options: argparse.Namespace) -> Config:
+    link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
+    if options.lockstep:
+        link["lockstep"] = True
+    return changed(config, {"link": link}, "the command line")
+
+
+def _flown(config: Config) -> tuple[Sequence | None, list[Finding]]:
+    """What is to be flown, or why it cannot be."""
+    try:
+        return programme(config), []
+    except ConfigError as error:
+        found = f"what is configured cannot be flown: {error}"
+        because = "`companion fly` refuses it"
+        return None, [Finding(Key.PROGRAMME, Verdict.INEFFECTIVE, found, because)]
+
+
+class _Visit:
+    """What one call of the command does; `result` is what `--json` prints."""
+
+    def __init__(self, config: Config, console: Console) -> None:
+        self._config, self._console = config, console
+        self._outcomes: list[Outcome] = []
+        self.result: dict[str, Any] = {}
+
+    async def examine(self, wait: float, *, fix: bool, unasked: bool) -> int:
+        """Look, tell, and mend if asked to; what is found after that decides the exit code."""
+        config = self._config
+        async with patient(config, self._link) as vehicle:
+            self.say(f"Asking the vehicle on {config.link.endpoint} …")
+            findings = await vehicle.met()
+            if findings:
+                return self._told(findings)
+            try:
+                evidence = await vehicle.evidence(wait)
+            except (LinkTimeout, LinkLost) as error:
+                return self._told(vehicle.silent(error))
+            flown, refusals = _flown(config)
+            evidence = replace(evidence, programme=flown)
+            findings = [*refusals, *examine(config, evidence)]
+            code = self._told(findings)
+            if fix:
+                code = await self._mend(vehicle, evidence, findings, unasked=unasked)
+        return code
+
+    def _link(self, notice: Notice) -> Link:
+        return open_link(self._config, None, notice)
+
+    async def restore(self, undo: Undo, path: Path) -> int:
+        """Set the parameters back to what an undo file says."""
+        async with patient(self._config, self._link) as vehicle:
+            findings = await vehicle.met()
+            if findings:
+                return self._told(findings)
+            link = vehicle.link
+            if not undo.meant_for(link, await identify(link)):
+                raise ConfigError(
+                    f"{path} is of another vehicle ({undo.autopilot}, system {undo.system}); "
+                    "nothing was set"
+                )
+            await restore(link, undo, self._note)
+        self.result = {"changes": [outcome_as_dict(outcome) for outcome in self._outcomes]}
+        return EXIT_FLIGHT if any(outcome.refusal for outcome in self._outcomes) else EXIT_OK
+
+    async def _mend(
+        self, vehicle: Patient, evidence: Evidence, findings: list[Finding], *, unasked: bool
+    ) -> int:
+        link, config = vehicle.link, self._config
+        proposed = [finding for finding in findings if finding.change is not None]
+        if not proposed:
+            self.say("No parameter is to be set.")
+            return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
+        require_disarmed(link)
+        undo = UndoFile(config.recording.directory, link, evidence.identity)
+        try:
+            await mend(link, proposed, _agree if unasked else self._ask, undo, self._note)
+        finally:
+            if undo.path.exists():
+                self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
+        evidence = replace(evidence, survey=await survey(link, link.family.parameters))
+        _, refusals = _flown(config)
+        code = self._told([*refusals, *examine(config, evidence)])
+        self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
+        self.result["undo"] = str(undo.path) if undo.path.exists() else None
+        return code
+
+    async def _ask(self, finding: Finding) -> Answer:
+        change = finding.change
+        assert change is not None
+        self.say(f"{finding.verdict.value}: {finding.sentence()}")
+        while True:
+            self._console.print(
+                f"Set {change.parameter} from {change.old:g} to {change.new:g}? "
+                "\\[y]es, \\[n]o, \\[a]ll, \\[q]uit ",
+                end="",
+            )
+            line = await read_line()
+            if not line:  # the end of the input
+                return Answer.QUIT
+            answer = _ANSWERS.get(line.strip().lower()[:1])
+            if answer is not None:
+                return answer
+
+    def _told(self, findings: list[Finding]) -> int:
+        self._console.print(tables(self._config, findings))
+        self.result = as_dict(self._config, findings)
+        return EXIT_OK if self.result["result"] == "ok" else EXIT_FLIGHT
+
+    def _note(self, outcome: Outcome) -> None:
+        self._outcomes.append(outcome)
+        self.say(outcome_line(outcome))
+
+    def say(self, text: str) -> None:
+        """Tell a person."""
+        self._console.print(text, markup=False, soft_wrap=True)
+
+
+async def _agree(_: Finding) -> Answer:
+    return Answer.ALL

@@ -1,0 +1,31 @@
+"""`companion fly` and `companion demo`."""
+
+import argparse
+
+from companion.cli import flying
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.terminal import FlightConsole
+from companion.config.files import load
+from companion.recording.summary import Summary
+
+
+def fly(options: argparse.Namespace) -> int:
+    """Fly the vehicle that the configuration names."""
+    config = flying.as_told(load(options.config), options)
+    folder = flying.flight_folder(config)
+    return _ended(flying.fly(config, folder, _console(options)), options)
+
+
+def demo(options: argparse.Namespace) -> int:
+    """Start the bundled vehicle and fly it."""
+    return _ended(flying.fly_bundled(options.config, options, _console(options)), options)
+
+
+def _console(options: argparse.Namespace) -> FlightConsole:
+    return FlightConsole(stderr=options.json, highlight=False)
+
+
+def _ended(summary: Summary, options: argparse.Namespace) -> int:
+    if options.json:
+        print(summary.as_json())
+    return EXIT_OK if summary.result == "ok" else EXIT_FLIGHT

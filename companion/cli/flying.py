@@ -1,0 +1,130 @@
+"""What the commands that fly have in common: what they change, where they record, how they end."""
+
+import argparse
+import shutil
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from companion import demo
+from companion.cli.signals import fly_interruptibly
+from companion.cli.terminal import FlightConsole, TerminalObserver
+from companion.config import Config
+from companion.config.files import changed, load
+from companion.control.outer_loop import predictive_settings
+from companion.extras import require
+from companion.files.yaml_file import ConfigError
+from companion.flight.maneuvers import programme
+from companion.flight.session import Session
+from companion.mavlink import lockstep
+from companion.mavlink import loop as link_loop
+from companion.mavlink.errors import EndpointError, SigningError
+from companion.realtime import RealtimeError
+from companion.recording.report import flight_table
+from companion.recording.summary import Summary
+
+
+def as_told(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
+    """The configuration with what the command line says otherwise.
+
+    Raises:
+        ConfigError: the two do not go together, or what is to be followed cannot be.
+        MissingExtraError: it needs an extra that is not installed.
+    """
+    link: dict[str, Any] = {}
+    flight: dict[str, Any] = {}
+    if options.endpoint:
+        link["endpoint"] = options.endpoint
+    if options.lockstep:
+        link["lockstep"] = True
+    if options.programme:
+        flight["programme"] = options.programme
+    if options.trajectory:
+        flight["programme"], flight["trajectory"] = ("trajectory",), options.trajectory
+    if options.slow_down:
+        flight["slow_down"] = True
+    if options.arm:
+        flight["arm"] = True
+    changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
+    told = changed(config, changes, "the command line")
+    # What cannot be flown is to be found out before anything is begun.
+    programme(told)
+    if told.guidance.kind == "nmpc":
+        predictive_settings(told)
+        require("casadi", "nmpc", "guidance.kind: nmpc")
+    if told.link.backend == "mavsdk":
+        require("mavsdk", "mavsdk", "link.backend: mavsdk")
+    return told
+
+
+def flight_folder(config: Config) -> Path:
+    """A new folder for one flight, named by its start in UTC.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    base = config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    for number in range(1, 100):
+        folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise ConfigError(
+                f"recording.directory: cannot make {folder}: {error.strerror}"
+            ) from error
+        return folder
+    raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
+
+
+def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
+    """Fly as configured, record it in `folder`, tell it on `console`, table included.
+
+    Raises:
+        LinkError: the link could not be opened; nothing was sent.
+        OSError: the folder cannot be written; nothing was sent.
+        RealtimeError: what `realtime` requires is not granted; nothing was sent.
+    """
+    observer = TerminalObserver(console)
+    session = Session(config, folder, observer, observer.ask_landing)
+    run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
+    with ExitStack() as stack:
+        stack.callback(observer.close)
+        try:
+            summary = run(fly_interruptibly(session))
+        except (EndpointError, RealtimeError, SigningError):
+            shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
+            raise
+    # From here on the vehicle is in other hands, and all is on the disk.
+    with suppress(OSError):
+        console.print(flight_table(summary))
+        console.print(f"Recorded in {folder}", soft_wrap=True)
+    return summary
+
+
+def fly_bundled(
+    path: Path | None,
+    options: argparse.Namespace,
+    console: FlightConsole,
+    planner: str | None = None,
+) -> Summary:
+    """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
+
+    They are joined as `link.endpoint` says, by UDP, TCP or a serial line, on free ports.
+
+    Raises:
+        ConfigError: the configuration, or the vehicle's own section of it, is wrong.
+        VehicleStoppedError: the vehicle ended before the flight did.
+    """
+    path = path or demo.default_config()
+    config = load(path)
+    with demo.wire_like(config.link.endpoint) as wire:
+        options.endpoint, options.arm = wire.endpoint, True
+        config = as_told(config, options, planner)
+        demo.check_mock(path)
+        folder = flight_folder(config)
+        with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
+            return fly(config, folder, console)

@@ -1,0 +1,206 @@
+"""`companion identify`: fly doublets, or read a flight, and write how the vehicle answers."""
+
+import argparse
+import json
+import os
+from contextlib import suppress
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from companion.cli import flying
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.terminal import FlightConsole
+from companion.config.files import load
+from companion.config.sections import AxisKeys
+from companion.files.yaml_file import ConfigError
+from companion.guidance.reference import GRAVITY
+from companion.identification import (
+    BadFitError,
+    IdentifiedVehicle,
+    RateResponse,
+    identify_vehicle,
+    kept_axes,
+    vehicle_fragment,
+    vehicle_table,
+)
+from companion.recording.summary import Summary
+from companion.vehicle.flight_log import read_flight_log
+
+SHIPPED = Path()
+"""Stands for the configuration that ships, where `--bundled` names none."""
+_PROGRAMME = "identify"
+_PLANNER = "first-order"
+"""It needs no knowledge of the vehicle: that is what is looked for."""
+_LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
+
+
+def identify(options: argparse.Namespace) -> int:
+    """Fly and fit, or fit a recorded flight; write the fit if it is good."""
+    console = FlightConsole(stderr=options.json, highlight=False)
+    if options.log is not None:
+        log = options.log / _LOG if options.log.is_dir() else options.log
+        out = options.out or log.with_name(_FRAGMENT)
+        if log.exists():  # else it is the log that is to be mended
+            _writable(out, options.force)
+        return _fitted(log, out, options, console)
+    if options.out is not None:
+        _writable(options.out, options.force)  # not to be found out after the flight
+    summary = _flown(options, console)
+    if summary.result != "ok" or summary.log is None:
+        _tell(options, {"result": summary.result, "log": str(summary.log)})
+        return EXIT_FLIGHT
+    log = summary.log / _LOG
+    out = options.out or log.with_name(_FRAGMENT)
+    try:
+        return _fitted(log, out, options, console)
+    except KeyboardInterrupt:
+        reason = (
+            f"interrupted while fitting; the flight is kept in {summary.log}; "
+            f"fit it with identify --log {summary.log}"
+        )
+        with suppress(OSError):
+            console.print(reason, soft_wrap=True)
+        _tell(options, {"result": reason, "log": str(log)})
+        return EXIT_FLIGHT
+
+
+def _writable(out: Path, force: bool) -> None:
+    """Refuse what no file can be put to.
+
+    Raises:
+        ConfigError: it cannot, and why.
+    """
+    if out.is_dir():
+        raise ConfigError(f"{out} is a folder; name a file in it, such as {out / _FRAGMENT}")
+    if out.exists() and not force:
+        raise ConfigError(f"{out} exists; name another file with --out, or replace it with --force")
+    if not out.parent.is_dir():
+        raise ConfigError(f"{out}: there is no folder {out.parent}")
+    if not os.access(out.parent, os.W_OK | os.X_OK):
+        raise ConfigError(f"{out}: the folder {out.parent} cannot be written; name another one")
+
+
+def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
+    options.programme = (_PROGRAMME,)
+    if options.bundled is not None:
+        path = None if options.bundled == SHIPPED else options.bundled
+        return flying.fly_bundled(path, options, console, _PLANNER)
+    config = flying.as_told(load(options.config), options, _PLANNER)
+    return flying.fly(config, flying.flight_folder(config), console)
+
+
+def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:
+    """Fit what a log holds, show it, and write it to `out` if it is good."""
+    with suppress(OSError):
+        console.print("fitting…")
+    rows = read_flight_log(log)
+    vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
+    known = _known(log)
+    try:
+        text = vehicle_fragment(vehicle, GRAVITY, known)
+    except BadFitError as error:
+        with suppress(OSError):
+            console.print(vehicle_table(vehicle, GRAVITY))
+            console.print("Not written, for the fit is bad:", style="bold red")
+            for axis, reason in vehicle.faults().items():
+                console.print(f"  {axis}: {reason}", soft_wrap=True)
+        _tell(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
+        return EXIT_FLIGHT
+    _replace(out, text)
+    kept = {
+        axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].reason()}"
+        for axis, keys in kept_axes(vehicle, known).items()
+    }
+    with suppress(OSError):
+        console.print(vehicle_table(vehicle, GRAVITY))
+        for axis, words in kept.items():
+            console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
+        console.print(_how_to_include(out, options.config), soft_wrap=True)
+    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
+    _tell(options, {**result, **_figures(vehicle)})
+    return EXIT_OK
+
+
+def _known(log: Path) -> dict[str, AxisKeys]:
+    """What the configuration of that flight, beside its log, says of each axis; perhaps nothing."""
+    try:
+        return load(log.with_name(_CONFIG)).vehicle.axes
+    except ConfigError:  # another program's log, or another version's configuration
+        return {}
+
+
+def _replace(out: Path, text: str) -> None:
+    """Write a file whole or not at all: what flies by it must not read half of it.
+
+    Raises:
+        OSError: it cannot be written; its text is a whole sentence.
+    """
+    part = out.with_name(f".{out.name}.{os.getpid()}")
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(out)
+    except OSError as error:
+        raise OSError(f"{out}: cannot write what was identified: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _how_to_include(out: Path, config: Path | None) -> str:
+    place = out.resolve()
+    if config is not None:
+        place = Path(os.path.relpath(place, config.resolve().parent))
+    return "\n".join(
+        (
+            f"Written to {out}. Let your configuration say",
+            f"  include: {place}",
+            "and neither `vehicle` nor `thrust.hover_thrust` itself: its own keys would win.",
+        )
+    )
+
+
+def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
+    """What `--json` tells of each axis; null where nothing was found."""
+    return {
+        name: {
+            "lag_ms": _in_ms(response.lag),
+            "dead_time_ms": _in_ms(response.dead_time),
+            "slew_rad_s2": response.slew,
+            "gain": _rounded(response.gain, 3),
+            "explained": round(response.fit.explained, 4),
+            "misfit": round(response.fit.misfit, 4),
+            "lag_error_ms": _in_ms(response.fit.lag_error),
+            "dead_time_error_ms": _in_ms(response.fit.dead_time_error),
+            "second_order": _second_order(response),
+        }
+        for name, response in vehicle.axes.items()
+    }
+
+
+def _second_order(response: RateResponse) -> dict[str, float] | None:
+    nearer = response.second_order
+    if nearer is None:
+        return None
+    return {
+        "frequency_rad_s": round(nearer.frequency, 2),
+        "damping": round(nearer.damping, 3),
+        "dead_time_ms": round(1e3 * nearer.dead_time, 1),
+        "explained": round(nearer.explained, 4),
+    }
+
+
+def _in_ms(seconds: float) -> float | None:
+    return _rounded(1e3 * seconds, 1)
+
+
+def _rounded(value: float, digits: int) -> float | None:
+    return round(value, digits) if isfinite(value) else None
+
+
+def _tell(options: argparse.Namespace, result: dict[str, Any]) -> None:
+    if options.json:
+        print(json.dumps(result, allow_nan=False))

@@ -1,0 +1,56 @@
+"""The program's entry. Exit codes: 0 done, 1 failed or interrupted, 2 usage or configuration.
+
+It imports next to nothing before Ctrl-C is seen to: the rest takes the better part of a second.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+from companion.cli.exit_codes import EXIT_FLIGHT
+
+TYPE_CHECKING = False  # as typing's, which is not worth its 5 ms here
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from types import FrameType
+    from typing import NoReturn
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code.
+
+    Args:
+        arguments: of the command line; None: those that the program was started with.
+    """
+    by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if by_default:  # not where a shell ignores it, nor where a test has its own
+        signal.signal(signal.SIGINT, _leave)
+    run = _loaded()
+    try:
+        if by_default:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        return run(arguments)
+    except KeyboardInterrupt:
+        sys.stderr.write("companion: interrupted\n")
+        return EXIT_FLIGHT
+    finally:
+        if by_default and arguments is None:  # all is done: Ctrl-C may end the rest at once
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def _loaded() -> Callable[[Sequence[str] | None], int]:
+    """The command line, imported, with streams that can take all it prints."""
+    from companion.cli.text_streams import print_anything  # noqa: PLC0415
+
+    print_anything()
+    from companion.cli.command_line import run  # noqa: PLC0415
+
+    return run
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
+    """End at once: an exception might come up where an import swallows or prints it."""
+    os.write(2, b"companion: interrupted before anything was sent\n")
+    os._exit(EXIT_FLIGHT)

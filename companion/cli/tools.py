@@ -1,0 +1,81 @@
+"""The commands that do not fly: `bench`, `study`, `plot`, `check-config`."""
+
+import argparse
+import json
+import sys
+
+from rich.console import Console
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.config.files import json_schema, load
+from companion.demo import check_mock
+from companion.files.yaml_file import ConfigError
+from companion.flight.assembly import link_settings
+from companion.flight.maneuvers import programme
+from companion.mavlink.endpoint import parse_endpoint
+from companion.recording.figure import draw_flight
+from companion.study import registry
+
+
+def bench_link(options: argparse.Namespace) -> int:
+    """Measure our latency beside others'."""
+    from companion.bench import link  # noqa: PLC0415  no other command needs it
+
+    figures = link.run(options.seconds, options.rate, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
+def bench_planner(options: argparse.Namespace) -> int:
+    """Measure a step of each planner."""
+    from companion.bench import planner  # noqa: PLC0415  no other command needs it
+
+    figures = planner.run(options.seconds, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
+def study(options: argparse.Namespace) -> int:
+    """Fly the paper's experiments and ours."""
+    if options.json and not all(study.prints_json for study in registry.chosen(options.name)):
+        raise ConfigError(
+            f"--json goes with study {registry.names_with_json()}; study {options.name} writes its"
+            " tables as CSV"
+        )
+    registry.check_extras(options.name)
+    from companion.study import runner  # noqa: PLC0415  needs the extra
+
+    console = Console(stderr=options.json)
+    try:
+        page, rows = runner.run(options.name, options.case, options.out, console)
+    except KeyboardInterrupt:
+        console.print(f"Interrupted; the files in {options.out} are complete.", highlight=False)
+        return EXIT_FLIGHT
+    console.print(f"Open {page}", soft_wrap=True, highlight=False)
+    if options.json:
+        print(json.dumps(rows, allow_nan=False))
+    return EXIT_OK
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a recorded flight."""
+    out = options.out or options.folder / "flight.png"
+    draw_flight(options.folder, out)
+    print(out)
+    return EXIT_OK
+
+
+def check_config(options: argparse.Namespace) -> int:
+    """Check a configuration file, or print the schema."""
+    if options.schema:
+        sys.stdout.write(json_schema())
+        return EXIT_OK
+    config = load(options.file)
+    parse_endpoint(link_settings(config).endpoint)
+    programme(config)  # the trajectory too
+    if config.mock is not None:
+        check_mock(options.file)
+    print(f"{options.file}: ok")
+    return EXIT_OK

@@ -1,0 +1,140 @@
+"""The configuration as files: read with what they include, changed, described for editors."""
+
+import json
+from collections.abc import Mapping
+from os.path import realpath
+from pathlib import Path
+from typing import Any
+
+from companion.config import Config
+from companion.config.root import MOST_INCLUDED
+from companion.files import yaml_file
+from companion.files.yaml_file import ConfigError, UnreadableFileError
+
+_INCLUDE = "include"
+_DEEPEST = 4
+"""Includes of includes."""
+
+
+def load(path: Path) -> Config:
+    """Read and check a configuration file, and the files that its `include` names beside it.
+
+    Keys of a file win over those that it includes, those of a later file over an earlier one's.
+
+    Raises:
+        ConfigError: a file is missing, includes itself, is not YAML, or holds an unknown key or a
+            bad value.
+    """
+    own = yaml_file.read(path, Config)
+    data: dict[str, Any] = {}
+    sources: dict[tuple[str, ...], str] = {}
+    reading = _Reading(data, sources)
+    reading.add_included((path,), own)
+    _merge(data, own, sources, str(path))
+    return yaml_file.validated(data, str(path), Config, sources)
+
+
+class _Reading:
+    """Reads the files that a configuration includes, each below the one that includes it.
+
+    Args:
+        data: takes their keys.
+        sources: takes in which file each key stands.
+    """
+
+    def __init__(self, data: dict[str, Any], sources: dict[tuple[str, ...], str]) -> None:
+        self._data = data
+        self._sources = sources
+        self._count = 0
+
+    def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
+        """Add the files that the last one of `chain` includes; its keys are not among them.
+
+        Args:
+            chain: the file, and before it those by whose includes it is read.
+            keys: of the file.
+
+        Raises:
+            ConfigError: as `load`.
+        """
+        for path in _included(chain[-1], keys):
+            self._add((*chain, path))
+
+    def _add(self, chain: tuple[Path, ...]) -> None:
+        *_, by, path = chain
+        self._count += 1
+        if self._count > MOST_INCLUDED:
+            raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
+        if realpath(path) in map(realpath, chain[:-1]):
+            names = " includes ".join(str(one) for one in chain)
+            raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
+        if len(chain) - 1 > _DEEPEST:
+            raise ConfigError(f"{by}: an include must not be deeper than {_DEEPEST} files")
+        try:
+            part = yaml_file.read(path, Config)
+        except UnreadableFileError as error:
+            raise ConfigError(f"{error} (included by {by})") from error
+        _check_part(path, part)
+        self.add_included(chain, part)
+        _merge(self._data, part, self._sources, str(path))
+
+
+def _included(path: Path, own: dict[str, Any]) -> list[Path]:
+    names = own.get(_INCLUDE, [])
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list) or not all(
+        isinstance(name, str) and yaml_file.is_path(name) for name in names
+    ):
+        told = yaml_file.shortened(names)
+        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {told}")
+    return [path.parent / name for name in names]
+
+
+def _check_part(included: Path, part: dict[str, Any]) -> None:
+    for section, values in part.items():
+        if section == "mock":
+            raise ConfigError(
+                f"{included}: `mock` must not stand here: "
+                "the bundled vehicle reads its section from the main file alone"
+            )
+        if section == _INCLUDE:
+            continue
+        if section in Config.model_fields and not isinstance(values, dict):
+            told = yaml_file.shortened(values)
+            raise ConfigError(f"{included}: `{section}` must hold keys, not {told}")
+
+
+def _merge(
+    data: dict[str, Any], part: dict[str, Any], sources: dict[tuple[str, ...], str], name: str
+) -> None:
+    """Put a file's keys over those of earlier ones, and note in which file each stands."""
+    for section, values in part.items():
+        sources[(section,)] = name
+        data.setdefault(section, {})
+        if isinstance(values, dict) and isinstance(data[section], dict):
+            sources.update({(section, key): name for key in values})
+            data[section] = {**data[section], **values}
+        else:
+            data[section] = values
+
+
+def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:
+    """The configuration with some keys changed, checked anew.
+
+    Args:
+        config: to start from.
+        changes: new values by section and key.
+        name: stands for the changes in errors.
+
+    Raises:
+        ConfigError: the result holds together no more.
+    """
+    data = config.model_dump()
+    for section, values in changes.items():
+        data[section].update(values)
+    return yaml_file.validated(data, name, Config)
+
+
+def json_schema() -> str:
+    """JSON Schema of the file, for editors to complete and check while typing."""
+    return json.dumps(Config.model_json_schema(), indent=2, ensure_ascii=False) + "\n"

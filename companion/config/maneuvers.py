@@ -1,0 +1,69 @@
+"""The sections of the configuration that say how each programme is flown."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from companion.config.sections import Seconds
+from companion.files.yaml_file import Section
+
+
+class HoverConfig(Section):
+    """Programme `hover`: stay where control began."""
+
+    duration_s: Seconds = 3.0
+    """How long."""
+
+
+class StepsConfig(Section):
+    """Programme `steps`: acceleration doublets along north, east and a diagonal."""
+
+    coefficient: Annotated[float, Field(gt=0.0, le=0.7)] = 0.25
+    """Size of a step: horizontal acceleration per specific thrust, the sine of the tilt."""
+    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.0
+    """How long the first part of a doublet lasts; the middle part takes twice as long."""
+    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
+    """Position hold between doublets."""
+
+
+class CornersConfig(Section):
+    """Programme `corners`: acceleration steps past level, where the planners differ."""
+
+    north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
+    """North at each corner, but for the sign; the tilt has the sine √(north² + east²)."""
+    east_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
+    """East at each corner. North 0.4, east 0.5 are the steps of the paper's figure 2."""
+    duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
+    """How long each corner is held."""
+    settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
+    """Position hold at the end."""
+
+
+class CircleConfig(Section):
+    """Programme `circle`: laps at a steady speed, heading held."""
+
+    radius_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 3.0
+    """Radius; the circle begins where the vehicle is and lies north of it."""
+    speed_m_s: Annotated[float, Field(ge=0.01, le=50.0)] = 2.0
+    """Speed along the circle, reached and left smoothly."""
+    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
+    """How often round, gathering speed and braking included."""
+
+
+class IdentifyConfig(Section):
+    """Programme `identify`, flown by `companion identify`: doublets of body rates and of climb."""
+
+    tilt_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 60.0
+    """Roll and pitch rate of the larger doublets; the smaller ones have half of it."""
+    tilt_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
+    """How long their first part lasts; with the rate it gives how far the vehicle tilts."""
+    yaw_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 50.0
+    """Yaw rate of the larger doublet; the smaller one has half of it."""
+    yaw_duration_s: Annotated[float, Field(ge=0.2, le=3.0)] = 1.2
+    """The same for yaw, which answers more slowly."""
+    climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
+    """Vertical acceleration of the doublets that tell the thrust."""
+    climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
+    """How long their first part lasts; the vehicle rises by climb_m_s2 times its square."""
+    settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
+    """Position hold before each doublet and at the end."""

@@ -1,0 +1,172 @@
+"""The typed configuration: its sections together, and what no single one of them can know.
+
+The defaults fly the bundled vehicle.
+"""
+
+from collections.abc import Mapping
+from math import ceil, cos, degrees, floor, hypot, radians, sin
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field, model_validator
+
+from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
+from companion.config.maneuvers import (
+    CircleConfig,
+    CornersConfig,
+    HoverConfig,
+    IdentifyConfig,
+    StepsConfig,
+)
+from companion.config.safety import SafetyConfig
+from companion.config.sections import (
+    AUTO,
+    DeadmanConfig,
+    FlightConfig,
+    GuidanceConfig,
+    LimitsConfig,
+    LinkConfig,
+    PlannerConfig,
+    RealtimeConfig,
+    RecordingConfig,
+    ThrustConfig,
+    VehicleConfig,
+)
+from companion.files.yaml_file import Section
+from companion.guidance.thrust import FOR_TILT, largest_tilt
+from companion.guidance.thrust_curve import ThrustCurve
+
+FileName = Annotated[str, Field(max_length=1000)]
+MOST_INCLUDED = 32
+"""Files that one configuration may include, those of its includes among them."""
+
+FORMER_KEYS = {
+    "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
+    " no key of its own, only the extra `nmpc`",
+}
+"""Keys that were renamed or removed → what to do instead; see `Section.former_keys`."""
+
+_TILT_SHARE = 0.75
+"""Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
+
+
+class Config(Section):
+    """Configuration of `companion`; the top level of the YAML file."""
+
+    former_keys: ClassVar[Mapping[str, str]] = FORMER_KEYS
+
+    link: LinkConfig = LinkConfig()
+    planner: PlannerConfig = PlannerConfig()
+    vehicle: VehicleConfig = VehicleConfig()
+    limits: LimitsConfig = LimitsConfig()
+    deadman: DeadmanConfig = DeadmanConfig()
+    safety: SafetyConfig = SafetyConfig()
+    guidance: GuidanceConfig = GuidanceConfig()
+    thrust: ThrustConfig = ThrustConfig()
+    flight: FlightConfig = FlightConfig()
+    hover: HoverConfig = HoverConfig()
+    steps: StepsConfig = StepsConfig()
+    corners: CornersConfig = CornersConfig()
+    circle: CircleConfig = CircleConfig()
+    identify: IdentifyConfig = IdentifyConfig()
+    realtime: RealtimeConfig = RealtimeConfig()
+    recording: RecordingConfig = RecordingConfig()
+    mock: dict[str, Any] | None = None
+    """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
+    include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
+        default=(), exclude=True
+    )
+    """Files whose keys are read as if they stood here, relative to this one; own keys win. They may
+    include others, up to four deep."""
+
+    @property
+    def planner_name(self) -> str:
+        """The planner that flies: what `planner.name` says, or what `auto` comes to."""
+        if self.planner.name != AUTO:
+            return self.planner.name
+        return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Config":
+        faults = [text for wrong, text in _contradictions(self) if wrong]
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+def _contradictions(config: Config) -> list[tuple[bool, str]]:
+    """What no single section can know: (whether it is wrong, what to say)."""
+    limits, thrust, flown = config.limits, config.thrust, config.flight.programme
+    tilt = radians(limits.max_tilt_deg)
+    return [
+        (
+            config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
+            "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms",
+        ),
+        (
+            not limits.min_thrust < thrust.hover_thrust < limits.max_thrust,
+            "thrust.hover_thrust must lie between limits.min_thrust and limits.max_thrust",
+        ),
+        *_thrust_contradictions(config),
+        (
+            config.deadman.target_stale_ms < 2000.0 / config.guidance.rate_hz,
+            "deadman.target_stale_ms must be at least two periods of guidance.rate_hz",
+        ),
+        (
+            "steps" in flown and config.steps.coefficient > sin(tilt),
+            "steps.coefficient must not exceed the sine of limits.max_tilt_deg",
+        ),
+        (
+            "corners" in flown
+            and hypot(config.corners.north_coefficient, config.corners.east_coefficient)
+            > sin(tilt),
+            "√(north² + east²) of corners' coefficients must not exceed the sine of "
+            "limits.max_tilt_deg",
+        ),
+        *(_identify_contradictions(config) if "identify" in flown else ()),
+    ]
+
+
+def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
+    """As `_contradictions`, of the thrust that the height takes at the largest tilt."""
+    limits, thrust = config.limits, config.thrust
+    curve = ThrustCurve(thrust.curve_factor)
+    hover = curve.share(thrust.hover_thrust)
+    # An autopilot that makes up for tilt may do it with all the thrust there is.
+    most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
+    tilt = degrees(largest_tilt(hover, most))
+    needed = hover / cos(radians(limits.max_tilt_deg)) / FOR_TILT
+    remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
+    if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
+        remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"
+    return [
+        (
+            hover < most and tilt < limits.max_tilt_deg,
+            f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
+            f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} it holds the "
+            f"height up to {tilt:.0f}°; {remedy}",
+        )
+    ]
+
+
+def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
+    """As `_contradictions`, of the programme `identify`."""
+    limits, identify = config.limits, config.identify
+    return [
+        (
+            len(config.flight.programme) > 1,
+            "flight.programme: identify is flown alone, with a calm hold between its doublets",
+        ),
+        (
+            identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,
+            "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed "
+            f"{_TILT_SHARE} × limits.max_tilt_deg",
+        ),
+        (
+            identify.tilt_rate_deg_s > limits.max_tilt_rate_deg_s,
+            "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s",
+        ),
+        (
+            identify.yaw_rate_deg_s > limits.max_yaw_rate_deg_s,
+            "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s",
+        ),
+    ]

@@ -1,0 +1,1 @@
+"""The control loop that answers each sample, and the guidance loop that leaves it its targets."""

@@ -1,0 +1,156 @@
+"""Jumps of the autopilot's estimate: the vehicle did not move, so what it is to do moves along.
+
+A jump is what neither the body rates nor the velocity explain between two samples (PX4's estimator
+resets position and heading when it no longer believes them, and counts it in ODOMETRY's
+`reset_counter`, which comes later and tells of no size). What is anchored to the estimate goes on
+in a frame without jumps:
+
+- positions are given on with all jumps taken out;
+- headings of poses, references and targets are those without jumps: an attitude is turned back by
+  all jumps before its heading is compared with them.
+
+Horizontal accelerations are left in the frame of the estimate, in which position is measured: a
+heading that was put right serves them at once.
+"""
+
+from collections import deque
+from math import asin, atan2, cos, hypot, radians, sin, sqrt
+
+from companion.attitude import BodyRates, Quaternion, Target, is_unit
+from companion.attitude.rotation import short_way, turned
+from companion.guidance.horizontal import rotated
+from companion.guidance.reference import Vector
+from companion.vehicle.records import LocalPosition
+from companion.vehicle.samples import AttitudeSample
+
+_LONGEST = 0.1
+"""Between two attitudes, s: further apart the rates say too little of what happened between."""
+_ANGLE = radians(4.0)
+"""Smaller jumps of the attitude are followed: it costs less than to tell them from noise."""
+_DISTANCE = 0.2
+"""The same of the position, m."""
+_LONGEST_WAY = 0.5
+"""Between two positions, s."""
+_ACCELERATION_CHANGE = 10.0
+"""Within the time between two positions, m/s²."""
+_ONE_RESET = 0.5
+"""What jumps within so long, s, does so at one reset; the counter comes at 10 Hz."""
+
+
+class EstimatorResets:
+    """Finds the jumps, adds them up and counts them.
+
+    Attributes:
+        turn: sum of the jumps in heading, rad.
+        shift: sum of the jumps in position, m NED.
+        largest_tilt: largest jump of the thrust axis, rad; no reference can make up for it.
+        newest: the newest attitude, or None.
+        times: when the latest resets were, s on our clock.
+    """
+
+    def __init__(self) -> None:
+        self.turn = 0.0
+        self.shift: Vector = (0.0, 0.0, 0.0)
+        self.largest_tilt = 0.0
+        self.times: deque[float] = deque(maxlen=32)
+        self.newest: AttitudeSample | None = None
+        self._raw: LocalPosition | None = None
+        self._counter: int | None = None
+
+    def on_attitude(self, sample: AttitudeSample) -> bool:
+        """Compare a sample that is newer than the last; whether the thrust axis jumped."""
+        if not is_unit(sample.q):
+            return False
+        before, self.newest = self.newest, sample
+        if before is None:
+            return False
+        dt = sample.vehicle_time - before.vehicle_time
+        if not 0.0 < dt <= _LONGEST:
+            return False
+        yaw, tilt, unsure = _attitude_jump(before, sample, dt)
+        jumped = tilt > unsure
+        if abs(yaw) > unsure:
+            self.turn = short_way(self.turn + yaw)
+        elif not jumped:
+            return False
+        self._count(sample.received)
+        self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
+        return jumped
+
+    def without_jumps(self, position: LocalPosition) -> LocalPosition:
+        """The position in the frame without jumps; finds the jump of one that is new."""
+        before, self._raw = self._raw, position
+        if before is not None:
+            self._find_way(before, position)
+        return position._replace(position_ned=_less(position.position_ned, self.shift))
+
+    def forget(self) -> None:
+        """Nothing is anchored to the estimate yet, as on the ground: what it says now is true."""
+        self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
+
+    def on_counter(self, counter: int | None, now: float) -> None:
+        """Take ODOMETRY's `reset_counter`: it also tells of resets too small to be found."""
+        if counter is not None and self._counter not in (None, counter):
+            self._count(now)
+        self._counter = counter
+
+    def attitude(self, q: Quaternion) -> Quaternion:
+        """The attitude as it would be without the jumps in heading."""
+        if self.turn == 0.0:
+            return q
+        c, s = cos(0.5 * self.turn), -sin(0.5 * self.turn)
+        w, x, y, z = q
+        return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+
+    def target(self, target: Target, turn: float) -> Target:
+        """A target without the jumps; it was made when their sum was `turn`, rad."""
+        if turn == 0.0:
+            return target
+        north, east = rotated(target.north, target.east, -turn)
+        return target._replace(north=north, east=east)
+
+    def _find_way(self, before: LocalPosition, position: LocalPosition) -> None:
+        dt = position.vehicle_time - before.vehicle_time
+        if not 0.0 < dt <= _LONGEST_WAY:
+            return
+        jump = [
+            new - old - 0.5 * dt * (v_old + v_new)
+            for old, new, v_old, v_new in zip(
+                before.position_ned,
+                position.position_ned,
+                before.velocity_ned,
+                position.velocity_ned,
+                strict=True,
+            )
+        ]
+        if hypot(*jump) > _DISTANCE + _ACCELERATION_CHANGE * dt * dt / 8.0:
+            north, east, down = self.shift
+            self.shift = (north + jump[0], east + jump[1], down + jump[2])
+            self._count(position.received)
+
+    def _count(self, now: float) -> None:
+        if not self.times or now - self.times[-1] > _ONE_RESET:
+            self.times.append(now)
+
+
+def _attitude_jump(
+    before: AttitudeSample, now: AttitudeSample, dt: float
+) -> tuple[float, float, float]:
+    """Jump in heading and of the thrust axis, and how large both may seem without one; rad."""
+    old, new = before.body_rates, now.body_rates
+    mean = BodyRates(*(0.5 * (a + b) for a, b in zip(old, new, strict=True)))
+    w, x, y, z = turned(before.q, mean, dt)
+    a, b, c, d = now.q
+    # now ⊗ foreseen⁻¹: the rotation, about axes of the world, that nothing explains.
+    r_w = a * w + b * x + c * y + d * z
+    r_x = -a * x + b * w - c * z + d * y
+    r_y = -a * y + b * z + c * w - d * x
+    r_z = -a * z - b * y + c * x + d * w
+    yaw = short_way(2.0 * atan2(r_z, r_w))
+    tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
+    change = sqrt(sum((p - q) ** 2 for p, q in zip(new, old, strict=True)))
+    return yaw, tilt, _ANGLE + 0.5 * change * dt
+
+
+def _less(left: Vector, right: Vector) -> Vector:
+    return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -1,0 +1,173 @@
+"""The programmes that the configuration asks for, checked before anything flies."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from math import radians, tau
+
+import numpy as np
+
+from companion.config import Config, trajectory_file
+from companion.config.known_drag import assumption, least_drag, most_drag
+from companion.config.maneuvers import IdentifyConfig
+from companion.control.outer_loop import thrust_limits
+from companion.drag import Drag
+from companion.files.yaml_file import ConfigError
+from companion.flight.fence_check import FenceCheck
+from companion.guidance import GRAVITY, Circle, Corners, Doublets, Hover, Programme, Sequence, Steps
+from companion.guidance.fence import Place
+from companion.guidance.follow import Follow
+from companion.guidance.predicted import predicted
+from companion.guidance.trajectory import (
+    Envelope,
+    Motion,
+    TrajectoryError,
+    Violation,
+    judge,
+    slow_down,
+    violations,
+)
+from companion.safety.table import fence_of
+
+_SLOWER = "make it slower or smaller, or change the limit"
+
+
+def programme(config: Config) -> Sequence:
+    """The programmes of `flight.programme`, one after the other.
+
+    Raises:
+        ConfigError: a trajectory cannot be read, or a programme cannot be flown within the limits
+            and the fence.
+    """
+    return Sequence([_part(config, name) for name in config.flight.programme])
+
+
+def unbegun(sequence: Sequence) -> Sequence:
+    """The same, as if nobody had asked it for a reference yet: `Follow` keeps where it began."""
+    return Sequence(
+        [
+            replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
+            for part in sequence.parts
+        ]
+    )
+
+
+def require_inside(config: Config, parts: Iterable[Programme], origin: Place | None) -> None:
+    """See that all programmes stay inside the fence, with a polygon on the map if there is one.
+
+    Args:
+        config: as it is flown.
+        parts: the programmes.
+        origin: where control begins, or None where that is not known.
+
+    Raises:
+        ConfigError: one of them leaves it, or could not stop inside.
+    """
+    check = _fence_check(config, origin)
+    for part in parts:
+        for motion in _motions(part, least_drag(config)):
+            _refuse(part.name, check(motion))
+
+
+def _part(config: Config, name: str) -> Programme:
+    if name == "trajectory":
+        return _follow(config)
+    part = _simple(config, name)
+    require_inside(config, [part], None)
+    if isinstance(part, Circle):
+        (motion,) = _motions(part, least_drag(config))
+        for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
+            _refuse(part.name, broken, assumption(config))
+    return part
+
+
+def _simple(config: Config, name: str) -> Programme:
+    corners, steps, circle = config.corners, config.steps, config.circle
+    match name:
+        case "hover":
+            return Hover(config.hover.duration_s)
+        case "steps":
+            return Steps(steps.coefficient, steps.duration_s, steps.settle_s)
+        case "circle":
+            return Circle(circle.radius_m, circle.speed_m_s, circle.laps)
+        case "corners":
+            return Corners(
+                corners.north_coefficient,
+                corners.east_coefficient,
+                corners.duration_s,
+                corners.settle_s,
+            )
+        case _:
+            return _doublets(config.identify)
+
+
+def _motions(part: Programme, drag: Drag) -> Iterator[Motion]:
+    """How the vehicle moves in it; with rates of the body, whatever its heading is."""
+    turns = 8 if isinstance(part, Doublets) else 1
+    for k in range(turns):
+        moments = list(predicted(part, tau * k / turns, drag))
+        times, offset, velocity, acceleration = (
+            np.array(column) for column in zip(*moments, strict=True)
+        )
+        jerk, turning = np.zeros_like(offset), np.zeros_like(times)
+        yield Motion(times, offset, velocity, acceleration, jerk, turning)
+
+
+def _refuse(name: str, broken: Violation | None, drag: str = "") -> None:
+    if broken is None:
+        return
+    # Only a trajectory is slowed down by us.
+    remedy = _SLOWER if broken.slowing_helps else broken.remedy
+    raise ConfigError(f"{name}: {broken}; {remedy}{drag}")
+
+
+def _doublets(identify: IdentifyConfig) -> Doublets:
+    return Doublets(
+        tilt_rate=radians(identify.tilt_rate_deg_s),
+        tilt_step=identify.tilt_duration_s,
+        yaw_rate=radians(identify.yaw_rate_deg_s),
+        yaw_step=identify.yaw_duration_s,
+        climb=identify.climb_m_s2,
+        climb_step=identify.climb_duration_s,
+        settle=identify.settle_s,
+    )
+
+
+def _follow(config: Config) -> Follow:
+    """The trajectory of `flight.trajectory`, slowed down if it has to be and may be."""
+    path = config.flight.trajectory
+    if path is None:
+        raise ConfigError("flight.trajectory: name a file, or fly with --trajectory FILE")
+    trajectory, envelope = trajectory_file.load(path), _envelope(config)
+    factor = 1.0
+    if config.flight.slow_down:
+        try:
+            trajectory, factor = slow_down(trajectory, envelope)
+        except TrajectoryError as error:
+            raise ConfigError(f"{path}: {error}") from error
+    elif broken := violations(trajectory, envelope):
+        first = min(broken, key=lambda one: one.slowing_helps)
+        drag = assumption(config) if first.slowing_helps else ""
+        raise ConfigError(f"{path}: {first}; {first.remedy}{drag}")
+    return Follow(trajectory, radians(config.limits.max_yaw_rate_deg_s), factor)
+
+
+def _envelope(config: Config) -> Envelope:
+    """What the vehicle may be asked for, from where the programme begins."""
+    limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
+    return Envelope(
+        max_tilt=radians(limits.max_tilt_deg),
+        max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
+        max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+        min_thrust=min_thrust,
+        max_thrust=max_thrust,
+        max_climb=limits.max_climb_m_s,
+        max_descent=limits.max_descent_m_s,
+        max_speed=config.safety.max_speed_m_s,
+        fence=_fence_check(config, None),
+        drag=most_drag(config),
+        gravity=GRAVITY,
+    )
+
+
+def _fence_check(config: Config, origin: Place | None) -> FenceCheck:
+    return FenceCheck(fence_of(config), config.flight.takeoff_height_m, origin)

@@ -1,0 +1,44 @@
+"""The vehicle's own story: its modes, its arming and its texts, told as events."""
+
+from collections.abc import Callable
+
+from companion.mavlink.texts import StatusText
+from companion.vehicle.state import VehicleState
+
+
+class Chronicle:
+    """Notes what changed since it last looked; looks at each heartbeat.
+
+    Args:
+        state: the vehicle as the link knows it.
+        note: takes each change as a sentence.
+    """
+
+    def __init__(self, state: VehicleState, note: Callable[[str], None]) -> None:
+        self._state = state
+        self._note = note
+        self._mode: str | None = None
+        self._armed: bool | None = None
+        self._last_text: StatusText | None = None
+
+    def look(self) -> None:
+        """Note every change since the last look."""
+        state = self._state
+        for text in self._new_texts():
+            self._note(f"autopilot: {text.text}")
+        if state.mode != self._mode:
+            self._mode = state.mode
+            self._note(f"mode {state.mode}")
+        if state.armed != self._armed:
+            self._armed = state.armed
+            self._note("armed" if state.armed else "disarmed")
+
+    def _new_texts(self) -> list[StatusText]:
+        new: list[StatusText] = []
+        for text in reversed(self._state.texts):
+            if text is self._last_text:
+                break
+            new.insert(0, text)
+        if new:
+            self._last_text = new[-1]
+        return new

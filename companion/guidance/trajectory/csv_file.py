@@ -1,0 +1,230 @@
+"""Trajectories from CSV files, as Agilicious and others publish them.
+
+A header names the columns: Agilicious' `t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,…,a_lin_x,…` or
+`t,x,y,z,yaw,vx,vy,vz,ax,ay,az` and their like; in s, m and rad, quaternions w first. Time and
+position must be there; velocity, acceleration beside velocity, and yaw or else a quaternion are
+used if they are; what else stands there is not.
+"""
+
+import csv
+import io
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+from pathlib import Path
+
+import numpy as np
+
+from companion.files.bounded_file import FileRefusedError, read_text
+from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
+from companion.guidance.trajectory.septic_spline import Floats
+
+_Spellings = tuple[tuple[str, ...], ...]
+
+
+def _of_axes(*patterns: str) -> _Spellings:
+    return tuple(tuple(pattern.format(axis) for axis in "xyz") for pattern in patterns)
+
+
+_SPELLINGS: dict[str, _Spellings] = {
+    "time": (("t",), ("time",), ("time_s",), ("timestamp",)),
+    "position": _of_axes("p_{}", "{}", "p{}", "pos_{}"),
+    "velocity": _of_axes("v_{}", "v{}", "vel_{}", "d{}"),
+    "acceleration": _of_axes("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
+    "yaw": (("yaw",), ("psi",), ("heading",)),
+    "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
+}
+"""Column names by quantity, in lower case; the first spelling that is complete counts."""
+
+_FEWEST = 4
+"""Samples; fewer do not determine a smooth curve."""
+
+_MOST = 50_000
+"""Samples; they are read within half a second."""
+
+_MOST_BYTES = 20_000_000
+"""Of a file: `_MOST` samples of twenty columns with all their digits."""
+
+_LEAST_STEP, _LONGEST_STEP = 1e-4, 10.0
+"""Between two samples, s. Nearer ones differ by rounding; farther ones tell nothing of the way."""
+
+_SHORTEST = 0.1
+"""The whole file, s."""
+
+_RANGES = {
+    "time": (1e10, "s"),
+    "position": (FARTHEST, "m from where it begins"),
+    "velocity": (FASTEST, "m/s"),
+    "acceleration": (1000.0, "m/s²"),
+    "yaw": (1e4, "rad"),
+    "quaternion": (2.0, "for a component"),
+}
+"""Largest number of each quantity, and its unit."""
+
+_LENGTH_ERROR = 0.1
+"""Of a quaternion, which is rounded in a file."""
+
+_SHOWN = 60
+"""Characters of the file in a message."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The samples of a file, in the file's own frame.
+
+    Attributes:
+        times: (m,), s, increasing from 0.
+        position: (m, 3), m.
+        derivatives: velocity, or velocity and acceleration, (m, 3) each, as far as the file goes.
+        yaw: (m,), rad, of tilt-yaw and without jumps; None if the file does not tell.
+    """
+
+    times: Floats
+    position: Floats
+    derivatives: tuple[Floats, ...]
+    yaw: Floats | None
+
+
+def read(path: Path) -> Table:
+    """Read a file.
+
+    Raises:
+        TrajectoryError: it cannot be read or is too large, a column is missing, a value is not a
+            number or outside its range, time does not rise by steps that mean something, or there
+            are too few samples or too many.
+    """
+    try:
+        text = read_text(path, _MOST_BYTES)
+        return table(io.StringIO(text, newline=""), str(path))
+    except FileRefusedError as error:
+        raise TrajectoryError(f"{path}: {error}") from error
+    except csv.Error as error:
+        raise TrajectoryError(f"{path}: not a CSV file") from error
+
+
+def table(lines: Iterable[str], name: str) -> Table:
+    """Take the samples from lines of text, the first of them the header.
+
+    Args:
+        lines: of the file; empty ones and those that begin with # are passed over.
+        name: stands for them in errors.
+
+    Raises:
+        TrajectoryError: as `read`.
+    """
+    reader = csv.reader(lines)
+    samples = (
+        (reader.line_num, row) for row in reader if row and not row[0].lstrip().startswith("#")
+    )
+    rows = list(itertools.islice(samples, _MOST + 2))
+    if len(rows) <= _FEWEST:
+        raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST} samples")
+    if len(rows) > _MOST + 1:
+        raise TrajectoryError(f"{name}: has more than {_MOST} samples; leave some out")
+    header = [column.strip().lower() for column in rows[0][1]]
+    groups = _groups(header, name)
+    data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
+    times = data["time"][:, 0]
+    lines_of = [line for line, _ in rows[1:]]
+    _require_steps(times, lines_of, name)
+    for group, values in data.items():
+        counted = values - values[0] if group == "position" else values
+        _require_range(group, counted, groups[group], lines_of, name)
+    known = [data[group] for group in ("velocity", "acceleration") if group in data]
+    return Table(times - times[0], data["position"], tuple(known), _yaw(data))
+
+
+def _groups(header: list[str], name: str) -> dict[str, tuple[str, ...]]:
+    """The columns of each quantity that the file tells."""
+    groups = {}
+    for group, spellings in _SPELLINGS.items():
+        found = [names for names in spellings if all(column in header for column in names)]
+        if found:
+            groups[group] = found[0]
+        elif group in ("time", "position"):
+            known = " or ".join(",".join(names) for names in spellings)
+            raise TrajectoryError(
+                f"{name}: the header names no {group}; expected {known}, found "
+                f"{_shown(','.join(header))}"
+            )
+    if "velocity" not in groups:
+        groups.pop("acceleration", None)
+    return groups
+
+
+def _numbers(
+    rows: Sequence[tuple[int, Sequence[str]]],
+    header: list[str],
+    names: tuple[str, ...],
+    name: str,
+) -> Floats:
+    """The columns of these names, (m, k)."""
+    columns = [header.index(column) for column in names]
+    numbers = np.empty((len(rows), len(columns)))
+    for k, (line, row) in enumerate(rows):
+        for i, column in enumerate(columns):
+            text = row[column] if column < len(row) else ""
+            try:
+                number = float(text)
+            except ValueError:
+                number = nan
+            # Python would read 1_0 as 10.
+            if not isfinite(number) or "_" in text:
+                raise TrajectoryError(
+                    f"{name}, line {line}: {names[i]} is {_shown(text)!r}, not a number"
+                )
+            numbers[k, i] = number
+    return numbers
+
+
+def _shown(text: str) -> str:
+    """As much of what stands in the file as a sentence can hold."""
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
+
+
+def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
+    """See that time rises, by steps that mean something."""
+    steps = np.diff(times)
+    wrong = np.flatnonzero(~((steps >= 0.999 * _LEAST_STEP) & (steps <= _LONGEST_STEP)))
+    if wrong.size:
+        step, line = float(steps[wrong[0]]), lines[int(wrong[0]) + 1]
+        if step <= 0.0:
+            raise TrajectoryError(f"{name}, line {line}: time does not increase")
+        raise TrajectoryError(
+            f"{name}, line {line}: {step:.3g} s after the sample before; from {_LEAST_STEP:g} to "
+            f"{_LONGEST_STEP:g} s can be used"
+        )
+    if times[-1] - times[0] < _SHORTEST:
+        raise TrajectoryError(f"{name}: lasts less than {_SHORTEST:g} s")
+
+
+def _require_range(
+    group: str, values: Floats, names: tuple[str, ...], lines: Sequence[int], name: str
+) -> None:
+    """See that a quantity is one that a vehicle can have."""
+    most, unit = _RANGES[group]
+    outside = np.argwhere(~(np.abs(values) <= most))
+    if outside.size:
+        k, i = (int(index) for index in outside[0])
+        raise TrajectoryError(
+            f"{name}, line {lines[k]}: {names[i]} is {values[k, i]:.3g}, more than {most:g} {unit}"
+        )
+    if group == "quaternion":
+        lengths = np.linalg.norm(values, axis=1)
+        bad = np.flatnonzero(np.abs(lengths - 1.0) > _LENGTH_ERROR)
+        if bad.size:
+            raise TrajectoryError(
+                f"{name}, line {lines[int(bad[0])]}: the quaternion has the length "
+                f"{lengths[bad[0]]:.3g}, not 1"
+            )
+
+
+def _yaw(data: dict[str, Floats]) -> Floats | None:
+    """From the yaw column, else from the quaternion."""
+    if "yaw" in data:
+        return np.unwrap(data["yaw"][:, 0])
+    if "quaternion" in data:
+        q = data["quaternion"]
+        return np.unwrap(2.0 * np.arctan2(q[:, 3], q[:, 0]))
+    return None

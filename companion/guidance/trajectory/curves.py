@@ -1,0 +1,229 @@
+"""Curves in space, over a phase that knows no time, with three exact derivatives.
+
+Each begins at (0, 0, 0). Angles are radians, lengths metres, the frame is NED.
+"""
+
+from dataclasses import dataclass
+from math import cos, hypot, sin, sqrt, tau
+from typing import NamedTuple, Protocol
+
+from companion.guidance.trajectory.sample import TrajectoryError, Vector
+
+
+class CurvePoint(NamedTuple):
+    """A point of a curve and its derivatives by the phase, m per unit of phase to the k-th."""
+
+    position: Vector
+    first: Vector
+    second: Vector
+    third: Vector
+
+
+class Looks(NamedTuple):
+    """Where to look at a curve so that nothing is missed between two looks.
+
+    Attributes:
+        step: phase between two looks; None where `phases` lists them.
+        period: after this phase it repeats itself, but for a steady rise; None: it does not.
+        phases: of the looks, ascending.
+    """
+
+    step: float | None
+    period: float | None = None
+    phases: tuple[float, ...] = ()
+
+
+PATH_STEP = 0.25
+"""Largest way between two looks, m."""
+
+MOST_LOOKS = 80_000
+"""Looks at one trajectory, about a second of work."""
+
+_LOOKS_A_LAP = 720
+"""An extreme of the k-th harmonic is then missed by 0.001 k² % at most."""
+
+
+def require_looks(needed: float) -> None:
+    """See that a trajectory can be judged with a bounded number of looks.
+
+    Raises:
+        TrajectoryError: it cannot.
+    """
+    if not needed <= MOST_LOOKS:
+        raise TrajectoryError(
+            f"it is too long to be checked: it takes {needed:.3g} samples, and {MOST_LOOKS} are "
+            "the most; make it shorter, or let it gather speed more quickly"
+        )
+
+
+def _looks_of(figure: "Figure") -> Looks:
+    return Looks(min(tau / _LOOKS_A_LAP, PATH_STEP / figure.steepest), tau)
+
+
+class Curve(Protocol):
+    """A curve over its phase."""
+
+    def at(self, phase: float) -> CurvePoint:
+        """The point at `phase`."""
+        ...
+
+    def looks(self) -> Looks:
+        """How finely it is to be looked at."""
+        ...
+
+
+class Figure(Curve, Protocol):
+    """A curve of which is known how far it goes per phase."""
+
+    @property
+    def steepest(self) -> float:
+        """Largest length of the first derivative, m per unit of phase."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """A straight line; the phase is the way along it in m.
+
+    Attributes:
+        direction: of length 1.
+    """
+
+    direction: Vector
+
+    def looks(self) -> Looks:
+        """The phase is the way."""
+        return Looks(PATH_STEP)
+
+    def at(self, phase: float) -> CurvePoint:
+        """The point `phase` metres along."""
+        north, east, down = self.direction
+        none = (0.0, 0.0, 0.0)
+        return CurvePoint((phase * north, phase * east, phase * down), self.direction, none, none)
+
+
+@dataclass(frozen=True, slots=True)
+class Helix:
+    """Rounds about a centre `radius` north of the start, setting off eastwards; phase 2π a round.
+
+    Attributes:
+        radius: m.
+        rise: upwards in each round, m; 0 makes a circle.
+    """
+
+    radius: float
+    rise: float = 0.0
+
+    @property
+    def steepest(self) -> float:
+        """The same everywhere."""
+        return hypot(self.radius, self.rise / tau)
+
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
+
+    def at(self, phase: float) -> CurvePoint:
+        """The point at the angle `phase`."""
+        r, up = self.radius, self.rise / tau
+        s, c = r * sin(phase), r * cos(phase)
+        return CurvePoint((r - c, s, -up * phase), (s, c, -up), (c, -s, 0.0), (-s, -c, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class GeronoEight:
+    """Lemniscate of Gerono, (A sin φ, A sin φ cos φ): north-south, begun in the middle.
+
+    Attributes:
+        half_width: A, m.
+    """
+
+    half_width: float
+
+    @property
+    def steepest(self) -> float:
+        """In the middle."""
+        return sqrt(2.0) * self.half_width
+
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
+
+    def at(self, phase: float) -> CurvePoint:
+        """The point at the angle `phase`."""
+        a = self.half_width
+        s, c = a * sin(phase), a * cos(phase)
+        s2, c2 = a * sin(2.0 * phase), a * cos(2.0 * phase)
+        return CurvePoint(
+            (s, 0.5 * s2, 0.0), (c, c2, 0.0), (-s, -2.0 * s2, 0.0), (-c, -4.0 * c2, 0.0)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BernoulliEight:
+    """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ): as Gerono's, but rounder.
+
+    Attributes:
+        half_width: A, m.
+    """
+
+    half_width: float
+
+    @property
+    def steepest(self) -> float:
+        """At the tips; in the middle it is 1/√2 of this."""
+        return self.half_width
+
+    def looks(self) -> Looks:
+        """The same in each lap."""
+        return _looks_of(self)
+
+    def at(self, phase: float) -> CurvePoint:
+        """The point at the angle `phase`."""
+        a = self.half_width
+        s, c, s2, c2 = sin(phase), cos(phase), sin(2.0 * phase), cos(2.0 * phase)
+        below = (0.5 * (3.0 + c2), -s2, -2.0 * c2, 4.0 * s2)
+        n = _quotient((a * s, a * c, -a * s, -a * c), below)
+        e = _quotient((0.5 * a * s2, a * c2, -2.0 * a * s2, -4.0 * a * c2), below)
+        return CurvePoint(*((n[k], e[k], 0.0) for k in range(4)))
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """A figure turned about the vertical through its start.
+
+    Attributes:
+        figure: what is turned.
+        angle: clockwise seen from above, rad.
+    """
+
+    figure: Figure
+    angle: float
+
+    @property
+    def steepest(self) -> float:
+        """That of the figure."""
+        return self.figure.steepest
+
+    def looks(self) -> Looks:
+        """Those of the figure."""
+        return self.figure.looks()
+
+    def at(self, phase: float) -> CurvePoint:
+        """The turned point."""
+        s, c = sin(self.angle), cos(self.angle)
+        return CurvePoint(*((c * n - s * e, s * n + c * e, d) for n, e, d in self.figure.at(phase)))
+
+
+_Jet = tuple[float, float, float, float]
+"""A value and its first three derivatives."""
+
+
+def _quotient(above: _Jet, below: _Jet) -> _Jet:
+    """Of a quotient q = above/below, by Leibniz' rule for above = q·below."""
+    d0, d1, d2, d3 = below
+    q0 = above[0] / d0
+    q1 = (above[1] - q0 * d1) / d0
+    q2 = (above[2] - 2.0 * q1 * d1 - q0 * d2) / d0
+    q3 = (above[3] - 3.0 * q2 * d1 - 3.0 * q1 * d2 - q0 * d3) / d0
+    return q0, q1, q2, q3

@@ -1,0 +1,99 @@
+"""What a trajectory demands of the vehicle: tilt, rates, thrust, speeds, room."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.drag import Drag
+from companion.guidance.trajectory.sample import Trajectory
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A trajectory at (m,) times; vectors are (m, 3), NED, from where it begins."""
+
+    times: Floats
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    heading_rate: Floats
+
+    def slowed(self, factor: float) -> "Motion":
+        """Of the trajectory stretched in time by `factor`."""
+        return Motion(
+            self.times * factor,
+            self.position,
+            self.velocity / factor,
+            self.acceleration / factor**2,
+            self.jerk / factor**3,
+            self.heading_rate / factor,
+        )
+
+
+def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
+    """The motion at some times, or at those at which all of it can be judged.
+
+    Raises:
+        TrajectoryError: it is too long to be judged.
+        FloatingPointError: it is not a finite number somewhere; see `computable`.
+    """
+    times = trajectory.check_times() if times is None else times
+    samples = [trajectory.at(time) for time in times]
+    position, velocity, acceleration, jerk, heading, heading_rate = (
+        np.array(column) for column in zip(*samples, strict=True)
+    )
+    motion = Motion(np.array(times), position, velocity, acceleration, jerk, heading_rate)
+    # A comparison with a limit is false for what is not a number.
+    for column in (position, velocity, acceleration, jerk, heading, heading_rate):
+        if not np.isfinite(column).all():
+            raise FloatingPointError("not a finite number")
+    return motion
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What the rotors must do for a motion, each (m,).
+
+    The rotors have to give f = a + d − g, d the deceleration by drag; the body's vertical axis
+    points along it, and turns with the part of ḟ = jerk + ḋ that is across f. Differential
+    flatness, as in Faessler, Franchi & Scaramuzza, RA-L 2018, for drag that is the same along all
+    axes.
+
+    Attributes:
+        tilt: of f from the vertical, rad.
+        tilt_rate: the roll-pitch rate, rad/s.
+        thrust: specific, the length of f, m/s².
+    """
+
+    tilt: Floats
+    tilt_rate: Floats
+    thrust: Floats
+
+
+def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
+    """What a motion takes.
+
+    Args:
+        motion: in still air.
+        drag: of the vehicle.
+        gravity: m/s².
+    """
+    velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)
+    slowed = np.stack(drag.deceleration(velocity), axis=1)
+    force = motion.acceleration + slowed - np.array([0.0, 0.0, gravity])
+    growth = motion.jerk + np.stack(drag.growth(velocity, acceleration), axis=1)
+    thrust = np.linalg.norm(force, axis=1)
+    tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), -force[:, 2])
+    # Without thrust there is no axis that could turn, and the thrust itself is what is wrong.
+    across = np.linalg.norm(np.cross(force, growth), axis=1)
+    tilt_rate = np.divide(across, thrust**2, out=np.zeros_like(across), where=thrust > 0.0)
+    return Demand(tilt, tilt_rate, thrust)
+
+
+def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+    return vectors[:, 0], vectors[:, 1], vectors[:, 2]

@@ -1,0 +1,152 @@
+"""Trajectories of a known form: hover, line, circle, eights, helix."""
+
+from dataclasses import dataclass, replace
+from math import atan2, hypot, pi, sqrt, tau
+
+from companion.guidance.trajectory.curves import (
+    BernoulliEight,
+    Figure,
+    GeronoEight,
+    Helix,
+    Straight,
+    Turned,
+)
+from companion.guidance.trajectory.sample import LEAST_WAY, Sample, TrajectoryError, Vector
+from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJerk
+from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
+
+_LARGEST_RAMP = 0.5
+"""Of the time that the whole way takes at the steady rate. A ramp then takes a quarter of the way
+at most, and the fastest place of a single lap of any figure here lies between the two."""
+
+_REST = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Hover:
+    """Stay where it begins.
+
+    Attributes:
+        duration: s.
+    """
+
+    duration: float
+    name: str = "hover"
+
+    @property
+    def holds_heading(self) -> bool:
+        """It does."""
+        return True
+
+    def check_times(self) -> list[float]:
+        """Its beginning and its end."""
+        return [0.0, self.duration]
+
+    def at(self, time: float) -> Sample:
+        """At rest."""
+        return Sample(_REST, _REST, _REST, _REST, 0.0, 0.0)
+
+
+def line(
+    to: Vector, speed: float, acceleration: float, jerk: float, along: bool = False
+) -> TimedCurve:
+    """A straight line, rest to rest, as fast as three limits allow.
+
+    Args:
+        to: the end, (north, east, down) of the start, m.
+        speed: largest, m/s.
+        acceleration: largest, m/s².
+        jerk: largest, m/s³.
+        along: face along it, instead of holding the heading.
+
+    Raises:
+        TrajectoryError: it leads nowhere, or a limit is not positive, or it is vertical and
+            `along`.
+    """
+    length = sqrt(sum(x * x for x in to))
+    if length < LEAST_WAY:
+        raise TrajectoryError("a line must lead somewhere else than where it begins")
+    if along and hypot(to[0], to[1]) == 0.0:
+        raise TrajectoryError("a vertical line has no heading to face along")
+    north, east, down = (x / length for x in to)
+    law = LimitedJerk(length, speed, acceleration, jerk)
+    heading = TangentHeading(atan2(east, north)) if along else HeldHeading()
+    return TimedCurve("line", Straight((north, east, down)), law, heading)
+
+
+@dataclass(frozen=True, slots=True)
+class Laps:
+    """How a figure is gone round: from rest to rest, at a steady pace between.
+
+    Attributes:
+        speed: at the fastest place, m/s.
+        laps: how often round, gathering and losing speed included.
+        acceleration: largest along the path while speed is gathered or lost, m/s². Too few laps
+            for it take more.
+        direction: in which the figure lies from the start, clockwise from north, rad.
+        along: face along the path, instead of holding the heading.
+    """
+
+    speed: float
+    laps: float = 1.0
+    acceleration: float = 3.0
+    direction: float = 0.0
+    along: bool = False
+
+
+def circle(radius: float, laps: Laps) -> TimedCurve:
+    """A circle of `radius` metres whose centre lies in `laps.direction`, anticlockwise from above.
+
+    Raises:
+        TrajectoryError: the radius, the speed, the laps or the acceleration is not positive.
+    """
+    return _rounds("circle", radius, Helix(radius), laps, TangentHeading(pi / 2.0, -1.0))
+
+
+def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
+    """A circle that rises by `rise` metres each lap; sinks, if that is negative.
+
+    Raises:
+        TrajectoryError: as `circle`.
+    """
+    return _rounds("helix", radius, Helix(radius, rise), laps, TangentHeading(pi / 2.0, -1.0))
+
+
+def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
+    """A lemniscate of Gerono, `half_width` metres to both sides along `laps.direction`.
+
+    Its phase runs steadily, as is usual in the literature: it is fastest in the middle.
+
+    Raises:
+        TrajectoryError: as `circle`, or the laps are not whole.
+    """
+    return _eight("gerono eight", half_width, GeronoEight(half_width), laps)
+
+
+def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
+    """A lemniscate of Bernoulli, likewise; with a steady phase it is fastest at the tips.
+
+    Raises:
+        TrajectoryError: as `gerono_eight`.
+    """
+    return _eight("bernoulli eight", half_width, BernoulliEight(half_width), laps)
+
+
+def _eight(name: str, half_width: float, curve: Figure, laps: Laps) -> TimedCurve:
+    if laps.laps % 1.0:
+        raise TrajectoryError("the laps of a figure-eight must be whole")
+    return _rounds(name, half_width, curve, laps, TangentHeading(-pi / 2.0))
+
+
+def _rounds(
+    name: str, size: float, curve: Figure, laps: Laps, tangent: TangentHeading
+) -> TimedCurve:
+    if min(size, laps.speed, laps.laps, laps.acceleration) <= 0.0:
+        raise TrajectoryError(f"size, speed, laps and acceleration of a {name} must be positive")
+    length, rate = tau * laps.laps, laps.speed / curve.steepest
+    ramp = min(STEEPEST * laps.speed / laps.acceleration, _LARGEST_RAMP * length / rate)
+    if laps.direction:
+        curve = Turned(curve, laps.direction)
+        tangent = replace(tangent, middle=tangent.middle + laps.direction)
+    heading = tangent if laps.along else HeldHeading()
+    return TimedCurve(name, curve, Cruise(length, rate, ramp, ramp), heading)

@@ -1,0 +1,187 @@
+"""A trajectory from samples of it, in whatever frame they are given."""
+
+from enum import Enum
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.guidance.trajectory.check_times import require_duration
+from companion.guidance.trajectory.csv_file import Table
+from companion.guidance.trajectory.sample import TrajectoryError
+from companion.guidance.trajectory.septic_spline import Floats, SepticSpline
+from companion.guidance.trajectory.spline_curve import (
+    HEADING_LOOKS,
+    SplineCurve,
+    heading_spline,
+    smoothed,
+    tangent_heading,
+)
+from companion.guidance.trajectory.time_laws import STEEPEST, Cruise
+from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
+
+_AT_REST = 0.1
+"""Samples that begin or end slower than this are meant to be at rest there, m/s."""
+
+_LOOKS = 16
+"""At each piece of the spline: it is smooth over two of them, a period of the cutoff."""
+
+_MOST_PIECES = 4500
+"""Pieces of the spline, two for each period of the cutoff; it is fitted within a second."""
+
+_LARGEST_RAMP = 0.5
+"""Of the duration may be taken by gathering speed, and by losing it."""
+
+
+class _Quantity(NamedTuple):
+    """A derivative that a file may give, and how far it may be off: floor + share × its size.
+
+    Both as root of the mean square. Published accelerations may jump where ours does not.
+
+    Attributes:
+        name: of it.
+        unit: of it and of the floor.
+        share: allowed, of its size.
+        floor: allowed, however small it is.
+    """
+
+    name: str
+    unit: str
+    share: float
+    floor: float
+
+
+_DERIVATIVES = (
+    _Quantity("velocity", "m/s", 0.2, 0.1),
+    _Quantity("acceleration", "m/s²", 0.5, 1.0),
+)
+
+
+class Frame(Enum):
+    """World frames of published trajectories."""
+
+    ENU = "enu"
+    """x east, y north, z up; yaw anticlockwise from east (ROS, REP 103)."""
+    NWU = "nwu"
+    """x north, y west, z up; yaw anticlockwise from north."""
+    NED = "ned"
+    """x north, y east, z down; yaw clockwise from north."""
+
+
+class _ToNed(NamedTuple):
+    """(3, 3), and heading = offset + sign·yaw in rad."""
+
+    rotation: Floats
+    offset: float
+    sign: float
+
+
+_TO_NED = {
+    Frame.ENU: _ToNed(np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]]), np.pi / 2.0, -1.0),
+    Frame.NWU: _ToNed(np.diag([1.0, -1.0, -1.0]), 0.0, -1.0),
+    Frame.NED: _ToNed(np.eye(3), 0.0, 1.0),
+}
+
+
+class HeadingFrom(Enum):
+    """Where the heading comes from."""
+
+    FIXED = "fixed"
+    """The start."""
+    ALONG = "along"
+    """The path."""
+    FILE = "file"
+    """The samples' yaw; fixed if they have none."""
+
+
+class SampleOptions(NamedTuple):
+    """How samples are understood.
+
+    Attributes:
+        frame: in which they are given.
+        heading: where it comes from.
+        cutoff: what is quicker than this is taken for noise or rounding, Hz.
+        acceleration: largest along the path while speed is gathered or lost where the samples do
+            not begin or end at rest, m/s².
+    """
+
+    frame: Frame = Frame.ENU
+    heading: HeadingFrom = HeadingFrom.FILE
+    cutoff: float = 5.0
+    acceleration: float = 3.0
+
+
+def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> TimedCurve:
+    """A smooth trajectory through samples, from rest to rest.
+
+    Samples that are in motion at an end are flown more slowly there: the time of the file then
+    runs from standstill up to its true pace, and the trajectory lasts longer than the samples.
+
+    Raises:
+        TrajectoryError: velocity or acceleration are not the derivatives of the position, or it
+            lasts too long.
+    """
+    _require_short(table, options.cutoff)
+    to_ned = _TO_NED[options.frame]
+    position = (table.position - table.position[0]) @ to_ned.rotation.T
+    derivatives = tuple(known @ to_ned.rotation.T for known in table.derivatives)
+    spline = smoothed(table.times, position, options.cutoff, derivatives)
+    _check(spline, table.times, derivatives)
+    speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
+    resting = speeds[0] < _AT_REST, speeds[1] < _AT_REST
+    spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
+    ramps = [
+        0.0 if rests else min(STEEPEST * speed / options.acceleration, _LARGEST_RAMP * spline.end)
+        for rests, speed in zip(resting, speeds, strict=True)
+    ]
+    law = Cruise(spline.end, 1.0, *ramps)
+    heading = _heading(spline, table, options, resting)
+    step = inf if isinstance(heading, HeldHeading) else HEADING_LOOKS
+    return TimedCurve(name, SplineCurve(spline, _LOOKS, step), law, heading)
+
+
+def _require_short(table: Table, cutoff: float) -> None:
+    """See that fitting it takes bounded work."""
+    lasts = float(table.times[-1])
+    require_duration(lasts)
+    if lasts * 2.0 * cutoff > _MOST_PIECES:
+        most = _MOST_PIECES / (2.0 * cutoff)
+        raise TrajectoryError(
+            f"it lasts {lasts:.4g} s, and {most:.4g} s is the longest with cutoff_hz {cutoff:g}; "
+            "lower that, or fly a part of it"
+        )
+
+
+def _speed(spline: SepticSpline, time: float) -> float:
+    return float(np.linalg.norm([axis[1] for axis in spline.at(time)]))
+
+
+def _check(spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]) -> None:
+    """That what the file calls velocity and acceleration are that."""
+    motion = spline.along(times)
+    for order, (known, quantity) in enumerate(zip(derivatives, _DERIVATIVES, strict=False), 1):
+        missed = np.linalg.norm(motion[:, :, order] - known, axis=1)
+        size = np.linalg.norm(known, axis=1)
+        if _root_mean_square(missed) > quantity.share * _root_mean_square(size) + quantity.floor:
+            worst = int(np.argmax(missed))
+            raise TrajectoryError(
+                f"the {quantity.name} is not the derivative of the positions: at "
+                f"{times[worst]:.2f} s it is off by {missed[worst]:.1f} {quantity.unit}. Is it in "
+                "another frame, or with gravity? Without these columns it is computed"
+            )
+
+
+def _root_mean_square(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _heading(
+    spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
+) -> Heading:
+    """As the options say."""
+    if options.heading is HeadingFrom.ALONG:
+        return tangent_heading(spline, resting)
+    if options.heading is HeadingFrom.FIXED or table.yaw is None:
+        return HeldHeading()
+    _, offset, sign = _TO_NED[options.frame]
+    return heading_spline(table.times, offset + sign * table.yaw, resting)

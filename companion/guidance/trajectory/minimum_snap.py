@@ -1,0 +1,163 @@
+"""The smoothest septic spline through what is fixed and near what was observed.
+
+Smoothest is the one whose snap has the smallest integral of squares: Mellinger & Kumar, Minimum
+snap trajectory generation and control for quadrotors, ICRA 2011. The unknowns are the states at the
+knots (Richter, Bry & Roy 2013); as a piece joins only two of them, the equations are
+block-tridiagonal, and the work grows as the number of knots.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.guidance.trajectory.septic_spline import (
+    FROM_ENDS,
+    ORDER,
+    Floats,
+    SepticSpline,
+    derivative_rows,
+)
+
+_CONDITION = 1e-13
+"""Of the scaled equations at a knot; below it they do not determine the spline."""
+
+
+class Fixed(NamedTuple):
+    """What the spline must meet.
+
+    Attributes:
+        states: (k, 4, n), value and three derivatives of n series at each knot.
+        mask: (k, 4), which of them are meant.
+    """
+
+    states: Floats
+    mask: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """What the spline should come near to.
+
+    Attributes:
+        times: (m,), s.
+        values: (m, n).
+        weights: (m,), of the squared differences.
+        derivative: which derivative was observed; 0 is the value.
+    """
+
+    times: Floats
+    values: Floats
+    weights: Floats
+    derivative: int = 0
+
+
+class _Equations(NamedTuple):
+    """A symmetric block-tridiagonal system: (k, 4, 4), (k−1, 4, 4) right of it, and (k, 4, n)."""
+
+    diagonal: Floats
+    upper: Floats
+    right: Floats
+
+
+def minimum_snap(
+    knots: Floats, fixed: Fixed, observations: tuple[Observations, ...] = (), stiffness: float = 1.0
+) -> SepticSpline:
+    """Minimise stiffness·∫ snap² dt + the weighted squares of what is missed of the observations.
+
+    Args:
+        knots: (k,), increasing, s.
+        fixed: met exactly.
+        observations: met as well as smoothness allows; within the knots.
+        stiffness: of the integral.
+
+    Raises:
+        numpy.linalg.LinAlgError: too little is fixed and observed.
+    """
+    # Time is counted in mean spans: the entries, powers of spans up to the seventh, stay near 1.
+    unit = float((knots[-1] - knots[0]) / (knots.size - 1))
+    spans = np.diff(knots) / unit
+    equations = _smoothness(spans, stiffness / unit**7, fixed.states.shape[2])
+    for observed in observations:
+        _add(equations, knots, spans, unit, observed)
+    scale = unit ** np.arange(ORDER)
+    states = _solved(equations, fixed.states * scale[:, None], fixed.mask)
+    return SepticSpline(knots, states / scale[:, None])
+
+
+def _smoothness(spans: Floats, stiffness: float, series: int) -> _Equations:
+    """Half the gradient of the integral of squared snap."""
+    powers = np.arange(ORDER)
+    # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
+    snap = np.array([24.0, 120.0, 360.0, 840.0])
+    energy = np.outer(snap, snap) / (powers[:, None] + powers + 1.0)
+    unit = FROM_ENDS[ORDER:].T @ energy @ FROM_ENDS[ORDER:]
+    ends = spans[:, None] ** np.tile(powers, 2)
+    blocks = stiffness * unit * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
+    diagonal = np.zeros((spans.size + 1, ORDER, ORDER))
+    diagonal[:-1] += blocks[:, :ORDER, :ORDER]
+    diagonal[1:] += blocks[:, ORDER:, ORDER:]
+    return _Equations(
+        diagonal, blocks[:, :ORDER, ORDER:].copy(), np.zeros((spans.size + 1, ORDER, series))
+    )
+
+
+def _add(
+    equations: _Equations, knots: Floats, spans: Floats, unit: float, observed: Observations
+) -> None:
+    """Add half the gradient of the squares of what is missed of the observations."""
+    piece = np.clip(np.searchsorted(knots, observed.times, side="right") - 1, 0, spans.size - 1)
+    span = spans[piece]
+    fractions = (observed.times - knots[piece]) / (span * unit)
+    ends = span[:, None] ** np.tile(np.arange(ORDER), 2)
+    rows = derivative_rows(fractions, observed.derivative) @ FROM_ENDS * ends
+    rows /= (span[:, None] * unit) ** observed.derivative
+    weighted = rows * observed.weights[:, None]
+    squares = weighted[:, :, None] * rows[:, None, :]
+    moments = weighted[:, :, None] * observed.values[:, None, :]
+    np.add.at(equations.diagonal, piece, squares[:, :ORDER, :ORDER])
+    np.add.at(equations.diagonal, piece + 1, squares[:, ORDER:, ORDER:])
+    np.add.at(equations.upper, piece, squares[:, :ORDER, ORDER:])
+    np.add.at(equations.right, piece, moments[:, :ORDER])
+    np.add.at(equations.right, piece + 1, moments[:, ORDER:])
+
+
+def _solved(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
+    """The states (k, 4, n) of smallest cost among those that agree with `states` at `mask`."""
+    met = np.where(mask[:, :, None], states, 0.0)
+    diagonal, upper, right = equations
+    right = right - diagonal @ met
+    right[:-1] -= upper @ met[1:]
+    right[1:] -= upper.transpose(0, 2, 1) @ met[:-1]
+    right[mask] = met[mask]
+    free = ~mask
+    diagonal = diagonal * (free[:, :, None] & free[:, None, :]) + mask[:, :, None] * np.eye(ORDER)
+    upper = upper * (free[:-1, :, None] & free[1:, None, :])
+    return _eliminated(diagonal, upper, right)
+
+
+def _eliminated(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
+    """Solve a symmetric positive definite block-tridiagonal system by Gaussian elimination.
+
+    Raises:
+        numpy.linalg.LinAlgError: it is not positive definite.
+    """
+    scale = 1.0 / np.sqrt(np.einsum("kii->ki", diagonal))
+    diagonal = diagonal * scale[:, :, None] * scale[:, None, :]
+    upper = upper * scale[:-1, :, None] * scale[1:, None, :]
+    right = right * scale[:, :, None]
+    reduced = np.empty_like(upper)
+    pivot = diagonal[0]
+    for k in range(len(upper)):
+        both = np.linalg.solve(pivot, np.concatenate((upper[k], right[k]), axis=1))
+        reduced[k], right[k] = both[:, :ORDER], both[:, ORDER:]
+        pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
+        right[k + 1] -= upper[k].T @ right[k]
+    if np.linalg.eigvalsh(pivot)[0] < _CONDITION:
+        raise np.linalg.LinAlgError("too little is fixed and observed to determine the spline")
+    right[-1] = np.linalg.solve(pivot, right[-1])
+    for k in range(len(upper) - 1, -1, -1):
+        right[k] -= reduced[k] @ right[k + 1]
+    states: Floats = right * scale[:, :, None]
+    return states

@@ -1,0 +1,198 @@
+"""Time laws: how far along a curve, and how fast, at which time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import NamedTuple, Protocol
+
+from companion.guidance.trajectory.sample import TrajectoryError
+
+STEEPEST = 2.1875
+"""Largest slope of the septic blend, 140·(1/2)⁶."""
+
+
+class Progress(NamedTuple):
+    """The phase of a curve at one time, and its derivatives by time.
+
+    Attributes:
+        phase: in the curve's unit.
+        first, second, third: per s, s², s³.
+    """
+
+    phase: float
+    first: float = 0.0
+    second: float = 0.0
+    third: float = 0.0
+
+
+class Piece(NamedTuple):
+    """A part of a time law in which its derivatives are smooth.
+
+    Attributes:
+        begin, end: s.
+        steady: whether the rate is constant in it.
+    """
+
+    begin: float
+    end: float
+    steady: bool
+
+
+class TimeLaw(Protocol):
+    """Progress along a curve over time."""
+
+    def pieces(self) -> Sequence[Piece]:
+        """Its smooth parts, in order, from 0 to the duration."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        ...
+
+    def at(self, time: float) -> Progress:
+        """Progress at `time`; at rest before 0 and past the duration."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Cruise:
+    """A steady rate, gathered and lost by the septic blend: snap is still continuous.
+
+    With both ramps 0 the rate is there at once, which is for curves that rest at their ends.
+
+    Attributes:
+        length: of the whole phase.
+        rate: steady, per s.
+        gathering: how long the rate is gathered, s.
+        losing: how long it is lost, s.
+    """
+
+    length: float
+    rate: float
+    gathering: float = 0.0
+    losing: float = 0.0
+
+    @property
+    def duration(self) -> float:
+        """The way at the steady rate, and half of each ramp more, s."""
+        return self.length / self.rate + 0.5 * (self.gathering + self.losing)
+
+    def pieces(self) -> list[Piece]:
+        """Gathering, steady, losing."""
+        brake = self.duration - self.losing
+        return [
+            Piece(0.0, self.gathering, False),
+            Piece(self.gathering, brake, True),
+            Piece(brake, self.duration, False),
+        ]
+
+    def at(self, time: float) -> Progress:
+        """Progress at `time`."""
+        left = self.duration - time
+        if time < 0.0:
+            return Progress(0.0)
+        if left < 0.0:
+            return Progress(self.length)
+        if time < self.gathering:
+            return _ramp(self.rate, self.gathering, time)
+        if left < self.losing:
+            phase, first, second, third = _ramp(self.rate, self.losing, left)
+            return Progress(self.length - phase, first, -second, third)
+        return Progress(self.rate * (time - 0.5 * self.gathering), self.rate)
+
+
+def _ramp(rate: float, duration: float, time: float) -> Progress:
+    """A rate gathered as 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷ of itself, u = time/duration."""
+    u = time / duration
+    v = 1.0 - u
+    u3 = u * u * u
+    return Progress(
+        rate * duration * u3 * u * u * (7.0 + u * (-14.0 + u * (10.0 - 2.5 * u))),
+        rate * u3 * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
+        rate / duration * 140.0 * u3 * v * v * v,
+        rate / (duration * duration) * 420.0 * u * u * v * v * (1.0 - 2.0 * u),
+    )
+
+
+_CRUISING = 3
+"""Which of the seven pieces of constant jerk has neither jerk nor acceleration."""
+
+
+class LimitedJerk:
+    """Rest to rest by seven pieces of constant jerk: the fastest within the three limits.
+
+    Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008),
+    section 3.4, double S with equal limits in both directions.
+    """
+
+    def __init__(self, length: float, speed: float, acceleration: float, jerk: float) -> None:
+        """Plan it.
+
+        Args:
+            length: how far, m.
+            speed: never exceeded, m/s; reached if `length` allows.
+            acceleration: never exceeded, m/s².
+            jerk: never exceeded, m/s³.
+
+        Raises:
+            TrajectoryError: one of them is not positive.
+        """
+        if min(length, speed, acceleration, jerk) <= 0.0:
+            raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
+        turning = min(acceleration / jerk, sqrt(speed / jerk))
+        gathering = turning + speed / (jerk * turning)
+        cruising = length / speed - gathering
+        if cruising < 0.0:
+            cruising = 0.0
+            turning = min(acceleration / jerk, (length / (2.0 * jerk)) ** (1.0 / 3.0))
+            gathering = turning / 2.0 + sqrt(turning**2 / 4.0 + length / (jerk * turning))
+        steady = max(gathering - 2.0 * turning, 0.0)
+        self._length = length
+        faster = ((turning, jerk), (steady, 0.0), (turning, -jerk))
+        slower = ((turning, -jerk), (steady, 0.0), (turning, jerk))
+        self._pieces = _joined((*faster, (cruising, 0.0), *slower))
+        self._ends = [start for start, _, _ in self._pieces[1:]]
+        self.duration = 2.0 * gathering + cruising
+        """How long it lasts, s."""
+
+    def pieces(self) -> list[Piece]:
+        """The seven of constant jerk."""
+        begins = [start for start, _, _ in self._pieces]
+        spans = zip(begins, [*begins[1:], self.duration], strict=True)
+        return [Piece(begin, end, k == _CRUISING) for k, (begin, end) in enumerate(spans)]
+
+    def at(self, time: float) -> Progress:
+        """Progress at `time`."""
+        if time < 0.0:
+            return Progress(0.0)
+        if time >= self.duration:
+            return Progress(self._length)
+        which = sum(time >= end for end in self._ends)
+        start, state, jerk = self._pieces[which]
+        return _moved(state, jerk, time - start)
+
+
+_Piece = tuple[float, Progress, float]
+"""(beginning in s, progress there, jerk)."""
+
+
+def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
+    """Pieces (duration, jerk) one after the other, from rest."""
+    pieces = []
+    start, state = 0.0, Progress(0.0)
+    for duration, jerk in jerks:
+        pieces.append((start, state, jerk))
+        start, state = start + duration, _moved(state, jerk, duration)
+    return pieces
+
+
+def _moved(state: Progress, jerk: float, time: float) -> Progress:
+    """Progress after `time` of constant jerk."""
+    s, v, a, _ = state
+    return Progress(
+        s + time * (v + time * (a / 2.0 + time * jerk / 6.0)),
+        v + time * (a + time * jerk / 2.0),
+        a + time * jerk,
+        jerk,
+    )

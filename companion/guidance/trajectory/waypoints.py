@@ -1,0 +1,122 @@
+"""Waypoints joined by minimum snap, as fast as a speed and an acceleration allow."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.guidance.trajectory.check_times import require_duration
+from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
+from companion.guidance.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
+from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
+from companion.guidance.trajectory.spline_curve import (
+    HEADING_LOOKS,
+    SplineCurve,
+    SplineHeading,
+    tangent_heading,
+)
+from companion.guidance.trajectory.time_laws import Cruise
+from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
+
+_LOOKS = 200
+"""In each segment, for its largest speed and acceleration."""
+
+
+def waypoints(
+    points: Sequence[Vector],
+    speed: float,
+    acceleration: float,
+    along: bool = False,
+    headings: Sequence[float | None] = (),
+) -> TimedCurve:
+    """From rest at the start through all points without a stop, to rest at the last.
+
+    A segment lasts in proportion to what a trapezoid of speed from rest to rest takes for it. The
+    whole is then made as fast as the two limits allow: one of them is met exactly.
+
+    Args:
+        points: (north, east, down) of the start, m; the start itself is not among them.
+        speed: largest, m/s.
+        acceleration: largest, m/s².
+        along: face along it, instead of holding the heading.
+        headings: at each point in rad from north, or None where it does not matter. From one to
+            the next the vehicle turns the short way.
+
+    Raises:
+        TrajectoryError: no points, two equal ones after each other, a limit that is not positive,
+            or headings that do not fit.
+    """
+    if min(speed, acceleration) <= 0.0:
+        raise TrajectoryError("speed and acceleration of waypoints must be positive")
+    if along and headings:
+        raise TrajectoryError("waypoints have either their own headings or one along the path")
+    if headings and len(headings) != len(points):
+        raise TrajectoryError(
+            f"there are {len(headings)} headings for {len(points)} waypoints; give one for each"
+        )
+    places = np.array([(0.0, 0.0, 0.0), *points])
+    distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    if not points or distances.min() < LEAST_WAY:
+        raise TrajectoryError(_fault(distances))
+    knots = np.concatenate(([0.0], np.cumsum(_trapezoids(distances, speed, acceleration))))
+    knots *= _stretch(_through(knots, places), knots, speed, acceleration)
+    require_duration(float(knots[-1]))
+    spline = _through(knots, places)
+    heading: Heading = HeldHeading()
+    curve = SplineCurve(spline)
+    if along:
+        curve = SplineCurve(spline, looks_step=HEADING_LOOKS)
+        heading = tangent_heading(spline, (True, True))
+    elif any(angle is not None for angle in headings):
+        heading = _given_headings(knots, headings)
+    return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
+
+
+def _fault(distances: Floats) -> str:
+    if not distances.size:
+        return "there are no waypoints"
+    which = int(np.flatnonzero(distances < LEAST_WAY)[0])
+    before = f"waypoint {which}" if which else "the start"
+    return f"waypoint {which + 1} is the same as {before}; leave it out"
+
+
+def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
+    """How long each distance takes from rest to rest, s."""
+    full = distances / speed + speed / acceleration
+    short = 2.0 * np.sqrt(distances / acceleration)
+    return np.where(distances < speed**2 / acceleration, short, full)
+
+
+def _through(knots: Floats, places: Floats) -> SepticSpline:
+    """Through the places (k, n) at the knots, from rest to rest."""
+    states = np.zeros((knots.size, ORDER, places.shape[1]))
+    states[:, 0] = places
+    return minimum_snap(knots, Fixed(states, _resting_ends(np.ones(knots.size, dtype=bool))))
+
+
+def _resting_ends(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Mask (k, 4) of a spline that rests at its ends and has some values (k,) given."""
+    mask = np.zeros((values.size, ORDER), dtype=bool)
+    mask[:, 0] = values
+    mask[[0, -1], 1:] = True
+    return mask
+
+
+def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: float) -> float:
+    """By which factor to stretch time so that the largest speed or acceleration is the allowed one.
+
+    Stretching the knots stretches the minimum-snap spline, without changing its form.
+    """
+    fine = np.linspace(0.0, knots.size - 1.0, _LOOKS * (knots.size - 1) + 1)
+    times = np.interp(fine, np.arange(knots.size), knots)
+    motion = spline.along(times)
+    fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
+    return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
+
+
+def _given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
+    """Through the headings that are given, turning the short way from one to the next."""
+    given = np.array([angle is not None for angle in (None, *headings)])
+    states = np.zeros((knots.size, ORDER, 1))
+    states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
+    return SplineHeading(minimum_snap(knots, Fixed(states, _resting_ends(given))))

@@ -1,0 +1,143 @@
+"""The prediction model that flies: the linear response of the acceleration coefficients."""
+
+from collections.abc import Callable
+from math import cos, hypot, pi, sin
+from typing import Any
+
+import casadi as ca
+
+from companion.nmpc.model import (
+    Conditions,
+    Floats,
+    Model,
+    Motion,
+    constants_symbols,
+    own_constant,
+    translation,
+)
+from companion.nmpc.reference import Node
+from companion.nmpc.settings import Settings
+
+_LEAST_SQUARE = 0.01
+"""Lower bound of cos²(tilt) in the prediction: a Newton step may tilt beyond 90°."""
+_SIDE_PAIRS = 6
+"""Pairs of opposite sides of the polygon that approximates a disc: a corner every 30°."""
+
+
+def coefficient_model(settings: Settings) -> Model:
+    """Equation 34 of Xu & Pei with a second-order inner response and the limits of the planner.
+
+    State p, v, c, heading, ċ; control (c_d north, c_d east, heading, specific thrust):
+    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, τ·c̈ + ċ = p·(c_d − c); the heading
+    responds in first order.
+
+    Limits: |c_d| ≤ sin(max_tilt), or |c| at the start where that is larger; the tilt rate of
+    p·(c_d − c) within W_M; the heading rate within its own limit. Polygons inside the discs make
+    the constraints linear in the control: a single iteration from anywhere keeps them, and no
+    quadratic program is infeasible. The dead time is not part of the model: `prediction` integrates
+    the motion past it.
+    """
+    symbols = Symbols(size=11, own_constants=1)
+    speed, turning = symbols.state[9:11], symbols.turning(settings)
+    longest = own_constant(symbols.constants)
+
+    def constants_of(conditions: Conditions, start: Motion) -> Floats:
+        return *conditions, max(sin(settings.max_tilt), hypot(start.north, start.east))
+
+    return symbols.model(
+        settings,
+        derivative=ca.vertcat(
+            symbols.translation(settings), speed, turning[2], (turning[0:2] - speed) / settings.lag
+        ),
+        bounded=ca.vertcat(
+            _across_sides(symbols.control[0:2], longest),
+            _across_sides(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
+            turning[2] / settings.max_yaw_rate,
+        ),
+        constants_of=constants_of,
+    )
+
+
+class Symbols:
+    """Symbols of a model whose control is a target of coefficients.
+
+    Args:
+        size: of the state, which begins with p, v, c and heading.
+        own_constants: number of constants besides `Conditions`.
+    """
+
+    def __init__(self, size: int, own_constants: int = 0) -> None:
+        self.state = ca.SX.sym("x", size)
+        self.control = ca.SX.sym("u", 4)
+        self.constants = constants_symbols(own_constants)
+        self.c = self.state[6:8]
+        self.heading = self.state[8]
+
+    def turning(self, settings: Settings) -> ca.SX:
+        """(3,), the commanded rates p·(c_d − c), 1/s, and of the heading, rad/s."""
+        return ca.vertcat(
+            settings.gain * (self.control[0:2] - self.c),
+            settings.yaw_gain * (self.control[2] - self.heading),
+        )
+
+    def translation(self, settings: Settings) -> ca.SX:
+        """(6,), see `model.translation`."""
+        axis = ca.vertcat(self.c, _cos_tilt(self.c))
+        return translation(self.state[3:6], self.control[3], axis, self.constants, settings)
+
+    def model(
+        self,
+        settings: Settings,
+        *,
+        derivative: ca.SX,
+        bounded: ca.SX,
+        constants_of: Callable[[Conditions, Motion], Floats],
+    ) -> Model:
+        """A `Model` of these symbols."""
+        aim, size = ca.SX.sym("aim", 4), self.state.numel()
+        return Model(
+            state=self.state,
+            control=self.control,
+            constants=self.constants,
+            derivative=derivative,
+            aim=aim,
+            heading_error=self.heading - aim[0],
+            turning_error=self.turning(settings) - aim[1:4],
+            target=self.control,
+            bounded=bounded,
+            state_of=lambda motion: motion[:size],
+            constants_of=constants_of,
+            aim_of=_aim_of,
+            control_of=lambda node: (
+                node.north + node.speed_north / settings.gain,
+                node.east + node.speed_east / settings.gain,
+                node.heading + node.heading_rate / settings.yaw_gain,
+                node.thrust,
+            ),
+        )
+
+
+def _aim_of(node: Node) -> Floats:
+    return node.heading, node.speed_north, node.speed_east, node.heading_rate
+
+
+def _tilt_rate(c: ca.SX, speed: ca.SX) -> ca.SX:
+    """(2,) in rad/s, as long as the tilt rate that belongs to a speed (2,) of the coefficients.
+
+    The thrust axis moves on a sphere: its speed squared is |ċ|² + (c·ċ)²/cos²(tilt).
+    """
+    cosine = _cos_tilt(c)
+    rate: ca.SX = speed + c * ca.dot(c, speed) / (cosine * (1.0 + cosine))
+    return rate
+
+
+def _cos_tilt(c: ca.SX) -> ca.SX:
+    return ca.sqrt(ca.fmax(1.0 - ca.sumsqr(c), _LEAST_SQUARE))
+
+
+def _across_sides(vector: ca.SX, radius: Any) -> ca.SX:
+    """(6,), a (2,) vector across each pair of sides; inside the polygon all lie in [−1, 1]."""
+    angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
+    across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
+    sides: ca.SX = ca.vertcat(*across) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)
+    return sides

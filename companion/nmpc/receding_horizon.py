@@ -1,0 +1,149 @@
+"""Receding horizon: solves again and again, each time from the previous plan, shifted in time."""
+
+from collections.abc import Callable, Sequence
+from math import floor
+from time import thread_time
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from companion.nmpc.model import Conditions, Model, Motion
+from companion.nmpc.problem import Floats, SqpSolver, parameters_of
+from companion.nmpc.reference import Node
+from companion.nmpc.settings import Settings
+
+
+class Plan(NamedTuple):
+    """The first control of a solve.
+
+    Attributes:
+        solved: whether the plan may be flown; the rest is meaningless if not.
+        converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
+        iterations: of the SQP.
+        seconds: processor time of the solver itself.
+        north, east, heading: the target for the planner: coefficients, rad.
+        thrust: specific, m/s².
+    """
+
+    solved: bool
+    converged: bool
+    iterations: int
+    seconds: float
+    north: float
+    east: float
+    heading: float
+    thrust: float
+
+
+_NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class RecedingHorizon:
+    """Plans again and again, each time starting from the previous plan.
+
+    The cost is the same for all models: errors of position, velocity and heading, and attitude rate
+    and thrust against those of the reference; see `Weights`.
+
+    Args:
+        settings: vehicle, horizon and solver.
+        make_model: makes the prediction model.
+    """
+
+    def __init__(self, settings: Settings, make_model: Callable[[Settings], Model]) -> None:
+        self._settings = settings
+        self._model = make_model(settings)
+        self._solver = SqpSolver(self._model, settings)
+        inputs = [self._model.state, self._model.control, self._model.constants]
+        self._target = ca.Function("target", inputs, [self._model.target])
+        self._previous: Floats | None = None
+        self._time = 0.0
+
+    def forget(self) -> None:
+        """Start the next solve from its reference."""
+        self._previous = None
+
+    def solve(
+        self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
+    ) -> Plan:
+        """Plan from `motion` on.
+
+        Args:
+            time: of `motion`, s; it tells by how much the previous plan is shifted.
+            motion: at the start of the horizon.
+            nodes: the reference at the ends of the steps, (steps + 1).
+            conditions: constant over the horizon.
+        """
+        model = self._model
+        start = np.array(model.state_of(motion))
+        constants = list(model.constants_of(conditions, motion))
+        guess = self._guess(time, nodes)
+        guess[: len(start)] = start
+        parameters = parameters_of(constants, nodes, [model.aim_of(node) for node in nodes])
+        if not (np.isfinite(start).all() and np.isfinite(parameters).all()):
+            self.forget()
+            return _NO_PLAN
+        began = thread_time()
+        solution = self._solver.solve(guess, parameters)
+        seconds = thread_time() - began
+        if not (solution.solved and np.isfinite(solution.unknown).all()):
+            self.forget()
+            return _NO_PLAN
+        self._previous, self._time = solution.unknown, time
+        control = solution.unknown[len(start) : len(start) + model.control.numel()]
+        target = np.asarray(self._target(start, control, constants), dtype=np.float64).ravel()
+        return Plan(
+            True, solution.converged, solution.iterations, seconds, *(float(v) for v in target)
+        )
+
+    def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
+        if self._previous is None or not time >= self._time:
+            return plan_on_reference(self._model, nodes, self._settings)
+        steps = (time - self._time) / self._settings.step
+        return shifted_plan(self._model, self._previous, steps)
+
+
+def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
+    """A plan shifted forward by `steps` of its horizon; past its end the last values are repeated.
+
+    Args:
+        model: the model of the plan.
+        plan: (x_0, u_0, …, x_N).
+        steps: not negative; between two nodes the plan is interpolated.
+    """
+    n = model.state.numel()
+    stages = plan[:-n].reshape(-1, n + model.control.numel())
+    states = np.vstack([stages[:, :n], plan[-n:]])
+    return _interleaved(_shifted(states, steps), _shifted(stages[:, n:], steps))
+
+
+def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -> Floats:
+    """A plan that is on its reference from the start, its thrust within the limits."""
+    states = [model.state_of(_motion_of(node)) for node in nodes]
+    controls = np.array([model.control_of(node) for node in nodes[:-1]])
+    controls[:, -1] = controls[:, -1].clip(settings.min_thrust, settings.max_thrust)
+    return _interleaved(np.array(states), controls)
+
+
+def _shifted(rows: Floats, steps: float) -> Floats:
+    whole = floor(steps)
+    last = len(rows) - 1
+    before = np.minimum(np.arange(len(rows)) + whole, last)
+    after = np.minimum(before + 1, last)
+    return np.asarray(rows[before] + (steps - whole) * (rows[after] - rows[before]))
+
+
+def _interleaved(states: Floats, controls: Floats) -> Floats:
+    return np.concatenate([np.hstack([states[:-1], controls]).ravel(), states[-1]])
+
+
+def _motion_of(node: Node) -> Motion:
+    return Motion(
+        *node.position,
+        *node.velocity,
+        node.north,
+        node.east,
+        node.heading,
+        node.speed_north,
+        node.speed_east,
+    )

@@ -1,0 +1,89 @@
+"""Checks of the vehicle's clock: how old samples are when they come, and how fast it runs."""
+
+from collections.abc import Iterator
+from math import inf
+
+from companion.config import Config
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding, Key
+from companion.vehicle.clock_rate import MOST_DRIFT
+from companion.vehicle.parameter_rules import Verdict
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+
+_MANY_NOT_NEWER = 0.2
+_SAMPLES_NEEDED = 10
+
+
+def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """How old a sample is when it arrives, as far as TIMESYNC tells."""
+    seconds, stale = evidence.samples.age, 1e-3 * config.deadman.telemetry_stale_ms
+    if seconds is None:
+        if evidence.link.other_clock:
+            yield Finding(
+                Key.AGE,
+                INEFFECTIVE,
+                "TIMESYNC counts another clock than time_boot_ms",
+                "how old a sample is when it comes cannot be known",
+                "let the autopilot itself answer TIMESYNC, not a router between",
+                "TIMESYNC",
+            )
+        return
+    late = seconds > stale
+    yield Finding(
+        Key.AGE,
+        UNSAFE if late else SAFE,
+        f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
+        + (", longer than deadman.telemetry_stale_ms" if late else ""),
+        "it would not be answered" if late else "",
+        "find what holds the messages up: a router, a full queue, a slow link" if late else "",
+        "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
+    )
+
+
+def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the vehicle's time goes on as time does: the law counts by it."""
+    samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
+    if samples.clock_change:
+        yield Finding(
+            Key.CLOCK,
+            UNSAFE,
+            samples.clock_change,
+            "in flight it is handed back for that",
+            "find out why; then check again",
+            source,
+        )
+    elif samples.not_newer:
+        yield Finding(
+            Key.CLOCK,
+            UNSAFE if samples.not_newer > _MANY_NOT_NEWER * samples.heard else INEFFECTIVE,
+            f"{samples.not_newer} of {samples.heard} samples are stamped no later than the one "
+            "before",
+            "they are not answered, and the flight is given up when that lasts",
+            "let one link alone bring attitude; start the autopilot anew if its clock stands still",
+            source,
+        )
+    elif samples.heard >= _SAMPLES_NEEDED and samples.clock_rate is not None:
+        yield _clock_rate(config, evidence, samples.clock_rate, source)
+
+
+def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) -> Finding:
+    """Whether the rate is one that is followed; a pause at either end makes it look wrong."""
+    behind = 1.0 - rate - MOST_DRIFT
+    stale_after = 1e-3 * config.deadman.telemetry_stale_ms / behind if behind > 0.0 else inf
+    unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)
+    too_slow = behind > unsure
+    apart = abs(rate - 1.0) > MOST_DRIFT
+    because = "limits in time, such as the deadman's, are not what they say"
+    if too_slow:
+        because = (
+            f"its samples count as older than deadman.telemetry_stale_ms after {stale_after:.0f} s"
+        )
+    return Finding(
+        Key.CLOCK,
+        UNSAFE if too_slow else INEFFECTIVE if apart else SAFE,
+        f"the vehicle's clock runs at {rate:.3f} of ours",
+        because if apart else "",
+        "run a simulation at the speed of real time, or in lockstep" if apart else "",
+        source,
+    )

@@ -1,0 +1,104 @@
+"""Checks of what our own configuration leaves undone or gets wrong, whatever the vehicle."""
+
+import json
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+
+from companion.attitude.planner import FIRST_ORDER
+from companion.config import Config
+from companion.config.sections import AUTO
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding, Key
+from companion.recording.dead_time import AxisDeadTime, DeadTimes
+from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.registry import FAMILIES
+
+SAFE, INEFFECTIVE = Verdict.SAFE, Verdict.INEFFECTIVE
+_MS = 1e-3
+
+
+def planner(config: Config, _: Evidence) -> Iterator[Finding]:
+    """Whether `auto` came to the planner that it is meant to come to."""
+    name, told = config.planner_name, config.planner.name
+    if told == AUTO and name == FIRST_ORDER:
+        yield Finding(
+            Key.PLANNER,
+            INEFFECTIVE,
+            f"planner.name is auto and comes to {name}, for `vehicle` tells no lag and dead time",
+            "acceleration overshoots, and steps leave their straight line",
+            "run `companion identify`, and include what it writes",
+            "companion study lag",
+        )
+    else:
+        yield Finding(Key.PLANNER, SAFE, f"{name} is flown", source="planner.name")
+
+
+def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
+    """Whether the newest flight answered as late as `vehicle` says; the ground cannot tell."""
+    if not config.vehicle.known:
+        return
+    folder, measured = _newest_dead_times(config.recording.directory)
+    if folder is None:
+        yield Finding(
+            Key.DEAD_TIME,
+            SAFE,
+            f"no flight in {config.recording.directory} measured the dead time yet",
+            mend="it can be measured in the air alone: the flight tells it at its end",
+            source="summary.json",
+        )
+        return
+    configured = {name: axis.dead_time_ms for name, axis in config.vehicle.axes.items()}
+    axes = {
+        name: AxisDeadTime(measured.get(name), None if value is None else _MS * value)
+        for name, value in configured.items()
+    }
+    warning = DeadTimes(axes).warning()
+    if warning is None:
+        found = f"the dead time of {folder.name} was as configured"
+        yield Finding(Key.DEAD_TIME, SAFE, found, source=str(folder))
+        return
+    found, _semicolon, mend = warning.partition("; ")
+    yield Finding(
+        Key.DEAD_TIME,
+        INEFFECTIVE,
+        f"in {folder.name} the {found}",
+        "the planner foresees the wrong attitude",
+        mend,
+        str(folder),
+    )
+
+
+def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
+    """Whether each exception names something that can be found at all."""
+    streams = {f"{Key.STREAMS}.{name}" for family in FAMILIES for name in family.wanted_rates}
+    limits = {"link.min_attitude_rate_hz", "link.min_position_rate_hz"}
+    parameters = {rule.name for family in FAMILIES for rule in family.parameters}
+    for name in config.flight.accept:
+        if name not in {*Key, *streams, *limits, *parameters}:
+            yield Finding(
+                Key.ACCEPT,
+                INEFFECTIVE,
+                f"flight.accept names {name!r}, which no check is called",
+                "it excepts nothing",
+                "name it as `companion doctor` does, or take it out",
+                "flight.accept",
+            )
+
+
+def _newest_dead_times(directory: Path) -> tuple[Path | None, dict[str, float]]:
+    """The newest flight's folder that measured any, by its name, and its dead times in s."""
+    for summary in sorted(directory.glob("*/summary.json"), reverse=True):
+        try:
+            told = json.loads(summary.read_text(encoding="utf-8"))["dead_time_s"]
+            axes = {name: told[name] for name in ("roll", "pitch", "yaw")}
+        except (OSError, ValueError, KeyError, TypeError):
+            continue  # of another program, or of a flight that was cut off
+        known = {
+            name: float(value)
+            for name, value in axes.items()
+            if isinstance(value, int | float) and isfinite(value)
+        }
+        if known:
+            return summary.parent, known
+    return None, {}

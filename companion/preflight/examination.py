@@ -1,0 +1,84 @@
+"""All checks in their order, and what a flight makes of what they find: the one place for both."""
+
+from collections.abc import Callable, Iterable, Iterator
+
+from companion.config import Config
+from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding
+from companion.preflight.offboard_loss import offboard_loss
+from companion.preflight.parameter_findings import parameters
+from companion.vehicle.parameter_rules import Verdict
+
+Check = Callable[[Config, Evidence], Iterator[Finding]]
+
+CHECKS: tuple[Check, ...] = (
+    link_checks.signing,
+    vehicle_checks.version,
+    vehicle_checks.motors,
+    vehicle_checks.power,
+    vehicle_checks.readiness,
+    vehicle_checks.gps,
+    vehicle_checks.ground,
+    vehicle_checks.attitude,
+    vehicle_checks.estimator,
+    vehicle_checks.fence,
+    link_checks.company,
+    link_checks.streams,
+    link_checks.losses,
+    link_checks.delays,
+    clock_checks.age,
+    clock_checks.clocks,
+    parameters,
+    offboard_loss,
+    configuration_checks.planner,
+    configuration_checks.dead_time,
+    configuration_checks.accepted,
+)
+
+
+ONCE: tuple[Check, ...] = (
+    offboard_loss,
+    configuration_checks.planner,
+    configuration_checks.dead_time,
+    configuration_checks.accepted,
+)
+"""What a flight need not ask twice: only the configuration decides it."""
+
+
+def examine(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
+    """All that is found, safe things included; `again`: without what is asked `ONCE`."""
+    return [
+        finding
+        for check in CHECKS
+        if not (again and check in ONCE)
+        for finding in check(config, evidence)
+    ]
+
+
+def forbidding(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+    """With any of these nothing is flown: unsafe and not excepted, or not ready."""
+    findings = tuple(findings)
+    waiting = (finding for finding in findings if finding.verdict is Verdict.NOT_READY)
+    return [*unexcepted(config, findings), *waiting]
+
+
+def unexcepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+    """What is unsafe and not excepted by `flight.accept`."""
+    return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
+
+
+def result(config: Config, findings: Iterable[Finding]) -> Verdict:
+    """What it comes to: the gravest verdict that `companion fly` would heed, else safe."""
+    findings = tuple(findings)
+    verdicts = {finding.verdict for finding in findings}
+    if Verdict.NOT_CONNECTED in verdicts:
+        return Verdict.NOT_CONNECTED
+    if unexcepted(config, findings):
+        return Verdict.UNSAFE
+    return Verdict.NOT_READY if Verdict.NOT_READY in verdicts else Verdict.SAFE
+
+
+def unsafe(findings: Iterable[Finding]) -> list[Finding]:
+    """Of the findings those by which somebody may be hurt or the vehicle lost."""
+    return [finding for finding in findings if finding.verdict is Verdict.UNSAFE]

@@ -1,0 +1,232 @@
+"""Checks of the link: whether enough arrives, soon enough, whole, and from whom it should."""
+
+from collections.abc import Iterable, Iterator
+
+from companion.config import Config
+from companion.mavlink.peer import PEER_NOTICE
+from companion.mavlink.stats import SOME_LOST
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding, Key
+from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.streams import StreamRate
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+
+_REACHED = 0.7
+"""PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
+_COUNTABLE = 5.0
+"""So many must be due while we listen for a rate to be told from a count."""
+_SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
+"""What is sent when it changes, and otherwise only so often, Hz, whatever is asked (PX4)."""
+_MANY_LOST = 0.2
+_SOME_DAMAGED = 0.01
+
+
+def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What arrives of the telemetry asked for."""
+    link = config.link
+    least = {
+        "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
+        "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
+    }
+    good = []
+    for name, rate in evidence.streams.items():
+        trouble = _trouble(name, rate, evidence)
+        if name in evidence.awaited and rate.granted >= _REACHED * rate.asked:
+            continue  # `readiness` tells of it
+        even = _even_rate(name, rate, evidence)
+        if name in least and even < least[name][1]:
+            key, limit = least[name]
+            uneven = even < _REACHED * rate.achieved
+            bursts = f" (in bursts, {rate.achieved:.0f} Hz by count)" if uneven else ""
+            yield Finding(
+                f"link.{key}",
+                UNSAFE,
+                f"{name} arrives at {even:.0f} Hz{bursts}, less than link.{key} = {limit:g}",
+                "the flight would be controlled on data that is too old",
+                trouble[1] if trouble else "raise the link's speed",
+                source="counted",
+            )
+        elif trouble is not None:
+            found, mend = trouble
+            because = "what hangs on it works late or not at all"
+            yield Finding(
+                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, mend, source="counted"
+            )
+        else:
+            good.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
+    if good:
+        found = f"telemetry arrives, Hz: {', '.join(good)}"
+        yield Finding(Key.STREAMS, SAFE, found, source="counted")
+
+
+def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
+    """The rate that counts, Hz: in flight, too, bursts are judged by the pauses between them."""
+    samples = evidence.samples.rate
+    if name != "ATTITUDE_QUATERNION" or samples is None:
+        return rate.achieved
+    return min(rate.achieved, samples)
+
+
+def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
+    """What is wrong with a message's rate, and what to do about it."""
+    asked, achieved = rate.asked, rate.achieved
+    if rate.refusal:
+        return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
+    if rate.granted < _REACHED * asked:
+        return (
+            f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
+            "ask for less, or let the autopilot's loop run faster",
+        )
+    asked = min(asked, _SENT_ON_CHANGE.get(name, asked))
+    countable = asked * evidence.window >= _COUNTABLE
+    if achieved >= _REACHED * asked if countable else evidence.received[name] > 0:
+        return None
+    return (
+        f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
+        "raise the link's speed, or ask for fewer messages, so that nothing has to wait",
+    )
+
+
+def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What does not arrive, or not as it was sent."""
+    link = evidence.link
+    share = link.loss
+    verdict = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
+    bad = verdict is not SAFE
+    yield Finding(
+        Key.LOSS,
+        verdict,
+        f"{100.0 * share:.1f} % of the vehicle's messages are lost",
+        "so are as many of our setpoints, and the pilot's mode is told late" if bad else "",
+        "ask for lower rates, or use a faster or better link" if bad else "",
+        "gaps in the running numbers",
+    )
+    if link.damaged > _SOME_DAMAGED * max(1, link.frames):
+        yield Finding(
+            Key.DAMAGE,
+            INEFFECTIVE,
+            f"{link.damaged} damaged messages in {evidence.window:g} s",
+            "they are refused, and so lost",
+            "check the wiring, its ground and the baud rate",
+            "checksums",
+        )
+    if link.not_finite:
+        yield Finding(
+            Key.NOT_FINITE,
+            INEFFECTIVE,
+            f"{link.not_finite} messages with a number that is NaN or infinite",
+            "they are refused, and so lost",
+            "let the estimator settle; if it goes on, do not fly",
+            "decoded messages",
+        )
+    if link.reconnects:
+        yield Finding(
+            Key.RECONNECTS,
+            UNSAFE,
+            f"the connection dropped {link.reconnects} times in {evidence.window:g} s",
+            "so it will in flight",
+            "check plugs, cables and power",
+            "the operating system",
+        )
+
+
+def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """How late what arrives is, and how evenly it comes."""
+    stale = 1e-3 * config.deadman.telemetry_stale_ms
+    round_trip, jitter = evidence.link.round_trip, evidence.link.jitter
+    if round_trip is None or jitter is None:
+        yield Finding(
+            Key.ROUND_TRIP,
+            INEFFECTIVE,
+            "the autopilot does not answer TIMESYNC",
+            "how old a sample is when it comes cannot be known",
+            "a router between may hold it back",
+            "TIMESYNC",
+        )
+    elif round_trip > stale:
+        yield Finding(
+            Key.ROUND_TRIP,
+            UNSAFE,
+            f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
+            "deadman.telemetry_stale_ms",
+            mend="use a faster link",
+            source="TIMESYNC",
+        )
+    else:
+        yield Finding(
+            Key.ROUND_TRIP,
+            SAFE,
+            f"the link's round trip takes {1e3 * round_trip:.1f} ms",
+            source="TIMESYNC",
+        )
+        uneven = jitter > 0.5 * stale
+        yield Finding(
+            Key.JITTER,
+            INEFFECTIVE if uneven else SAFE,
+            f"the round trip varies by {1e3 * jitter:.1f} ms",
+            "the planner reckons with one dead time" if uneven else "",
+            "find what holds the messages up: a router, Wi-Fi, a busy computer" if uneven else "",
+            "TIMESYNC",
+        )
+    samples = evidence.samples
+    if samples.longest_pause > stale:
+        yield Finding(
+            Key.PAUSES,
+            INEFFECTIVE,
+            f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
+            "deadman.telemetry_stale_ms",
+            "setpoints pause with it",
+            "find what holds the messages up: a router, Wi-Fi, a busy computer",
+            "ATTITUDE_QUATERNION",
+        )
+
+
+def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether both sides sign, with the same key, or neither; and who else would be the peer."""
+    yield from signing_findings(evidence.link.notices)
+
+
+def signing_findings(notices: Iterable[str], verdict: Verdict = INEFFECTIVE) -> Iterator[Finding]:
+    """What the link said of signatures and of the peer, as findings of a `verdict`."""
+    for notice in notices:
+        of_peer = notice.startswith(PEER_NOTICE)
+        found, _semicolon, mend = notice.removeprefix(PEER_NOTICE).partition("; ")
+        key = Key.ENDPOINT if of_peer else Key.SIGNING
+        source = "senders' addresses" if of_peer else "MAVLink 2 signatures"
+        yield Finding(key, verdict, found, mend=mend, source=source)
+
+
+def company(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Who else speaks to the vehicle."""
+    link, others = config.link, evidence.company
+    ours = link.source_system, link.source_component
+    if ours in others.sources:
+        yield Finding(
+            Key.OUR_IDS,
+            UNSAFE,
+            f"somebody else speaks as system/component {ours[0]}/{ours[1]}, our own ids",
+            "answers meant for one are taken by the other, and it may steer, too",
+            "end the other program, or give each its own link.source_component",
+            "frames heard",
+        )
+    for system, component in sorted(others.companions - {ours}):
+        yield Finding(
+            Key.SECOND_COMPANION,
+            INEFFECTIVE,
+            f"another companion computer is there, {system}/{component}",
+            "should it send commands or setpoints, two steer one vehicle",
+            "see that it only listens",
+            "HEARTBEAT of type onboard controller",
+        )
+    steering = sorted(others.steering)
+    if steering or others.echo:
+        who = ", ".join(f"{system}/{component}" for system, component in steering)
+        yield Finding(
+            Key.OTHER_SETPOINTS,
+            UNSAFE,
+            f"somebody else sends setpoints{': ' + who if who else ''}",
+            "the autopilot obeys whichever came last, so two would steer one vehicle",
+            "end the other program",
+            "setpoints heard" if steering else "ATTITUDE_TARGET while disarmed",
+        )

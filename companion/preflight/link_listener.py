@@ -1,0 +1,140 @@
+"""An ear on the link for a while: when samples come, who else speaks, how the estimate jumps."""
+
+from collections.abc import Callable
+from math import isfinite
+from statistics import median
+from types import TracebackType
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion.attitude.representation import is_unit
+from companion.mavlink.codec import Message
+from companion.mavlink.framing import Frame
+from companion.preflight.evidence import Company, SampleTimes
+from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.link import Link
+
+_HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
+_TYPE_AT = 4
+"""Offset of `type` in HEARTBEAT's payload."""
+_ONBOARD_CONTROLLER = bytes([dialect.MAV_TYPE_ONBOARD_CONTROLLER])
+_SETPOINTS = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
+    }
+)
+_STILL = 0.05
+"""Disarmed autopilots tell of rates below 0.02 rad/s and of no thrust (recorded from both)."""
+_ENOUGH = 10
+"""Samples from which the rate of a clock can be told."""
+
+
+class Ear:
+    """Listens while its block runs.
+
+    Args:
+        link: To listen on; its `on_foreign` is ours meanwhile.
+        clock: Our clock, s.
+    """
+
+    def __init__(self, link: Link, clock: Callable[[], float]) -> None:
+        self._link, self._clock = link, clock
+        self._stamps: list[tuple[float, float]] = []
+        self._ages: list[float] = []
+        self._timeline = link.clock.timeline
+        self._unusable = 0
+        self._sources: set[tuple[int, int]] = set()
+        self._companions: set[tuple[int, int]] = set()
+        self._steering: set[tuple[int, int]] = set()
+        self._echo = False
+        self._resets_before: int | None = None
+        self.resets = 0
+
+    def __enter__(self) -> "Ear":
+        self._before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
+        self._unsubscribe = [
+            self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
+            self._link.subscribe("ATTITUDE_TARGET", self._on_target),
+            self._link.subscribe("ODOMETRY", self._on_odometry),
+        ]
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._link.on_foreign = self._before
+        for unsubscribe in self._unsubscribe:
+            unsubscribe()
+
+    @property
+    def samples(self) -> SampleTimes:
+        """The attitude samples so far."""
+        pairs = list(zip(self._stamps, self._stamps[1:], strict=False))
+        if not pairs:
+            return SampleTimes(len(self._stamps), unusable=self._unusable)
+        (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
+        known = len(self._stamps) >= _ENOUGH and last > first
+        held = HeldRates()
+        for earlier, later in pairs:
+            held.add(later[0] - earlier[0])
+        return SampleTimes(
+            heard=len(self._stamps),
+            longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
+            not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
+            unusable=self._unusable,
+            clock_rate=(last_stamp - first_stamp) / (last - first) if known else None,
+            age=median(self._ages) if self._ages and self._link.clock.age_known else None,
+            clock_change=self._clock_change,
+            rate=held.rate_since(HeldRates()) if known else None,
+        )
+
+    @property
+    def company(self) -> Company:
+        """Who else was heard so far."""
+        return Company(
+            frozenset(self._sources),
+            frozenset(self._companions),
+            frozenset(self._steering),
+            self._echo,
+        )
+
+    def _on_foreign(self, frame: Frame) -> None:
+        source = frame.system, frame.component
+        self._sources.add(source)
+        if frame.message_id in _SETPOINTS:
+            self._steering.add(source)
+        if (
+            frame.message_id == _HEARTBEAT
+            and frame.payload[_TYPE_AT : _TYPE_AT + 1] == _ONBOARD_CONTROLLER
+        ):
+            self._companions.add(source)
+
+    @property
+    def _clock_change(self) -> str:
+        clock = self._link.clock
+        return clock.last_change if clock.timeline != self._timeline else ""
+
+    def _on_attitude(self, message: Message) -> None:
+        now, clock = self._clock(), self._link.clock
+        self._stamps.append((now, message.time_boot_ms / 1000.0))
+        age = clock.age(clock.vehicle_time(message.time_boot_ms), now)
+        if age is not None:
+            self._ages.append(age)
+        rates = message.rollspeed, message.pitchspeed, message.yawspeed
+        usable = is_unit((message.q1, message.q2, message.q3, message.q4))
+        self._unusable += not (usable and all(map(isfinite, rates)))
+
+    def _on_target(self, message: Message) -> None:
+        rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
+        moving = any(abs(value) > _STILL for value in (*rates, message.thrust))
+        self._echo = self._echo or (moving and self._link.state.armed is False)
+
+    def _on_odometry(self, message: Message) -> None:
+        before, self._resets_before = self._resets_before, message.reset_counter
+        if before is not None:
+            self.resets += (message.reset_counter - before) & 0xFF

@@ -1,0 +1,173 @@
+"""Whether the fence holds if our program ends in flight: the last rates are weighed against it."""
+
+from collections.abc import Iterator
+from math import exp, hypot, radians
+from typing import NamedTuple
+
+from companion.config import Config
+from companion.config.known_drag import least_drag
+from companion.drag import Drag
+from companion.guidance import Pose, Reference, Sequence
+from companion.guidance.fence import Fence
+from companion.guidance.offboard_loss import Flown, Loss, Reach, path_thrust, reach, tilted_thrust
+from companion.guidance.reference import Vector
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Finding, Key
+from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_hold
+from companion.vehicle.parameter_rules import Verdict
+
+_PERIOD = 0.05
+"""The maneuvers are looked at this often, s,"""
+_MOST = 1500
+"""but at most this many times."""
+_AHEAD = 0.02
+"""The rate of change of the thrust is taken over this, s."""
+_START = Pose((0.0, 0.0, 0.0), 0.0)
+
+
+class Worst(NamedTuple):
+    """The largest reach over the maneuvers.
+
+    Attributes:
+        away, up, down: From where the setpoints ended, m.
+        breach: The first breach of the fence, as the end of a sentence; `None`: none.
+        time: When the setpoints would have to end for it, s after control begins.
+    """
+
+    away: float = 0.0
+    up: float = 0.0
+    down: float = 0.0
+    breach: str | None = None
+    time: float = 0.0
+
+
+def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """How far the vehicle is carried if our setpoints end at the worst moment of the flight."""
+    dead_man, programme = evidence.family.dead_man, evidence.programme
+    held = evidence.survey.values.get(dead_man.parameter)
+    if programme is None or held is None or not 0.0 <= held <= LONGEST_HELD:
+        return  # an unknown or longer time is unsafe, whatever is flown
+    worst = worst_reach(config, programme, held, brakes=dead_man.brakes)
+    carried = (
+        f"should our setpoints end, the last rates are held for {held:g} s "
+        f"({dead_man.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
+        f"{worst.up:.0f} m up and {worst.down:.0f} m down"
+    )
+    source = "worst case of docs/exits.md"
+    if worst.breach is None:
+        yield Finding(Key.OFFBOARD_LOSS, Verdict.SAFE, carried, source=source)
+        return
+    shortest = shortest_hold(1e-3 * config.deadman.silence_limit_ms)
+    shorter = f"set {dead_man.parameter} to {shortest:g}, " if held > shortest else ""
+    yield Finding(
+        Key.OFFBOARD_LOSS,
+        Verdict.INEFFECTIVE,
+        carried,
+        f"{worst.time:.1f} s after control begins that can end {worst.breach}",
+        f"{shorter}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther from the "
+        "fence and the ground",
+        source,
+    )
+
+
+def worst_reach(config: Config, programme: Sequence, held: float, *, brakes: bool) -> Worst:
+    """The largest reach over the maneuvers; `held` and `brakes` as of `Loss`."""
+    limits, safety = config.limits, config.safety
+    fence = Fence(
+        limits.fence_radius_m,
+        limits.fence_ceiling_m,
+        limits.fence_floor_m,
+        safety.fence_polygon_m,
+        (),
+        safety.braking_m_s2,
+        safety.reaction_s,
+    )
+    drag = least_drag(config)
+    max_tilt_rate = radians(limits.max_tilt_rate_deg_s)
+    loss, worst = Loss(held, brakes, drag, max_tilt_rate, fence), Worst()
+    for time, flown in _flown(config, programme, drag):
+        there = reach(flown, loss)
+        breach, at = worst.breach, worst.time
+        if breach is None:
+            breach, at = _breach(config, flown.offset, there, loss.fence), time
+        worst = Worst(
+            max(worst.away, there.away),
+            max(worst.up, there.up),
+            max(worst.down, there.down),
+            breach,
+            at,
+        )
+    return worst
+
+
+def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str | None:
+    """What is wrong with where it can come to, as the end of a sentence."""
+    north, east = offset[0] + there.place[0], offset[1] + there.place[1]
+    distance = hypot(north, east)
+    outward = 1.0 + there.spread / distance if distance > 0.0 else 1.0
+    far: Vector = (north * outward, east * outward, offset[2])
+    if distance == 0.0:
+        far = (there.spread, 0.0, offset[2])
+    height = config.flight.takeoff_height_m - offset[2]
+    for place, level in (
+        (far, height),
+        ((north, east, offset[2] - there.up), height),
+        ((north, east, offset[2]), height - there.down),
+    ):
+        breach = fence.breach(place, level, None)
+        if breach is not None:
+            return str(breach)
+    return None
+
+
+def _flown(config: Config, programme: Sequence, drag: Drag) -> Iterator[tuple[float, Flown]]:
+    """What is flown over the maneuvers; open-loop steps are answered as the attitude law does."""
+    gain = config.planner.gain_per_s
+    period = max(_PERIOD, programme.duration / _MOST)
+    velocity: Vector = (0.0, 0.0, 0.0)
+    place: Vector = (0.0, 0.0, 0.0)
+    tilt = (0.0, 0.0)
+    for index in range(int(programme.duration / period) + 1):
+        time = index * period
+        told = programme.at(time, _START)
+        if told.closed_loop:
+            place, velocity = told.position_ned, told.velocity_ned
+            thrust = _thrust(told, drag)
+            later = _thrust(programme.at(time + _AHEAD, _START), drag)
+            turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
+            size = hypot(*thrust)
+            tilt = (thrust[0] / size, thrust[1] / size)
+            yield time, Flown(place, velocity, thrust, (turn[0], turn[1], turn[2]))
+            continue
+        rates, tilt_after = _answer(told, tilt, gain, period)
+        thrust = tilted_thrust(*tilt)
+        turn_north, turn_east = (hypot(*thrust) * rate for rate in rates)
+        yield time, Flown(place, velocity, thrust, (turn_north, turn_east, 0.0))
+        tilt = tilt_after
+        north, east, _ = tilted_thrust(*tilt)
+        slowed = drag.deceleration(velocity)
+        velocity = (
+            velocity[0] + (north - slowed[0]) * period,
+            velocity[1] + (east - slowed[1]) * period,
+            0.0,
+        )
+        place = (place[0] + velocity[0] * period, place[1] + velocity[1] * period, place[2])
+
+
+def _thrust(told: Reference, drag: Drag) -> Vector:
+    return path_thrust(told.acceleration_ned, told.velocity_ned, drag)
+
+
+def _answer(
+    told: Reference, tilt: tuple[float, float], gain: float, period: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Rates of the thrust axis (north, east) now, and the coefficients a period later."""
+    if told.coefficients is not None:
+        aim = told.coefficients
+        left = exp(-gain * period)
+        north, east = (goal - now for goal, now in zip(aim, tilt, strict=True))
+        after = (aim[0] - north * left, aim[1] - east * left)
+        return (gain * north, gain * east), after
+    assert told.body_rates is not None
+    north, east = -told.body_rates.pitch, told.body_rates.roll
+    return (north, east), (tilt[0] + north * period, tilt[1] + east * period)

@@ -1,0 +1,246 @@
+"""Checks of the vehicle itself: whether it may be armed now, its battery, its estimator, itself."""
+
+from collections.abc import Iterator
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion.config import Config
+from companion.guidance.fence import Place, inside, local_polygon
+from companion.preflight.evidence import Evidence, Stage
+from companion.preflight.finding import Finding, Key
+from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.state import GROUND_HEIGHT, VehicleState
+
+SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+NOT_READY = Verdict.NOT_READY
+
+_FEW_UNUSABLE = 0.01
+"""A larger share than this of the attitude samples is more than one damaged message."""
+
+
+def armed(state: VehicleState) -> Finding:
+    """Whether the motors may turn already."""
+    if state.armed:
+        return Finding(
+            Key.ARMED,
+            UNSAFE,
+            "the vehicle is already armed",
+            mend="land and disarm it first",
+            source="HEARTBEAT",
+        )
+    return Finding(Key.ARMED, SAFE, "the vehicle is disarmed", source="HEARTBEAT")
+
+
+def battery(config: Config, state: VehicleState) -> Finding:
+    """Whether there is charge enough, as far as the vehicle tells."""
+    remaining = None if state.battery is None else state.battery.remaining
+    least = config.limits.min_battery_percent
+    source = "BATTERY_STATUS, SYS_STATUS"
+    if state.battery_silent:
+        return Finding(
+            Key.BATTERY,
+            UNSAFE,
+            "the vehicle does not tell its battery's state any more",
+            "an empty one would not be noticed",
+            "find what holds the messages up",
+            source,
+        )
+    if remaining is None:
+        return Finding(
+            Key.BATTERY,
+            INEFFECTIVE,
+            "the vehicle does not tell its battery's charge",
+            "limits.min_battery_percent protects nothing",
+            "set the battery's capacity or number of cells in the autopilot",
+            source,
+        )
+    if remaining < least / 100.0:
+        return Finding(
+            Key.BATTERY,
+            UNSAFE,
+            f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent",
+            mend="charge it",
+            source=source,
+        )
+    return Finding(Key.BATTERY, SAFE, f"battery at {100 * remaining:.0f} %", source=source)
+
+
+def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether they stand still before anybody arms."""
+    if evidence.stage is Stage.GROUND:
+        yield armed(evidence.state)
+
+
+def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """The battery."""
+    if evidence.booting and evidence.state.battery is None:
+        yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
+    else:
+        yield battery(config, evidence.state)
+
+
+def failsafe(state: VehicleState) -> Iterator[Finding]:
+    """Whether the autopilot is in a failsafe."""
+    if state.failsafe:
+        yield Finding(
+            Key.FAILSAFE,
+            UNSAFE,
+            "the autopilot is in a failsafe",
+            "it does what that asks for, and not what we ask",
+            "clear its cause first",
+            "HEARTBEAT system_status",
+        )
+
+
+def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the autopilot would arm, and why not, in its own words."""
+    state, stage = evidence.state, evidence.stage
+    yield from failsafe(state)
+    ready = state.readiness
+    if stage is Stage.AIRBORNE:  # its checks before arming are over
+        ready = ready._replace(prearm_good=True)
+    missing = evidence.family.not_ready(ready)
+    said = "; ".join(dict.fromkeys(evidence.words))
+    if missing is not None:
+        silent = evidence.awaited
+        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
+        yield Finding(
+            Key.READY,
+            NOT_READY,
+            f"not ready {stage.value}, it lacks {missing}{unsent}",
+            f"the autopilot says: {said}" if said else "",
+            "wait, or put right what it says, and try again",
+            "SYS_STATUS, estimator flags",
+        )
+        return
+    flags = state.estimator.flags if state.estimator else 0
+    found = f"ready {stage.value}, estimator flags 0x{flags:x}"
+    yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
+    if said:
+        yield Finding(Key.WORDS, SAFE, f"the autopilot says: {said}", source="STATUSTEXT, EVENT")
+
+
+def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether a GPS that was good still is."""
+    fault, source = evidence.state.gps_fault, "GPS_RAW_INT"
+    if fault is not None:
+        yield Finding(
+            Key.GPS,
+            UNSAFE,
+            fault,
+            "the vehicle will not know where it is",
+            "wait for its fix, in the open",
+            source,
+        )
+
+
+def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether it stands on the ground, and heights mean what they should."""
+    state, source = evidence.state, "EXTENDED_SYS_STATE, LOCAL_POSITION_NED, HOME_POSITION"
+    if evidence.stage is Stage.AIRBORNE:
+        return
+    if not state.landed:
+        yield Finding(
+            Key.LANDED,
+            UNSAFE if state.flying else NOT_READY,
+            "the vehicle says that it flies"
+            if state.flying
+            else "the autopilot does not say that it stands on the ground",
+            "nothing is begun in the air",
+            "land it first, or find why EXTENDED_SYS_STATE does not tell that it stands",
+            "EXTENDED_SYS_STATE",
+        )
+    height = state.height
+    if height is not None and abs(height) > GROUND_HEIGHT:
+        yield Finding(
+            Key.HOME,
+            UNSAFE,
+            f"the vehicle stands {height:.1f} m above home by what it says",
+            "flight.takeoff_height_m and limits.fence_floor_m would be wrong",
+            "have the autopilot set home here",
+            source,
+        )
+
+
+def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the attitude that arrives can be answered."""
+    samples = evidence.samples
+    if samples.unusable:
+        yield Finding(
+            Key.ATTITUDE,
+            UNSAFE if samples.unusable > _FEW_UNUSABLE * samples.heard else INEFFECTIVE,
+            f"{samples.unusable} of {samples.heard} attitude samples are no unit quaternion of "
+            "finite numbers",
+            "they are not answered, and the flight is given up when that lasts",
+            "wait until the estimator has settled; if it goes on, do not fly",
+            "ATTITUDE_QUATERNION",
+        )
+
+
+def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the estimate holds still while the vehicle does."""
+    if evidence.resets:
+        yield Finding(
+            Key.ESTIMATOR_RESETS,
+            INEFFECTIVE,
+            f"the estimate jumped {evidence.resets} times in {evidence.window:g} s",
+            "in flight each jump moves the vehicle",
+            "wait until compass and GPS have settled",
+            "ODOMETRY reset_counter",
+        )
+
+
+def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether it stands inside a fence that is given by latitude and longitude."""
+    corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
+    if not corners:
+        return
+    source = "GLOBAL_POSITION_INT"
+    if told is None:
+        yield Finding(
+            Key.FENCE,
+            NOT_READY if evidence.awaits_position else UNSAFE,
+            "the vehicle does not tell its latitude and longitude",
+            "whether it is inside safety.fence_polygon_deg cannot be known",
+            "wait for GPS",
+            source,
+        )
+        return
+    here = Place(told.latitude_deg, told.longitude_deg)
+    if inside(0.0, 0.0, local_polygon(corners, here)):
+        yield Finding(Key.FENCE, SAFE, "it stands inside its fence", source=source)
+        return
+    yield Finding(
+        Key.FENCE,
+        UNSAFE,
+        f"it stands at {here.latitude:.5f}, {here.longitude:.5f}, outside safety.fence_polygon_deg",
+        "the flight would end as soon as it began",
+        "carry it inside, or mend the corners: each is [latitude, longitude]",
+        source,
+    )
+
+
+def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
+    """What autopilot it is."""
+    identity, name = evidence.identity, evidence.family.name
+    if identity.version is None or identity.capabilities is None:
+        yield Finding(
+            Key.VERSION,
+            INEFFECTIVE,
+            f"{name} does not tell its version",
+            "which of its manners apply cannot be known",
+            "a newer version tells it",
+            "AUTOPILOT_VERSION",
+        )
+    elif not identity.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET:
+        yield Finding(
+            Key.VERSION,
+            INEFFECTIVE,
+            f"{name} {identity.version} does not take SET_ATTITUDE_TARGET",
+            "it is the only setpoint that we send",
+            "use a newer version, or a build with offboard control",
+            "AUTOPILOT_VERSION capabilities",
+        )
+    else:
+        found = f"{name} {identity.version}"
+        yield Finding(Key.VERSION, SAFE, found, source="AUTOPILOT_VERSION")

@@ -1,0 +1,250 @@
+"""The flights: every planner behind a slow rate loop, model-following also with wrong times."""
+
+from dataclasses import replace
+from itertools import product
+from math import pi
+from typing import NamedTuple
+
+from companion.attitude import Limits, Planner, make_planner
+from companion.study.inner_loop import InnerLoop
+from companion.study.lag_loop import LagLoop
+from companion.study.measures import cross_track, time_to
+from companion.study.methods import EXACT, FOLLOWING, PAPERS, Method
+from companion.study.outcome import Tick
+from companion.study.step import FIGURE_2, Loop, Response, Step, fly_loop
+
+METHODS = (*PAPERS, EXACT, FOLLOWING)
+OTHERS = tuple(method for method in METHODS if method is not FOLLOWING)
+"""The methods that know nothing of the rate loop."""
+RATES_HZ = (50.0, 100.0, 250.0)
+DEAD_TIMES_MS = (0, 20, 40, 60, 80)
+LAGS_MS = (10, 25, 40, 60)
+
+EXAMPLE_LOOP = LagLoop(lag_ms=25, dead_time_ms=45)
+"""Between what was measured on PX4 and on ArduPilot."""
+EXAMPLE_RATES_HZ = (100.0, 250.0)
+EXAMPLE_ERRORS_HZ = 100.0
+MAX_TILT_RATE = pi / 2.0
+"""W_M of the flights with a rate limit, rad/s."""
+
+COMPLETE_LOOP = InnerLoop(transport_delay=0.02)
+COMPLETE_HZ = 250.0
+"""The sample rate at which the complete inner loop is shown."""
+
+
+class TimesError(NamedTuple):
+    """Relative errors of the times that model-following assumes; 0.5 is 50 % too long."""
+
+    lag: float
+    dead_time: float
+
+    def __str__(self) -> str:
+        return f"lag {in_percent(self.lag)} and dead time {in_percent(self.dead_time)}"
+
+
+NO_ERROR = TimesError(0.0, 0.0)
+GRID_ERRORS = (-0.5, 0.0, 0.5)
+FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
+"""Errors tried in the example and with the complete inner loop."""
+
+
+class Times(NamedTuple):
+    """Lag and dead time of a rate loop by axis, s, under the planner's own option names."""
+
+    lag: float
+    dead_time: float
+    yaw_lag: float
+    yaw_dead_time: float
+
+    def with_error(self, error: TimesError) -> "Times":
+        """These times, all lags and all dead times scaled by their errors."""
+        lag, dead_time = 1.0 + error.lag, 1.0 + error.dead_time
+        return Times(
+            lag * self.lag,
+            dead_time * self.dead_time,
+            lag * self.yaw_lag,
+            dead_time * self.yaw_dead_time,
+        )
+
+
+COMPLETE_TIMES = Times(
+    lag=0.047,
+    dead_time=0.040 + COMPLETE_LOOP.transport_delay,
+    yaw_lag=0.37,
+    yaw_dead_time=0.102 + COMPLETE_LOOP.transport_delay,
+)
+"""First order and dead time fitted to the measured PX4, plus the transport delay."""
+
+
+class Score(NamedTuple):
+    """How straight and how fast a response is.
+
+    Attributes:
+        cross_track: largest distance from the straight line, in coefficients.
+        time: until no more than 5 % of the step is left for good, s; inf if never.
+    """
+
+    cross_track: float
+    time: float
+
+
+class Comparison(NamedTuple):
+    """All methods behind one rate loop at one sample rate.
+
+    Attributes:
+        right: every method; model-following with the right times.
+        wrong: model-following by the error of its times. Without a dead time there are fewer.
+    """
+
+    right: dict[Method, Score]
+    wrong: dict[TimesError, Score]
+
+    @property
+    def best_other(self) -> Method:
+        """The straightest of the methods that know nothing of the rate loop."""
+        return min(OTHERS, key=lambda method: self.right[method].cross_track)
+
+    @property
+    def worst_error(self) -> TimesError:
+        """The error with the largest cross-track."""
+        return max(self.wrong, key=lambda error: self.wrong[error].cross_track)
+
+    @property
+    def worst(self) -> float:
+        """Cross-track of model-following with that error."""
+        return self.wrong[self.worst_error].cross_track
+
+    @property
+    def ratio(self) -> float:
+        """That cross-track over the best other method's; below 1 model-following is better."""
+        return self.worst / self.right[self.best_other].cross_track
+
+
+class Cell(NamedTuple):
+    """One cell of the grid."""
+
+    rate_hz: float
+    dead_time_ms: int
+    lag_ms: int
+
+    def __str__(self) -> str:
+        return f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.rate_hz:.0f} Hz"
+
+
+Grid = dict[Cell, Comparison]
+
+
+class Example(NamedTuple):
+    """The flights behind `EXAMPLE_LOOP`.
+
+    Attributes:
+        free: every method by rate (Hz), without limits.
+        limited: model-following with W_M, by rate.
+        wrong: model-following at 100 Hz by the error of its times, no error included.
+    """
+
+    free: dict[float, dict[Method, Response]]
+    limited: dict[float, Response]
+    wrong: dict[TimesError, Score]
+
+
+class Complete(NamedTuple):
+    """The flights with the complete inner loop.
+
+    Attributes:
+        by_rate: the comparison at each sample rate (Hz), no error included among the wrong times.
+        shown: responses of every method at `COMPLETE_HZ`.
+    """
+
+    by_rate: dict[float, Comparison]
+    shown: dict[Method, Response]
+
+
+def in_percent(error: float) -> str:
+    """An error as tables and legends show it."""
+    return f"{100.0 * error:+.0f} %".replace("-", "−") if error else "right"
+
+
+def score(response: Response) -> Score:
+    """The score at the only heading."""
+    return Score(float(cross_track(response)[0]), float(time_to(response)[0]))
+
+
+def step_at(rate_hz: float) -> Step:
+    """The step of figure 2 at heading 0; of all methods only `euler` depends on heading."""
+    return replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
+
+
+def fly_grid(tick: Tick) -> Grid:
+    """Fly every method in every cell, model-following also with times wrong by 50 %."""
+    grid = {}
+    for dead_time, lag in product(DEAD_TIMES_MS, LAGS_MS):
+        tick(f"dead time {dead_time} ms, lag {lag} ms")
+        loop = LagLoop(lag, dead_time)
+        times = _times_of(loop)
+        errors = [
+            error
+            for error in _combined(GRID_ERRORS)
+            if error != NO_ERROR and (dead_time or not error.dead_time)
+        ]
+        for rate in RATES_HZ:
+            grid[Cell(rate, dead_time, lag)] = Comparison(
+                {m: score(_fly(m, times, loop, rate)) for m in METHODS},
+                _with_errors(errors, times, loop, rate),
+            )
+    return grid
+
+
+def fly_example() -> Example:
+    """Fly the example with every method, with the rate limit, and with wrong times."""
+    loop, times, limits = EXAMPLE_LOOP, _times_of(EXAMPLE_LOOP), Limits(max_tilt_rate=MAX_TILT_RATE)
+    return Example(
+        {hz: {m: _fly(m, times, loop, hz) for m in METHODS} for hz in EXAMPLE_RATES_HZ},
+        {hz: _fly(FOLLOWING, times, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
+        _with_errors(_combined(FINE_ERRORS), times, loop, EXAMPLE_ERRORS_HZ),
+    )
+
+
+def fly_complete(tick: Tick) -> Complete:
+    """Fly every method at every rate, model-following also with wrong times."""
+    flown, by_rate = {}, {}
+    for rate in RATES_HZ:
+        tick(f"complete inner loop at {rate:.0f} Hz")
+        flown[rate] = {m: _fly(m, COMPLETE_TIMES, COMPLETE_LOOP, rate) for m in METHODS}
+        by_rate[rate] = Comparison(
+            {method: score(response) for method, response in flown[rate].items()},
+            _with_errors(_combined(FINE_ERRORS), COMPLETE_TIMES, COMPLETE_LOOP, rate),
+        )
+    return Complete(by_rate, flown[COMPLETE_HZ])
+
+
+def _combined(errors: tuple[float, ...]) -> list[TimesError]:
+    """Every combination of these errors of lag and dead time."""
+    return [TimesError(*pair) for pair in product(errors, repeat=2)]
+
+
+def _times_of(loop: LagLoop) -> Times:
+    """The true times of a loop that is the same on every axis."""
+    lag, dead_time = 1e-3 * loop.lag_ms, 1e-3 * loop.dead_time_ms
+    return Times(lag, dead_time, lag, dead_time)
+
+
+def _with_errors(
+    errors: list[TimesError], times: Times, loop: Loop, rate_hz: float
+) -> dict[TimesError, Score]:
+    return {
+        error: score(_fly(FOLLOWING, times.with_error(error), loop, rate_hz)) for error in errors
+    }
+
+
+def _fly(
+    method: Method,
+    times: Times,
+    loop: Loop,
+    rate_hz: float,
+    limits: Limits = Limits(),  # noqa: B008  (frozen)
+) -> Response:
+    """Fly a method; only model-following takes the times of the rate loop."""
+    options = times._asdict() if method is FOLLOWING else {}
+    planner: Planner = make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
+    return fly_loop(planner, step_at(rate_hz), loop)

@@ -1,0 +1,248 @@
+"""The prediction models of the study; the equations are those of Xu & Pei, Sensors 2026, 26(9).
+
+The paper has `proposed` (34), `euler` (37) and `quaternion` (39), none with a limit of tilt or
+rate. `limited` is the model that flies, and `euler-reduced` the fair baseline of `euler`. The paper
+leaves drag and disturbance out; here they are the same in all models.
+
+The controls of the attitude models are body rates. Their answers are converted to the target for
+which the planner commands these rates (`_led_target`): the same inner loop flies all models.
+"""
+
+from collections.abc import Callable
+from math import cos, sin
+from typing import Any, Literal
+
+import casadi as ca
+
+from companion.attitude.kinematics import into_body
+from companion.attitude.reference_model import rates_along
+from companion.attitude.representation import wrap_angle
+from companion.attitude.rotation import attitude_of, euler_angles
+from companion.nmpc.coefficient_model import Symbols, coefficient_model
+from companion.nmpc.model import (
+    Conditions,
+    Floats,
+    Model,
+    Motion,
+    constants_symbols,
+    own_constant,
+    translation,
+)
+from companion.nmpc.reference import Node
+from companion.nmpc.settings import Settings
+
+ModelName = Literal["proposed", "limited", "euler", "euler-reduced", "quaternion"]
+
+
+def proposed(settings: Settings) -> Model:
+    """Equation 34: p, v, c and heading; control (c_d N, E, heading, specific thrust).
+
+    V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, ċ = p·(c_d − c), the heading likewise.
+    Only the product with the thrust, and the root, are nonlinear.
+    """
+    symbols = Symbols(size=9)
+    return symbols.model(
+        settings,
+        derivative=ca.vertcat(symbols.translation(settings), symbols.turning(settings)),
+        bounded=ca.SX(0, 1),
+        constants_of=_conditions_only,
+    )
+
+
+def euler(settings: Settings) -> Model:
+    """Equation 37: p, v, and the Euler angles Z-Y-X; control (body rates, specific thrust).
+
+    The angles turn with M(φ, θ)⁻¹·ω, the inverse of the matrix in section 4.2.
+    """
+    state, control, constants = ca.SX.sym("x", 9), ca.SX.sym("u", 4), constants_symbols()
+    roll, pitch, yaw = state[6], state[7], state[8]
+    turning = ca.vertcat(*_euler_rates(roll, pitch, control[0], control[1], control[2]))
+    axis = _thrust_axis(roll, pitch, yaw)
+    moving = translation(state[3:6], control[3], axis, constants, settings)
+    derivative = ca.vertcat(moving, turning)
+    aim = ca.SX.sym("aim", 4)
+    heading = _heading(roll, pitch, yaw)
+    return Model(
+        state=state,
+        control=control,
+        constants=constants,
+        derivative=derivative,
+        aim=aim,
+        heading_error=yaw - aim[0],
+        turning_error=control[0:3] - aim[1:4],
+        target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
+        state_of=lambda motion: (
+            *motion[:6],
+            *_euler_near(motion.north, motion.east, motion.heading),
+        ),
+        aim_of=lambda node: (
+            _euler_near(node.north, node.east, node.heading)[2],
+            *_body_rates(node),
+        ),
+        control_of=lambda node: (*_body_rates(node), node.thrust),
+        bounded=ca.SX(0, 1),
+        constants_of=_conditions_only,
+    )
+
+
+def euler_reduced(settings: Settings) -> Model:
+    """Equation 37 with its matrix cancelled and the yaw held: the fair baseline.
+
+    Since ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards, the controls may be φ̇ and θ̇ themselves.
+    Then the matrix drops out, and the yaw is a constant of the horizon: the one at its start.
+    """
+    state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own=1)
+    yaw = own_constant(constants)
+    roll, pitch = state[6], state[7]
+    axis = _thrust_axis(roll, pitch, yaw)
+    moving = translation(state[3:6], control[2], axis, constants, settings)
+    derivative = ca.vertcat(moving, control[0:2])
+    aim = ca.SX.sym("aim", 2)
+    heading = _heading(roll, pitch, yaw)
+    return Model(
+        state=state,
+        control=control,
+        constants=constants,
+        derivative=derivative,
+        aim=aim,
+        heading_error=ca.SX(0, 1),
+        turning_error=control[0:2] - aim,
+        target=_led_target(state, derivative, axis[0:2], heading, control[2], settings),
+        state_of=lambda motion: (
+            *motion[:6],
+            *_euler_near(motion.north, motion.east, motion.heading)[:2],
+        ),
+        aim_of=_angle_rates,
+        control_of=lambda node: (*_angle_rates(node), node.thrust),
+        bounded=ca.SX(0, 1),
+        constants_of=lambda conditions, start: (
+            *conditions,
+            _euler_near(start.north, start.east, start.heading)[2],
+        ),
+    )
+
+
+def quaternion(settings: Settings) -> Model:
+    """Equation 39: p, v, and the attitude as a unit quaternion; control (body rates, thrust).
+
+    q̇ = ½·q ⊗ (0, ω).
+    """
+    state, control, constants = ca.SX.sym("x", 10), ca.SX.sym("u", 4), constants_symbols()
+    w, x, y, z = (state[6 + i] for i in range(4))
+    roll, pitch, yaw = (control[i] for i in range(3))
+    axis = ca.vertcat(-2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 1.0 - 2.0 * (x * x + y * y))
+    turning = 0.5 * ca.vertcat(
+        -x * roll - y * pitch - z * yaw,
+        w * roll + y * yaw - z * pitch,
+        w * pitch + z * roll - x * yaw,
+        w * yaw + x * pitch - y * roll,
+    )
+    derivative = ca.vertcat(translation(state[3:6], control[3], axis, constants, settings), turning)
+    aim, heading = ca.SX.sym("aim", 5), 2.0 * ca.atan2(z, w)
+    return Model(
+        state=state,
+        control=control,
+        constants=constants,
+        derivative=derivative,
+        aim=aim,
+        # Twice the sine of half the error of the tilt-yaw heading: smooth, where an angle jumps.
+        heading_error=2.0 * (z * aim[0] - w * aim[1]) / ca.sqrt(w * w + z * z),
+        turning_error=control[0:3] - aim[2:5],
+        target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
+        state_of=lambda motion: (
+            *motion[:6],
+            *attitude_of(motion.north, motion.east, motion.heading),
+        ),
+        aim_of=lambda node: (
+            cos(0.5 * node.heading),
+            sin(0.5 * node.heading),
+            *_body_rates(node),
+        ),
+        control_of=lambda node: (*_body_rates(node), node.thrust),
+        bounded=ca.SX(0, 1),
+        constants_of=_conditions_only,
+    )
+
+
+MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
+    "proposed": proposed,
+    "limited": coefficient_model,
+    "euler": euler,
+    "euler-reduced": euler_reduced,
+    "quaternion": quaternion,
+}
+"""What makes each model."""
+
+
+def _conditions_only(conditions: Conditions, _start: Motion) -> Floats:
+    """The constants of a model that has none of its own."""
+    return conditions
+
+
+def _led_target(
+    state: ca.SX,
+    derivative: ca.SX,
+    coefficients: ca.SX,
+    heading: ca.SX,
+    thrust: ca.SX,
+    settings: Settings,
+) -> ca.SX:
+    """The target for which a first-order planner turns the attitude as `derivative` does.
+
+    c_d = c + ċ/p, and likewise for the heading.
+    """
+    speed = ca.jtimes(coefficients, state, derivative)
+    heading_rate = ca.jtimes(heading, state, derivative)
+    return ca.vertcat(
+        coefficients + speed / settings.gain,
+        heading + heading_rate / settings.yaw_gain,
+        thrust,
+    )
+
+
+def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
+    """M(φ, θ)⁻¹·ω of body rates (x, y, z); symbols or numbers."""
+    turning = ca.sin(roll) * y + ca.cos(roll) * z
+    return (
+        x + ca.tan(pitch) * turning,
+        ca.cos(roll) * y - ca.sin(roll) * z,
+        turning / ca.cos(pitch),
+    )
+
+
+def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+    """Coefficients and cos(tilt), (3,): the third column of the rotation matrix."""
+    lean = ca.sin(pitch) * ca.cos(roll)
+    return ca.vertcat(
+        -(ca.cos(yaw) * lean + ca.sin(yaw) * ca.sin(roll)),
+        ca.cos(yaw) * ca.sin(roll) - ca.sin(yaw) * lean,
+        ca.cos(pitch) * ca.cos(roll),
+    )
+
+
+def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
+    """Tilt-yaw heading 2·atan2(z, w) of Euler angles."""
+    level, tilted = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))
+    half = 0.5 * yaw
+    return 2.0 * ca.atan2(
+        level * ca.sin(half) - tilted * ca.cos(half), level * ca.cos(half) + tilted * ca.sin(half)
+    )
+
+
+def _euler_near(north: float, east: float, heading: float) -> tuple[float, float, float]:
+    """Roll, pitch, and yaw within π of the heading, which may be unwrapped; rad."""
+    roll, pitch, yaw = euler_angles(attitude_of(north, east, heading))
+    return roll, pitch, heading + wrap_angle(yaw - heading)
+
+
+def _body_rates(node: Node) -> tuple[float, float, float]:
+    """Body rates that keep a vehicle on the reference, rad/s."""
+    x, y, still = rates_along(node.north, node.east, node.speed_north, node.speed_east)
+    return (*into_body(cos(node.heading), sin(node.heading), x, y), still + node.heading_rate)
+
+
+def _angle_rates(node: Node) -> tuple[float, float]:
+    """φ̇ and θ̇ that keep a vehicle on the reference, rad/s."""
+    roll, pitch, _ = _euler_near(node.north, node.east, node.heading)
+    roll_rate, pitch_rate, _ = _euler_rates(roll, pitch, *_body_rates(node))
+    return roll_rate, pitch_rate

@@ -1,0 +1,195 @@
+"""Figure 2: the step response of every method against the first-order reference."""
+
+from math import degrees
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from companion.attitude import Quaternion, Target, body_error
+from companion.attitude.constants import Constants
+from companion.attitude.planner import LawPlanner
+from companion.study.drawing import (
+    draw,
+    draw_plane,
+    draw_reference,
+    draw_response,
+    new_figure,
+)
+from companion.study.measures import (
+    best_and_worst,
+    cross_track,
+    deviation,
+    heading_effect,
+    largest_deviation,
+    time_to,
+)
+from companion.study.methods import (
+    EULER,
+    EXACT,
+    PAPERS,
+    PROPOSED,
+    QUATERNION,
+    SO3,
+    Method,
+    planner_of,
+)
+from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
+from companion.study.step import FIGURE_2, Floats, Response, fly
+
+_SAME = 1e-9
+"""Paths at two headings that differ by less are the same."""
+_METHODS = (*PAPERS, EXACT)
+PARTS = len(_METHODS) + 1
+
+
+def _printed_quaternion_law(
+    q: Quaternion, target: Target, dt: float, constants: Constants
+) -> tuple[float, float, float]:
+    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error that section 4.2 prints.
+
+    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹: this is the body-frame error rotated to the world
+    frame. Using it as body rates shows the effect of the misprint.
+    """
+    w, x, y, z = q
+    i, j, k = body_error.quaternion(q, target, dt, constants)
+    t_x, t_y, t_z = 2.0 * (y * k - z * j), 2.0 * (z * i - x * k), 2.0 * (x * j - y * i)
+    return (
+        i + w * t_x + y * t_z - z * t_y,
+        j + w * t_y + z * t_x - x * t_z,
+        k + w * t_z + x * t_y - y * t_x,
+    )
+
+
+def run(tick: Tick) -> Outcome:
+    """Fly the step of figure 2 with every method at every heading."""
+    reference = FIGURE_2.reference()
+    responses = {}
+    for method in _METHODS:
+        tick(method.label)
+        responses[method] = fly(planner_of(method, FIGURE_2.gain), FIGURE_2)
+    tick("the error as the paper prints it")
+    printed = fly(
+        LawPlanner(_printed_quaternion_law, planner_of(QUATERNION, FIGURE_2.gain).constants),
+        FIGURE_2,
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for method, response in responses.items():
+        rows += _rows(method.label, response, reference)
+    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed, reference)
+    return Outcome(
+        name="fig2",
+        title="Figure 2: step response without limits",
+        conditions=(
+            "Coefficients step from (−0.4, −0.5) to (0.4, −0.5), p = 5 s⁻¹, 1000 Hz, body rates"
+            " follow at once, 72 headings π/36 apart. The step is to the north, so a_E should"
+            " stay at −0.5."
+        ),
+        figure=_figure(responses, reference),
+        caption=(
+            "Every method at one heading, for Euler angles the worst: both coefficients, distance"
+            " from the first-order reference, and the path in the plane of the coefficients."
+        ),
+        tables=(
+            Table(
+                "fig2",
+                "Step response of figure 2. A method that depends on heading has two rows: for its"
+                " best and for its worst heading.",
+                (
+                    "method",
+                    "largest deviation from first order",
+                    "cross-track",
+                    "time to 5 %, s",
+                    "difference between headings",
+                ),
+                tuple(rows),
+            ),
+        ),
+        findings=_findings(responses, printed, reference),
+    )
+
+
+def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
+    away, across = largest_deviation(response, reference), cross_track(response)
+    arrived, effect = time_to(response), heading_effect(response)
+    if effect < _SAME:
+        return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
+    rows: list[tuple[Cell, ...]] = []
+    for words, index in zip(("best", "worst"), best_and_worst(away), strict=True):
+        at = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
+        rows.append((at, float(away[index]), float(across[index]), float(arrived[index]), effect))
+    return rows
+
+
+def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
+    time = FIGURE_2.time
+    _, worst = best_and_worst(largest_deviation(responses[EULER], reference))
+    at = {method: worst if method is EULER else 0 for method in PAPERS}
+    curves = [
+        (
+            method,
+            f"{method.label} (worst heading)" if method is EULER else method.label,
+            responses[method].at(at[method]),
+        )
+        for method in PAPERS
+    ]
+    figure, ((north, east), (away, plane)) = new_figure(2, 2)
+    draw_response(north, east, time, curves)
+    draw_reference(north, east, time, reference)
+    for method in PAPERS:
+        error = deviation(responses[method], reference)[:, at[method]]
+        draw(away, time, error, method.line)
+    away.set(
+        title="Distance from the reference",
+        xlabel="time, s",
+        ylabel="|c − reference|",
+        yscale="log",
+        ylim=(1e-5, 0.1),
+    )
+    draw_plane(plane, curves, np.array([FIGURE_2.start, FIGURE_2.target]))
+    north.legend(loc="lower right")
+    return figure
+
+
+def _findings(
+    responses: dict[Method, Response], printed: Response, reference: Floats
+) -> tuple[Finding, ...]:
+    away = {method: largest_deviation(responses[method], reference) for method in responses}
+    effect = {method: heading_effect(responses[method]) for method in responses}
+    best_other = min(float(away[method].min()) for method in (QUATERNION, SO3, EULER))
+    proposed = float(away[PROPOSED].max())
+    return (
+        Finding(
+            "paper",
+            "The proposed method follows the first-order reference; the others do not.",
+            proposed < 0.2 * best_other,
+            f"Largest deviation {proposed:.2g}. The best other method at its best heading has"
+            f" {best_other:.2g}, {best_other / proposed:.0f} times as much (required: 5 times).",
+        ),
+        Finding(
+            "paper",
+            "Heading does not change the response of the proposed, the quaternion and the SO(3)"
+            " method.",
+            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _SAME,
+            "Largest difference of the paths between any two headings: "
+            + ", ".join(
+                f"{method.label} {effect[method]:.1g}" for method in (PROPOSED, QUATERNION, SO3)
+            )
+            + ". The error must be taken in the body frame, q⁻¹ ⊗ q_d.",
+        ),
+        Finding(
+            "asked",
+            "Heading does not change the response of the quaternion method with the error"
+            " q_d ⊗ q⁻¹, as the paper prints it.",
+            heading_effect(printed) < _SAME,
+            f"With that error as body rates the paths at two headings differ by up to"
+            f" {heading_effect(printed):.2g}, and the largest deviation is"
+            f" {largest_deviation(printed, reference).max():.2g}.",
+        ),
+        Finding(
+            "paper",
+            "Heading changes the response of the Euler-angle method.",
+            effect[EULER] > _SAME,
+            f"Its largest deviation is {away[EULER].min():.2g} at the best heading and"
+            f" {away[EULER].max():.2g} at the worst.",
+        ),
+    )

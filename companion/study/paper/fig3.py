@@ -1,0 +1,92 @@
+"""Figure 3: the Euler-angle method at headings every π/36."""
+
+from math import degrees
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from companion.study.drawing import draw, draw_reference, label_response, new_figure
+from companion.study.measures import best_and_worst, cross_track, largest_deviation
+from companion.study.methods import EULER, PROPOSED, planner_of
+from companion.study.outcome import Finding, Outcome, Table, Tick
+from companion.study.step import FIGURE_2, Floats, Response, fly
+
+_FOLDED = colormaps["viridis"]
+"""Colours by the angle between the heading and the axis of the step, 0° to 90°."""
+PARTS = 2
+
+
+def run(tick: Tick) -> Outcome:
+    """Fly the step of figure 2 with Euler angles at every heading."""
+    tick(EULER.label)
+    response = fly(planner_of(EULER, FIGURE_2.gain), FIGURE_2)
+    reference = FIGURE_2.reference()
+    away, across = largest_deviation(response, reference), cross_track(response)
+    best, worst = best_and_worst(away)
+    tick(PROPOSED.label)
+    proposed = largest_deviation(fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference)
+    at = [round(degrees(heading)) for heading in FIGURE_2.headings]
+    return Outcome(
+        name="fig3",
+        title="Figure 3: Euler angles at every heading",
+        conditions="The step of figure 2 with the Euler-angle method, 72 headings π/36 apart.",
+        figure=_figure(response, reference),
+        caption=(
+            "One line for each heading, from dark (along the step) to bright (across it): both"
+            " coefficients, the paths, and the largest deviation by heading."
+        ),
+        tables=(
+            Table(
+                "fig3",
+                "The Euler-angle method by heading.",
+                ("heading, °", "largest deviation from first order", "cross-track"),
+                tuple((at[k], float(away[k]), float(across[k])) for k in range(len(at))),
+            ),
+        ),
+        findings=(
+            Finding(
+                "asked",
+                "The Euler-angle method is much better at some headings than at others.",
+                bool(away[best] < 0.5 * away[worst]),
+                f"Largest deviation {away[best]:.2g} at the best heading, {at[best]}°, and"
+                f" {away[worst]:.2g} at the worst, {at[worst]}°. The proposed method has"
+                f" {proposed.max():.2g} at every heading.",
+            ),
+        ),
+    )
+
+
+def _figure(response: Response, reference: Floats) -> Figure:
+    figure, ((north, east), (away, plane)) = new_figure(2, 2)
+    time, headings = FIGURE_2.time, np.degrees(FIGURE_2.headings)
+    folded = np.abs((headings + 90.0) % 180.0 - 90.0)
+    key = ScalarMappable(Normalize(0.0, 100.0), _FOLDED)
+    colours = key.to_rgba(folded)
+    for k in np.argsort(-folded):
+        line = {"color": colours[k], "linewidth": 0.8}
+        c = response.at(k)
+        draw(north, time, c[:, 0], line)
+        draw(east, time, c[:, 1], line)
+        draw(plane, c[:, 1], c[:, 0], line)
+    draw_reference(north, east, time, reference)
+    label_response(north, east)
+    plane.set(
+        title="Paths (a straight line at $a_E$ = −0.5 is asked)", xlabel="$a_E$", ylabel="$a_N$"
+    )
+    largest = largest_deviation(response, reference)
+    away.scatter(headings, largest, c=colours, s=14, zorder=3)
+    away.plot(headings, largest, **{"color": "#888888", "linewidth": 0.8})
+    away.set(
+        title="Largest deviation by heading",
+        xlabel="heading, °",
+        ylabel="max |c − reference|",
+        xticks=np.arange(-180, 181, 60),
+        ylim=(0.0, None),
+    )
+    bar = figure.colorbar(key, ax=[east, plane], ticks=[0, 30, 60, 90], boundaries=range(91))
+    bar.set_label("angle between heading and the step's axis, °")
+    north.legend(loc="lower right")
+    return figure

@@ -1,0 +1,144 @@
+"""Figure 4: the step under a limit of the tilt rate."""
+
+from dataclasses import replace
+from math import pi, radians
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from companion.attitude import Limits
+from companion.attitude.reference import FirstOrderReference
+from companion.study.drawing import (
+    draw,
+    draw_plane,
+    draw_reference,
+    label_response,
+    label_tilt_rate,
+    new_figure,
+)
+from companion.study.measures import cross_track, largest_deviation, largest_tilt_rate, time_to
+from companion.study.methods import (
+    EULER,
+    LIMIT,
+    PAPER_LIMIT,
+    PROPOSED,
+    QUATERNION,
+    SO3,
+    Method,
+    planner_of,
+)
+from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
+from companion.study.step import FIGURE_4, Floats, Response, fly
+
+MAX_TILT = radians(40.0)
+MAX_TILT_RATE = pi / 2.0
+
+_METHODS = (QUATERNION, SO3, EULER, PROPOSED, PAPER_LIMIT)
+PARTS = len(_METHODS)
+
+
+def run(tick: Tick) -> Outcome:
+    """Fly the step of figure 4 with every method; the proposed one with each of its limits."""
+    tight = Limits(MAX_TILT, MAX_TILT_RATE)
+    paper = replace(tight, shape="paper")
+    responses = {}
+    for method in _METHODS:
+        tick(method.label)
+        limits = paper if method is PAPER_LIMIT else tight
+        responses[method] = fly(planner_of(method, FIGURE_4.gain, limits), FIGURE_4)
+    reference = FIGURE_4.reference(FirstOrderReference(FIGURE_4.gain, paper.coefficient_speed))
+    return Outcome(
+        name="fig4",
+        title="Figure 4: step response with the tilt rate limited",
+        conditions=(
+            "Coefficients step from (−0.5, 0) to (0, 0.5), p = 5 s⁻¹, 1000 Hz, tilt limit 40°,"
+            " W_M = π/2 rad/s, 72 headings. The paper bounds the coefficients' rate by"
+            " W_M·cos 40° (equation 33); the tight limit scales the tilt rate only where it would"
+            " exceed W_M."
+        ),
+        figure=_figure(responses, reference),
+        caption=(
+            "Response, path, and √(ω_x² + ω_y²) with its limit; Euler angles at the slowest"
+            " heading. The reference is first order with the limit of equation 33."
+        ),
+        tables=(
+            Table(
+                "fig4",
+                "Step response of figure 4 under W_M = π/2 rad/s; largest values over 72 headings.",
+                (
+                    "method",
+                    "largest √(ω_x²+ω_y²), rad/s",
+                    "time to 5 %, s",
+                    "cross-track",
+                    "largest deviation from the reference of equation 33",
+                ),
+                tuple(_row(method, responses[method], reference) for method in _METHODS),
+            ),
+        ),
+        findings=_findings(responses, reference),
+    )
+
+
+def _row(method: Method, response: Response, reference: Floats) -> tuple[Cell, ...]:
+    return (
+        method.label,
+        largest_tilt_rate(response),
+        float(time_to(response).max()),
+        float(cross_track(response).max()),
+        float(largest_deviation(response, reference).max()),
+    )
+
+
+def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
+    time = FIGURE_4.time
+    slowest = int(time_to(responses[EULER]).argmax())
+    at = {method: slowest if method is EULER else 0 for method in _METHODS}
+    curves = [(method, method.label, responses[method].at(at[method])) for method in _METHODS]
+    figure, ((north, east), (rate, plane)) = new_figure(2, 2)
+    for method, label, c in curves:
+        draw(north, time, c[:, 0], method.line, label)
+        draw(east, time, c[:, 1], method.line)
+        draw(rate, time[:-1], responses[method].tilt_rate[:, at[method]], method.line)
+    draw_reference(north, east, time, reference, "reference, equation 33")
+    rate.axhline(MAX_TILT_RATE, **LIMIT)
+    label_response(north, east)
+    label_tilt_rate(rate, "Tilt rate and its limit")
+    rate.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))
+    draw_plane(plane, curves, np.array([FIGURE_4.start, FIGURE_4.target]))
+    north.legend(loc="lower right")
+    return figure
+
+
+def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Finding, ...]:
+    rate = {method: largest_tilt_rate(responses[method]) for method in _METHODS}
+    arrived = {method: float(time_to(responses[method]).max()) for method in _METHODS}
+    across = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
+    away = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
+    euler = time_to(responses[EULER])
+    return (
+        Finding(
+            "paper",
+            "The limit of equation 33 keeps the tilt rate within W_M.",
+            rate[PAPER_LIMIT] <= MAX_TILT_RATE * (1.0 + 1e-12),
+            f"The largest is {rate[PAPER_LIMIT]:.3f} of {MAX_TILT_RATE:.3f} rad/s; the response"
+            f" follows the limited first-order reference within {away:.2g}.",
+        ),
+        Finding(
+            "asked",
+            "That limit makes full use of W_M.",
+            rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
+            f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of W_M and takes"
+            f" {arrived[PAPER_LIMIT]:.3f} s; the tight limit uses"
+            f" {100.0 * rate[PROPOSED] / MAX_TILT_RATE:.0f} % and takes {arrived[PROPOSED]:.3f} s,"
+            f" along the same straight line (cross-track {across[PROPOSED]:.2g}).",
+        ),
+        Finding(
+            "asked",
+            "Under the limit the proposed method is the quickest.",
+            min(arrived, key=lambda method: arrived[method]) in (PROPOSED, PAPER_LIMIT),
+            f"so3 takes {arrived[SO3]:.3f} s, the quaternion method {arrived[QUATERNION]:.3f} s,"
+            f" euler {euler.min():.3f} to {euler.max():.3f} s by heading, first-order"
+            f" {arrived[PROPOSED]:.3f} s. so3 leaves the straight line by {across[SO3]:.2g},"
+            f" first-order by {across[PROPOSED]:.2g}.",
+        ),
+    )

@@ -1,0 +1,219 @@
+"""Figure 5: the step of figure 2 with the complete inner loop."""
+
+from math import hypot
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from companion.study.drawing import draw, draw_plane, draw_reference, draw_response, new_figure
+from companion.study.measures import (
+    FIT_COLUMNS,
+    deviation,
+    heading_effect,
+    largest_deviation,
+    time_to,
+)
+from companion.study.methods import (
+    EULER,
+    PAPERS,
+    PROPOSED,
+    QUATERNION,
+    REFERENCE,
+    SO3,
+)
+from companion.study.outcome import Finding, Outcome, Source, Table, Tick
+from companion.study.paper.fig5_flights import (
+    MEASURED,
+    METHODS,
+    PARTS,
+    QUICK,
+    LoopFlights,
+    Sweep,
+    fly_methods,
+    fly_sweep,
+)
+from companion.study.step import FIGURE_2
+
+__all__ = ["PARTS", "run"]
+
+_SECOND_ORDER_SHARE = 0.02
+_SECOND_ORDER = {**REFERENCE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
+
+
+def run(tick: Tick) -> Outcome:
+    """Fly the step of figure 2 with every method through rate loop, rotors and rigid body."""
+    quick, measured = fly_methods(QUICK, tick), fly_methods(MEASURED, tick)
+    sweep = fly_sweep(tick)
+    return Outcome(
+        name="fig5",
+        title="Figure 5: step response with the complete inner loop",
+        conditions=(
+            "The step of figure 2 through a PI rate loop with feed-forward and saturation, rotor"
+            " lag, aerodynamic damping and a rigid body with gyroscopic torque; 8 headings. The"
+            " result depends on the speed of that loop. It is flown with two: the bundled vehicle,"
+            " which responds as measured on a PX4 (a step of the roll rate reaches 63 % after"
+            f" {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK} times shorter"
+            f" ({1e3 * quick.time_63:.0f} ms)."
+        ),
+        figure=_figure(quick, measured, sweep),
+        caption=(
+            "Every method at the heading with its largest cross-track: above with the quick inner"
+            " loop, below with the measured one, whose rotors saturate at the start and cause a"
+            " slow tail. The second-order reference, with a dead time, is fitted to first-order."
+            " Below right: cross-track by the speed of the loop."
+        ),
+        tables=(_table(quick, measured), _sweep_table(sweep)),
+        findings=_findings(quick, measured, sweep),
+    )
+
+
+def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
+    reference = quick.responses[PROPOSED].step.reference()
+    return Table(
+        "fig5",
+        "Step response with the complete inner loop; largest values over 8 headings. The"
+        " second-order model is fitted at the heading of the largest cross-track.",
+        (
+            "method",
+            "63 % of a rate step, ms",
+            "largest deviation from first order",
+            "cross-track",
+            "time to 5 %, s",
+            *FIT_COLUMNS,
+            "largest deviation from it",
+            "difference between headings",
+        ),
+        tuple(
+            (
+                method.label,
+                1e3 * loop.time_63,
+                float(largest_deviation(loop.responses[method], reference).max()),
+                loop.cross_track(method),
+                float(time_to(loop.responses[method]).max()),
+                *loop.fits[method].cells,
+                loop.from_second_order(method),
+                heading_effect(loop.responses[method]),
+            )
+            for loop in (quick, measured)
+            for method in METHODS
+        ),
+    )
+
+
+def _sweep_table(sweep: Sweep) -> Table:
+    return Table(
+        "fig5-quickness",
+        "Cross-track by the speed of the inner loop, heading 0.",
+        ("63 % of a rate step, ms", *(method.label for method in PAPERS)),
+        tuple(
+            (1e3 * time_63, *(across[method] for method in PAPERS))
+            for time_63, across in sweep.items()
+        ),
+    )
+
+
+def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
+    figure, axes = new_figure(4, 2, height=2.9)
+    _draw_loop((axes[0, 0], axes[0, 1], axes[1, 0]), quick)
+    _draw_loop((axes[2, 0], axes[2, 1], axes[3, 0]), measured)
+    away, across = axes[1, 1], axes[3, 1]
+    step = quick.responses[PROPOSED].step
+    for method in PAPERS:
+        error = deviation(quick.responses[method], step.reference())[:, quick.worst(method)]
+        draw(away, step.time, error, method.line)
+        times = 1e3 * np.array(list(sweep))
+        values = [tracks[method] for tracks in sweep.values()]
+        across.plot(times, values, marker="o", markersize=4, **method.line)
+    away.set(
+        title=f"Distance from first order, {quick}",
+        xlabel="time, s",
+        ylabel="|c − reference|",
+        xlim=(0.0, 1.5),
+        ylim=(0.0, None),
+    )
+    across.set(
+        title="Cross-track by quickness, heading 0",
+        xlabel="63 % of a rate step, ms",
+        ylabel="largest distance from the line",
+        ylim=(0.0, None),
+        xlim=(0.0, None),
+    )
+    axes[0, 0].legend(loc="lower right")
+    return figure
+
+
+def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
+    """Response and path of every method with one inner loop, each at its worst heading."""
+    north, east, plane = panels
+    curves = [
+        (method, method.label, loop.responses[method].at(loop.worst(method))) for method in PAPERS
+    ]
+    step, second = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
+    draw_response(north, east, step.time, curves)
+    draw_reference(north, east, step.time, step.reference())
+    draw(north, step.time, second[:, 0], _SECOND_ORDER, "second-order reference")
+    draw_plane(plane, curves, np.array([step.start, step.target]))
+    for panel in (north, east):
+        panel.set(xlim=(0.0, 1.5))
+    for panel in panels:
+        panel.set_title(f"{panel.get_title()}, {loop}")
+
+
+def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
+    """Straightness and order of the response with each loop, and the effect of heading."""
+    others = [method for method in PAPERS if method is not PROPOSED]
+    ahead = [t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)]
+    return (
+        _straightest("paper", "quick", quick),
+        _straightest("asked", "as slow as measured", measured),
+        Finding(
+            "asked",
+            "The proposed method is the straightest with every inner loop.",
+            len(ahead) == len(sweep),
+            "At heading 0 it is with loops of "
+            + (", ".join(f"{1e3 * t:.0f}" for t in ahead) or "no")
+            + " ms (63 % of a rate step). Its cross-track is "
+            + ", ".join(f"{across[PROPOSED]:.2g}" for across in sweep.values())
+            + " with "
+            + ", ".join(f"{1e3 * t:.0f}" for t in sweep)
+            + " ms.",
+        ),
+        Finding(
+            "asked",
+            "Heading does not change the response with a complete inner loop either.",
+            max(heading_effect(measured.responses[m]) for m in (PROPOSED, QUATERNION, SO3)) < 1e-3,
+            "Largest difference of the paths between any two headings, measured inner loop: "
+            + ", ".join(f"{m.label} {heading_effect(measured.responses[m]):.2g}" for m in PAPERS)
+            + " (required: 0.001).",
+        ),
+        _second_order("paper", "quick", quick),
+        _second_order("asked", "as slow as measured", measured),
+    )
+
+
+def _straightest(source: Source, words: str, loop: LoopFlights) -> Finding:
+    across = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
+    return Finding(
+        source,
+        f"With a complete inner loop that is {words} ({1e3 * loop.time_63:.0f} ms) the proposed"
+        " method still is the straightest.",
+        across[PROPOSED] < min(bent for m, bent in across.items() if m is not PROPOSED),
+        "Cross-track over all headings: "
+        + ", ".join(f"{method.label} {bent:.2g}" for method, bent in across.items())
+        + ".",
+    )
+
+
+def _second_order(source: Source, words: str, loop: LoopFlights) -> Finding:
+    fit, away = loop.fits[PROPOSED], loop.from_second_order(PROPOSED)
+    bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
+    return Finding(
+        source,
+        f"With a complete inner loop that is {words} the response of the proposed method is second"
+        " order.",
+        away < bound,
+        f"It stays within {away:.2g} of ω = {fit.model.frequency:.1f} rad/s,"
+        f" ζ = {fit.model.damping:.2f} after a dead time of {1e3 * fit.dead_time:.0f} ms; required"
+        f" are 2 % of the step, {bound:.2g}.",
+    )

@@ -1,0 +1,134 @@
+"""Appendix A: the body rate needed per rate of the coefficients, by tilt and direction."""
+
+from math import cos, degrees, pi, radians, sin
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from companion.attitude import Coefficients
+from companion.attitude.reference_model import rates_along
+from companion.study.drawing import new_figure
+from companion.study.methods import PROPOSED, REFERENCE
+from companion.study.outcome import Finding, Outcome, Table, Tick
+from companion.study.step import Floats
+
+TILTS = tuple(radians(angle) for angle in (0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0))
+PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
+"""K_max as the paper prints it, by tilt in degrees."""
+
+_LIMIT = radians(60.0)
+_DIRECTIONS = 72
+PARTS = 2
+
+
+def scaling_factor(c: Coefficients, direction: float) -> float:
+    """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) when the coefficients move towards `direction` (rad)."""
+    roll, pitch, _ = rates_along(c.north, c.east, cos(direction), sin(direction))
+    return roll * roll + pitch * pitch
+
+
+def bound(max_tilt: float) -> float:
+    """Appendix A: K_max = 1/(1 − 2A_M²)² with A_M = sin(max_tilt/2)."""
+    return float((1.0 - 2.0 * sin(0.5 * max_tilt) ** 2) ** -2)
+
+
+def run(tick: Tick) -> Outcome:
+    """Compute K with the formulas that fly, over tilts and directions."""
+    tick("tilts")
+    directions = np.linspace(0.0, 2.0 * pi, _DIRECTIONS, endpoint=False)
+    by_tilt = {
+        tilt: np.array([scaling_factor(Coefficients(sin(tilt), 0.0), d) for d in directions])
+        for tilt in TILTS
+    }
+    tick("disc")
+    rows = tuple(
+        (
+            round(degrees(tilt)),
+            float(k.max()),
+            bound(tilt),
+            float(k.min()),
+            float(np.sqrt(k).mean() / np.sqrt(k.max())),
+        )
+        for tilt, k in by_tilt.items()
+    )
+    computed = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
+    share = {row[0]: row[4] for row in rows}
+    return Outcome(
+        name="kmax",
+        title="Appendix A: the scaling factor K over the tilt disc",
+        conditions=(
+            "K = (ω_x² + ω_y²)/|ċ|² of the flying planner's kinematics, tilts to 60°, 72 directions"
+            " of ċ. Equation 33 uses the largest K of all tilts and directions."
+        ),
+        figure=_figure(by_tilt),
+        caption=(
+            "Left: K for a movement to the north, by tilt. Right: the largest and the smallest K of"
+            " all directions, by tilt; ● are the values that the paper prints."
+        ),
+        tables=(
+            Table(
+                "kmax",
+                "Scaling factor by tilt.",
+                (
+                    "tilt, °",
+                    "K_max computed",
+                    "1/(1 − 2A_M²)² = 1/cos² tilt, A_M = sin(tilt/2)",
+                    "K_min computed",
+                    "mean rate over largest rate",
+                ),
+                rows,
+            ),
+        ),
+        findings=(
+            Finding(
+                "paper",
+                "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
+                all(abs(computed[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
+                and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
+                "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed.items()) + ".",
+            ),
+            Finding(
+                "asked",
+                "A movement in any direction needs K_max.",
+                min(row[3] / row[1] for row in rows) > 0.99,
+                f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
+                f" depending on direction. The mean body rate is {100.0 * share[40]:.0f} % of the"
+                f" largest at 40° of tilt and {100.0 * share[60]:.0f} % at 60°.",
+            ),
+        ),
+    )
+
+
+def _figure(by_tilt: dict[float, Floats]) -> Figure:
+    figure, ((disc, over_tilt),) = new_figure(1, 2, height=3.8)
+    radii = np.linspace(0.0, sin(_LIMIT), 40)
+    around = np.linspace(0.0, 2.0 * pi, 73)
+    k = np.array(
+        [[scaling_factor(Coefficients(r * cos(b), r * sin(b)), 0.0) for b in around] for r in radii]
+    )
+    north, east = np.outer(radii, np.cos(around)), np.outer(radii, np.sin(around))
+    levels = np.linspace(1.0, 4.0, 13)
+    filled = disc.contourf(east, north, k, levels=levels, cmap="cividis")
+    lines = disc.contour(east, north, k, levels=[1.333, 2.0, 3.0], colors="white", linewidths=0.8)
+    disc.clabel(lines, fmt="%.3g", fontsize=7)
+    figure.colorbar(filled, ax=disc, label="K", ticks=[1, 2, 3, 4])
+    disc.set(title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal")
+    tilts = np.linspace(0.0, _LIMIT, 121)
+    over_tilt.plot(
+        np.degrees(tilts), [bound(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE
+    )
+    for extreme, marker, words in ((np.max, "s", "largest"), (np.min, "v", "smallest")):
+        over_tilt.plot(
+            np.degrees(list(by_tilt)),
+            [extreme(values) for values in by_tilt.values()],
+            marker,
+            color=PROPOSED.colour,
+            markerfacecolor="none",
+            label=f"{words} over the directions",
+        )
+    over_tilt.plot(
+        list(PRINTED), list(PRINTED.values()), "o", color="black", label="printed in the paper"
+    )
+    over_tilt.set(title="K by tilt", xlabel="tilt, °", ylabel="K", ylim=(0.0, None))
+    over_tilt.legend(loc="upper left")
+    return figure

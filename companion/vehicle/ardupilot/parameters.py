@@ -1,0 +1,266 @@
+"""ArduCopter's parameters that matter to a flight by body rates.
+
+Sources: ArduCopter's parameter reference; "measured": ArduCopter 4.7 in simulation, 2025. Version
+4.7 renamed some; where their unit or sense changed with the name they have a rule each.
+"""
+
+from companion.vehicle.parameter_checks import (
+    INEFFECTIVE,
+    UNSAFE,
+    acceleration_limit,
+    at_most,
+    battery_scaling,
+    bit_clear,
+    bit_set,
+    forbidden,
+    hover_thrust,
+    our_system,
+    positive,
+    rates_held,
+    required,
+    thrust_curve,
+)
+from companion.vehicle.parameter_rules import Complaint, ParameterRule, Setup, Values
+
+_REFERENCE = "ArduCopter parameter reference"
+_MEASURED = "measured on ArduCopter 4.7, 2025"
+_STOPS_MOTORS = "the motors stop in the air"
+_THRUST_AS_THRUST = 8
+_CENTI = 0.01
+
+
+def _angle_boost(value: float, _: Values, setup: Setup) -> Complaint | None:
+    if value and not setup.tilt_compensated:
+        return Complaint(
+            UNSAFE,
+            "ArduPilot divides thrust by cos(tilt) and so do we, so that the vehicle climbs when "
+            "it tilts (thrust.autopilot_compensates_tilt is false)",
+            0.0,
+        )
+    if not value and setup.tilt_compensated:
+        return Complaint(
+            UNSAFE,
+            "neither ArduPilot nor we divide thrust by cos(tilt), so that the vehicle sinks when "
+            "it tilts; set thrust.autopilot_compensates_tilt to false",
+        )
+    return None
+
+
+def _transmitter_failsafe(value: float, values: Values, _: Setup) -> Complaint | None:
+    if value or values.get("FS_GCS_ENABLE"):
+        return None
+    return Complaint(
+        UNSAFE,
+        "nothing is done when the pilot's transmitter is lost, nor (FS_GCS_ENABLE) when the ground "
+        "station is",
+        1.0,
+    )
+
+
+def _ground_station(value: float, values: Values, setup: Setup) -> Complaint | None:
+    if value != setup.source_system or not values.get("FS_GCS_ENABLE"):
+        return None
+    return Complaint(
+        INEFFECTIVE,
+        f"our own heartbeat, of system {setup.source_system}, counts as the ground station's, so "
+        "that its loss is not noticed",
+        255.0 if setup.source_system != 255 else None,
+    )
+
+
+def _loop_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
+    if value >= setup.attitude_rate_hz:
+        return None
+    return Complaint(
+        INEFFECTIVE,
+        f"no message is sent more often, so that link.attitude_rate_hz {setup.attitude_rate_hz:g} "
+        "is denied; ask for less",
+    )
+
+
+def _fence(value: float, values: Values, _: Setup) -> Complaint | None:
+    if value or not values.get("FENCE_ENABLE"):
+        return None
+    return Complaint(INEFFECTIVE, "the fence is on (FENCE_ENABLE) and only reports", 1.0)
+
+
+def _any_value(_: float, __: Values, ___: Setup) -> None:
+    """Read for the sake of another rule; without a fence of ArduPilot's there still is ours."""
+
+
+def _battery_failsafe(value: float, values: Values, _: Setup) -> Complaint | None:
+    if value == 5.0:
+        return Complaint(UNSAFE, _STOPS_MOTORS, 1.0)
+    if value or values.get("BATT_FS_LOW_ACT"):
+        return None
+    return Complaint(
+        INEFFECTIVE,
+        "ArduPilot does nothing about an empty battery; nobody lands should our program have ended",
+        1.0,
+    )
+
+
+def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
+    meaning = f"how quickly the {name} rate may change"
+    return (
+        ParameterRule((f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, name), _MEASURED),
+        ParameterRule(
+            (f"ATC_ACCEL_{axis}_MAX",),
+            f"{meaning}, in hundredths of a degree (before 4.7)",
+            acceleration_limit(_CENTI, name),
+            _REFERENCE,
+        ),
+    )
+
+
+ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
+    ParameterRule(
+        ("GUID_OPTIONS",),
+        "whether our thrust is a thrust or a climb rate",
+        bit_set(
+            UNSAFE,
+            _THRUST_AS_THRUST,
+            "our thrust would be obeyed as a climb rate (bit 3, value 8, makes it a thrust)",
+        ),
+        f"{_REFERENCE}; {_MEASURED}",
+        vital=True,
+    ),
+    ParameterRule(
+        ("ATC_ANGLE_BOOST",),
+        "whether ArduPilot divides thrust by cos(tilt)",
+        _angle_boost,
+        _MEASURED,
+        vital=True,
+    ),
+    ParameterRule(
+        ("GUID_TIMEOUT",),
+        "for how long the last rates are held",
+        rates_held,
+        _MEASURED,
+        vital=True,
+    ),
+    ParameterRule(
+        ("ATC_RATE_FF_ENAB",),
+        "whether body rates are fed forward",
+        required(INEFFECTIVE, 1.0, "our rates are followed late, by the attitude alone"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("ATC_INPUT_TC",),
+        "how softly ArduPilot levels by itself",
+        at_most(INEFFECTIVE, 0.3, "levelling takes long when our setpoints stop", 0.15),
+        _REFERENCE,
+    ),
+    *_acceleration("R", "roll"),
+    *_acceleration("P", "pitch"),
+    *_acceleration("Y", "yaw"),
+    ParameterRule(
+        ("FS_GCS_ENABLE",),
+        "what ArduPilot does when the ground station's heartbeat stops",
+        forbidden(
+            INEFFECTIVE,
+            {2.0: "the value 2 was given up in 4.0; what it does now depends on the version"},
+            1.0,
+        ),
+        f"{_REFERENCE}; {_MEASURED}",
+    ),
+    ParameterRule(
+        ("MAV_GCS_SYSID", "SYSID_MYGCS"),
+        "whose heartbeat counts as the ground station's",
+        _ground_station,
+        _MEASURED,
+    ),
+    ParameterRule(
+        ("MAV_SYSID", "SYSID_THISMAV"), "the vehicle's system id", our_system, "MAVLink routing"
+    ),
+    ParameterRule(
+        ("FS_THR_ENABLE",),
+        "what ArduPilot does when the pilot's transmitter is lost",
+        _transmitter_failsafe,
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("FS_OPTIONS",),
+        "in which modes failsafes are ignored",
+        bit_clear(INEFFECTIVE, 4, "in GUIDED nothing is done about a lost transmitter"),
+        _REFERENCE,
+    ),
+    ParameterRule(("MOT_THST_HOVER",), "at which thrust ArduPilot hovers", hover_thrust, _MEASURED),
+    ParameterRule(
+        ("MOT_THST_EXPO",),
+        "whether ArduPilot makes up for the thrust curve",
+        thrust_curve,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MOT_BAT_VOLT_MAX",),
+        "whether ArduPilot makes up for the battery's voltage (0: it does not)",
+        battery_scaling,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("ARMING_SKIPCHK",),
+        "which checks before arming are left out",
+        required(UNSAFE, 0.0, "checks before arming are left out"),
+        _REFERENCE,
+        universal=True,
+        instead="ARMING_CHECK",
+    ),
+    ParameterRule(
+        ("ARMING_CHECK",),
+        "which checks before arming are made (before 4.7)",
+        required(UNSAFE, 1.0, "not all checks are made before arming"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("DISARM_DELAY",),
+        "after how long on the ground ArduPilot disarms itself",
+        positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("SCHED_LOOP_RATE",), "how often ArduPilot's main loop runs, Hz", _loop_rate, _MEASURED
+    ),
+    ParameterRule(
+        ("FS_EKF_ACTION",),
+        "what ArduPilot does when its estimator fails",
+        forbidden(
+            UNSAFE,
+            {
+                0.0: "it only reports that it does not know where it is",
+                2.0: "it goes to ALT_HOLD, and drifts unless a pilot acts at once",
+            },
+            1.0,
+        ),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("FENCE_ACTION",),
+        "what ArduPilot does at its own geofence",
+        _fence,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("FENCE_ENABLE",),
+        "whether ArduPilot has a geofence of its own",
+        _any_value,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("BATT_FS_LOW_ACT",),
+        "what ArduPilot does about a low battery",
+        forbidden(UNSAFE, {5.0: _STOPS_MOTORS}, 2.0),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("BATT_FS_CRT_ACT",),
+        "what ArduPilot does about a battery that is nearly empty",
+        _battery_failsafe,
+        _REFERENCE,
+        universal=True,
+    ),
+)

@@ -1,0 +1,104 @@
+"""Keeps one transport open between the endpoint and the two boxes."""
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from companion.mavlink.endpoint import Endpoint, UdpIn, UdpOut
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.opening import OpenTransport, open_transport
+from companion.mavlink.outbox import Outbox
+from companion.mavlink.stats import LinkStats
+from companion.vehicle.inbox import Inbox
+
+_LOG = logging.getLogger(__name__)
+
+_BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
+
+
+class Connection:
+    """A connection that is opened again when it drops, with growing pauses.
+
+    Nothing survives a drop: the old transport is closed with what it had not sent yet, a frame
+    cut in two is forgotten, and `dropped` ends whatever waited for an answer.
+
+    Args:
+        endpoint: Where to.
+        inbox: Takes what arrives.
+        outbox: Sends over the transport that is open, or drops what it is given.
+        stats: Counts the reconnects.
+        dropped: Called with the reason of each drop.
+        opener: Opens the transport.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        inbox: Inbox,
+        outbox: Outbox,
+        stats: LinkStats,
+        dropped: Callable[[str], None],
+        opener: OpenTransport = open_transport,
+    ) -> None:
+        self._endpoint, self._inbox, self._outbox = endpoint, inbox, outbox
+        self._stats, self._dropped, self._opener = stats, dropped, opener
+        self._reopening: asyncio.Task[None] | None = None
+        self._lost_early: str | None = None
+
+    @property
+    def local_address(self) -> tuple[str, int] | None:
+        """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
+        return getattr(self._outbox.transport, "local", None)
+
+    async def open(self) -> None:
+        """Open the transport.
+
+        Raises:
+            EndpointError: With the reason and how to mend it.
+        """
+        # Before the transport is there: its first bytes may come before we run again.
+        self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
+        self._lost_early = None
+        transport = await self._opener(self._endpoint, self._inbox, self._on_lost)
+        if self._lost_early is not None:
+            transport.close()
+            raise EndpointError(f"the connection was dropped at once: {self._lost_early}")
+        self._outbox.transport = transport
+
+    async def close(self) -> None:
+        """Close the transport and stop reconnecting."""
+        if self._reopening is not None:
+            self._reopening.cancel()
+            await asyncio.gather(self._reopening, return_exceptions=True)
+        self._drop_transport()
+
+    def _drop_transport(self) -> None:
+        transport, self._outbox.transport = self._outbox.transport, None
+        if transport is not None:
+            transport.close()
+
+    def _on_lost(self, reason: str) -> None:
+        _LOG.warning("link lost: %s", reason)
+        transport = self._outbox.transport
+        if transport is None:
+            self._lost_early = reason
+            return
+        if transport.reconnects:
+            self._drop_transport()
+            self._reopening = asyncio.get_running_loop().create_task(self._reopen())
+        else:  # a server goes on listening
+            self._inbox.connect(streaming=True)
+            self._stats.reconnects += 1
+        self._dropped(reason)
+
+    async def _reopen(self) -> None:
+        pause = _BACKOFF_FIRST_S
+        while self._outbox.transport is None:
+            await asyncio.sleep(pause)
+            try:
+                await self.open()
+            except EndpointError as error:
+                _LOG.info("not yet back: %s", error)
+                pause = min(2.0 * pause, _BACKOFF_MAX_S)
+        self._stats.reconnects += 1
+        _LOG.info("link is back")

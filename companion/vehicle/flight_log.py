@@ -1,0 +1,152 @@
+"""What a recorded flight tells of how the vehicle answers, all of it in vehicle time."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from companion.mavlink.codec import IGNORE_ATTITUDE, Message
+from companion.mavlink.errors import LogError
+from companion.mavlink.tlog_file import messages
+from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.registry import FAMILIES, FAMILY_NAMES
+from companion.vehicle.roles import Role
+
+Row = tuple[float, ...]
+
+_FAMILIES = {family.autopilot: family for family in FAMILIES}
+_ARMED = 128
+_WHAT_COUNTS = IGNORE_ATTITUDE | 0b1100111
+"""Of a type mask: quaternion, three rates, throttle, and the body thrust that may replace it."""
+_STANDARD_GRAVITY = 9.80665
+_RECENT = 500
+"""A setpoint that echoes the stamp of a sample echoes one of the latest so many."""
+_ONE_CLOCK = 1.0
+"""An accelerometer's stamp that is further than this from the attitude's is of another clock, s."""
+_NAMES = {
+    "HEARTBEAT",
+    "SET_ATTITUDE_TARGET",
+    "ATTITUDE_QUATERNION",
+    "ATTITUDE",
+    "HIGHRES_IMU",
+    "SCALED_IMU",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLog:
+    """Rows of one flight; times are the vehicle's, s since its boot.
+
+    Attributes:
+        setpoints: (time of the sample that it answers, roll, pitch, yaw rate in rad/s, thrust in
+            0..1), those that the autopilot obeyed.
+        rates: (time, roll, pitch, yaw rate in rad/s), measured.
+        specific_thrust: (time, m/s²), the accelerometer's −z (FRD).
+    """
+
+    setpoints: list[Row]
+    rates: list[Row]
+    specific_thrust: list[Row]
+
+
+def read_flight_log(path: Path) -> FlightLog:
+    """Read a `.tlog`, ours or another program's.
+
+    A setpoint that carries the stamp of a recent sample answers that sample, as ours do; any other
+    is taken to answer the latest sample recorded before it. It counts where the heartbeats before
+    and after it say that the vehicle is armed and obeys rates, in the words of its family.
+
+    Raises:
+        LogError: the file cannot be read, is not a `.tlog`, or holds no heartbeat of an autopilot
+            that we know, or no setpoint that it obeyed.
+    """
+    reader = _Reader()
+    for frame, message in messages(path, _NAMES):
+        reader.take((frame.system, frame.component), message)
+    if reader.vehicle is None:
+        raise LogError(f"{path}: holds no heartbeat of {FAMILY_NAMES}")
+    if not reader.obeyed:
+        raise LogError(
+            f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
+            "armed, in the mode that obeys it"
+        )
+    # Both kinds tell the same rates; together they would count twice.
+    return FlightLog(
+        reader.obeyed, max(reader.quaternion, reader.euler, key=len), reader.specific_thrust
+    )
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Takes messages in the order in which they were recorded.
+
+    Attributes:
+        vehicle: system and component of the autopilot, from its first heartbeat.
+        obeyed: rows of setpoints.
+        quaternion: rows of rates told by ATTITUDE_QUATERNION.
+        euler: those told by ATTITUDE.
+        specific_thrust: rows of the accelerometer.
+    """
+
+    vehicle: tuple[int, int] | None = None
+    obeyed: list[Row] = field(default_factory=list)
+    quaternion: list[Row] = field(default_factory=list)
+    euler: list[Row] = field(default_factory=list)
+    specific_thrust: list[Row] = field(default_factory=list)
+    _family: AutopilotFamily | None = None
+    _obeying: bool = False
+    _unconfirmed: list[Row] = field(default_factory=list)
+    _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
+
+    def take(self, source: tuple[int, int], message: Message) -> None:
+        """Take one message from `source` (system, component)."""
+        kind = message.get_type()
+        if kind == "SET_ATTITUDE_TARGET":
+            self._setpoint(message)
+        elif kind == "HEARTBEAT":
+            self._heartbeat(source, message)
+        elif source == self.vehicle:
+            self._telemetry(kind, message)
+
+    def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
+        if self.vehicle is None and heartbeat.autopilot in _FAMILIES:
+            self.vehicle, self._family = source, _FAMILIES[heartbeat.autopilot]
+        if source != self.vehicle or self._family is None:
+            return
+        mode = self._family.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
+        armed = bool(heartbeat.base_mode & _ARMED)
+        obeying = armed and Role.OFFBOARD in self._family.roles(mode)
+        if obeying and self._obeying:
+            self.obeyed.extend(self._unconfirmed)
+        self._unconfirmed.clear()
+        self._obeying = obeying
+
+    def _setpoint(self, setpoint: Message) -> None:
+        if not self._stamps_ms or setpoint.type_mask & _WHAT_COUNTS != IGNORE_ATTITUDE:
+            return
+        echoes = setpoint.time_boot_ms in self._stamps_ms
+        answered = setpoint.time_boot_ms if echoes else self._stamps_ms[-1]
+        self._unconfirmed.append(
+            (
+                1e-3 * answered,
+                setpoint.body_roll_rate,
+                setpoint.body_pitch_rate,
+                setpoint.body_yaw_rate,
+                setpoint.thrust,
+            )
+        )
+
+    def _telemetry(self, kind: str, message: Message) -> None:
+        if kind == "HIGHRES_IMU":
+            self._accelerometer(1e-6 * message.time_usec, -message.zacc)
+        elif kind == "SCALED_IMU":
+            milli_g = -message.zacc
+            self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * _STANDARD_GRAVITY * milli_g)
+        else:
+            rows = self.quaternion if kind == "ATTITUDE_QUATERNION" else self.euler
+            time = 1e-3 * message.time_boot_ms
+            rows.append((time, message.rollspeed, message.pitchspeed, message.yawspeed))
+            self._stamps_ms.append(message.time_boot_ms)
+
+    def _accelerometer(self, time: float, specific_thrust: float) -> None:
+        if self._stamps_ms and abs(time - 1e-3 * self._stamps_ms[-1]) < _ONE_CLOCK:
+            self.specific_thrust.append((time, specific_thrust))

@@ -1,0 +1,218 @@
+"""One vehicle, one connection: everything the rest of the program says and hears goes here."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from companion.attitude.types import BodyRates
+from companion.mavlink.endpoint import parse_endpoint
+from companion.mavlink.errors import LinkError, LinkTimeout
+from companion.mavlink.framing import Frame
+from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.opening import OpenTransport, open_transport
+from companion.mavlink.outbox import Outbox
+from companion.mavlink.pending import Pending
+from companion.mavlink.router import Router
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.silence import no_beacon, no_heartbeat
+from companion.mavlink.stamp_keeper import StampKeeper
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.transport import Tap
+from companion.vehicle.client import Conversation
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.connection import Connection
+from companion.vehicle.inbox import Inbox, Notice
+from companion.vehicle.presence import send_heartbeat, send_heartbeats, synchronise
+from companion.vehicle.records import Heartbeat
+from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.timesync import TimeSync
+
+_LOG = logging.getLogger(__name__)
+
+
+class Link(Conversation):
+    """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
+
+    It sends a heartbeat, keeps the clocks compared and opens a dropped connection again. It never
+    repeats a setpoint: each one leaves because `send_setpoint` was called.
+
+    Args:
+        settings: Where the vehicle is and who we are.
+        tap: Called with every frame accepted from and sent to the vehicle, for recordings.
+        opener: Opens the transport.
+        notice: Told, once each, of what keeps the two sides from understanding each other; by
+            default the log.
+
+    Attributes:
+        stats: Counters.
+        state: What is known of the vehicle.
+        clock: The vehicle's: how old a sample is, and whether the clock jumped or restarted.
+        timesync: Round trip.
+
+    Raises:
+        EndpointError: The endpoint's notation is wrong.
+        LinkError: Lockstep is asked for on another event loop than its own.
+    """
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        tap: Tap | None = None,
+        opener: OpenTransport = open_transport,
+        notice: Notice = _LOG.warning,
+    ) -> None:
+        endpoint = parse_endpoint(settings.endpoint)
+        self._loop = asyncio.get_running_loop()
+        self._tasks: list[asyncio.Task[None]] = []
+        stats = LinkStats()
+        router, outbox = Router(stats), Outbox(settings, stats, tap)
+        self.clock = VehicleClock(lockstep=settings.lockstep)
+        super().__init__(settings, outbox, router, stats, self._loop.time, self.clock)
+        self._inbox = Inbox(
+            settings, stats, router, tap, notice, self.clock, lambda: outbox.setpoint_at
+        )
+        self.timesync = TimeSync(outbox, router, self._loop.time, self.clock)
+        self._connection = Connection(
+            endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
+        )
+        self._keeper: StampKeeper | None = None
+        if settings.signing is not None and settings.signing.file is not None:
+            self._keeper = StampKeeper(settings.signing, settings.signing.file)
+        self._lockstep: LockstepClient | None = None
+        if settings.lockstep:
+            if not isinstance(self._loop, LockstepEventLoop):
+                raise LinkError("lockstep needs the event loop of companion.mavlink.lockstep.run")
+            self._lockstep = self._inbox.follow_vehicle_time(self._loop, outbox.close_step)
+
+    # --- lifetime
+
+    async def __aenter__(self) -> "Link":
+        await self._connection.open()
+        try:
+            if self._lockstep is not None:
+                await self._first_beacon(self._lockstep)
+        except BaseException:
+            await self.__aexit__()
+            raise
+        if self._keeper is not None:
+            self._keeper.start()
+        self._inbox.tell_remarks()
+        self._start(send_heartbeats(self.settings, self._outbox))
+        self._start(synchronise(self.timesync, self.clock))
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        if self._lockstep is not None:
+            self._lockstep.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._tasks.clear()
+        self._registry.fail("closed by us")
+        await self._connection.close()
+        if self._keeper is not None:
+            self._keeper.stop()
+        self._inbox.tell_remarks()
+
+    async def wait_connected(self, timeout_s: float) -> Heartbeat:
+        """Wait for the autopilot's heartbeat; return the newest at once if there was one.
+
+        Raises:
+            LinkTimeout: None came; the message says what did come.
+            UnsupportedAutopilot: It is none that we can fly.
+        """
+        with Pending[None](self._registry) as heard:
+            unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
+            try:
+                async with asyncio.timeout(timeout_s):
+                    while self.state.heartbeat is None:
+                        await heard.next(timeout_s)
+            except TimeoutError:
+                raise LinkTimeout(no_heartbeat(self.settings, self.stats, timeout_s)) from None
+            finally:
+                unsubscribe()
+        if self.state.unsupported is not None:
+            raise self.state.unsupported
+        assert self.state.heartbeat is not None
+        return self.state.heartbeat
+
+    @property
+    def local_address(self) -> tuple[str, int] | None:
+        """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
+        return self._connection.local_address
+
+    # --- control
+
+    @property
+    def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
+        """Called with each attitude sample inside the read callback; what it raises is reported."""
+        return self._inbox.on_attitude
+
+    @on_attitude.setter
+    def on_attitude(self, callback: Callable[[AttitudeSample], None] | None) -> None:
+        self._inbox.on_attitude = callback
+
+    @property
+    def on_foreign(self) -> Callable[[Frame], None] | None:
+        """Called with each frame of others than the autopilot; nothing else is done with them."""
+        return self._inbox.on_foreign
+
+    @on_foreign.setter
+    def on_foreign(self, callback: Callable[[Frame], None] | None) -> None:
+        self._inbox.on_foreign = callback
+
+    @property
+    def on_error(self) -> Callable[[Exception], None] | None:
+        """Called with what a callback raised; without it such errors go to the log."""
+        return self._router.on_error
+
+    @on_error.setter
+    def on_error(self, callback: Callable[[Exception], None] | None) -> None:
+        self._router.on_error = callback
+
+    def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
+        """Send body rates and thrust, once and now. It never blocks.
+
+        In lockstep a setpoint that answers the open step closes it, and so leaves last.
+
+        Args:
+            time_boot_ms: The stamp of the sample it answers, ms.
+            rates: rad/s about body x, y, z (FRD).
+            thrust: Collective thrust, 0..1.
+
+        Returns:
+            Whether it left; false if the connection is down or the kernel does not take it.
+
+        Raises:
+            InvalidSetpoint: Not finite or out of range (`NonFiniteSetpoint`); nothing was sent.
+        """
+        if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
+            self._outbox.latch(time_boot_ms, rates, thrust)
+            return True
+        return self._outbox.setpoint(time_boot_ms, rates, thrust)
+
+    # --- inside
+
+    def _on_dropped(self, reason: str) -> None:
+        self._registry.fail(reason)
+        self.timesync.reset()
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(work)
+        task.add_done_callback(_log_failure)
+        self._tasks.append(task)
+
+    async def _first_beacon(self, lockstep: LockstepClient) -> None:
+        # A vehicle that waits to be spoken to (udpout, TCP) hears us by this.
+        send_heartbeat(self.settings, self._outbox)
+        try:
+            async with asyncio.timeout(self.settings.first_beacon_timeout_s):
+                await lockstep.first_beacon
+        except TimeoutError:
+            raise LinkTimeout(no_beacon(self.settings, self.stats)) from None
+
+
+def _log_failure(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and task.exception() is not None:
+        _LOG.error("a task of the link failed", exc_info=task.exception())

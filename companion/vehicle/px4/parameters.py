@@ -1,0 +1,242 @@
+"""PX4's parameters that matter to a flight by body rates.
+
+Sources: PX4's parameter reference and `commander`; "measured": PX4 main in simulation, 2026.
+"""
+
+from math import degrees
+
+from companion.vehicle.parameter_checks import (
+    INEFFECTIVE,
+    UNSAFE,
+    at_most,
+    battery_scaling,
+    bit_clear,
+    bit_set,
+    forbidden,
+    hover_thrust,
+    our_system,
+    positive,
+    rates_held,
+    required,
+    thrust_curve,
+)
+from companion.vehicle.parameter_rules import Complaint, ParameterRule, Setup, Values
+
+_REFERENCE = "PX4 parameter reference"
+_MEASURED = "measured on PX4 main, 2026"
+_STOPS_MOTORS = "the motors stop in the air"
+_STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
+_INTEGRATION_RATES = (100.0, 200.0, 250.0, 400.0)
+_TERMINATION_OFF = 121212
+_FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
+_NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
+_DEFAULT_FAILURE_ANGLE = 60.0
+_OVERSHOOT = 15.0
+"""By which a gust or a step may carry the tilt over its limit, degrees."""
+
+
+def _attitude_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
+    wanted = setup.attitude_rate_hz
+    if value >= min(wanted, _INTEGRATION_RATES[-1]):
+        return None
+    enough = [rate for rate in _INTEGRATION_RATES if rate >= wanted]
+    return Complaint(
+        INEFFECTIVE,
+        f"attitude is estimated no faster than that, so link.attitude_rate_hz {wanted:g} is not "
+        "reached",
+        enough[0] if enough else _INTEGRATION_RATES[-1],
+    )
+
+
+def _termination(value: float, values: Values, setup: Setup) -> Complaint | None:
+    """Flight termination is only to be armed where our own tilt cannot set it off."""
+    if value == _TERMINATION_OFF:
+        return None
+    if not all(name in values for name in _FAILURE_ANGLES):
+        return Complaint(
+            UNSAFE,
+            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; mend the link",
+        )
+    angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
+    if not angles or min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
+        return None
+    return Complaint(
+        UNSAFE,
+        f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
+        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; lower limits.max_tilt_deg to "
+        f"{_OVERSHOOT:g}° below it, for gusts and steps",
+    )
+
+
+def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | None:
+    """The failure detector's angle matters by itself only where it is below our own tilt."""
+    if value == 0.0 or value > degrees(setup.max_tilt):
+        return None
+    raised = degrees(setup.max_tilt) < _DEFAULT_FAILURE_ANGLE
+    return Complaint(
+        INEFFECTIVE,
+        f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
+        "allows" + ("" if raised else f"; lower limits.max_tilt_deg below {value:g}"),
+        # Beyond PX4's own default a detector would be weakened for the sake of our limit.
+        _DEFAULT_FAILURE_ANGLE if raised else None,
+    )
+
+
+def _signing(value: float, _: Values, setup: Setup) -> Complaint | None:
+    """The reverse needs no rule: a vehicle that does not sign is not heard where we do."""
+    if not value or setup.signs:
+        return None
+    return Complaint(
+        INEFFECTIVE, "PX4 obeys only what is signed, and we sign nothing; set link.signing_key_file"
+    )
+
+
+PX4_PARAMETERS: tuple[ParameterRule, ...] = (
+    ParameterRule(
+        ("COM_OF_LOSS_T",),
+        "for how long the last rates are held",
+        rates_held,
+        _MEASURED,
+        vital=True,
+    ),
+    ParameterRule(
+        ("COM_OBL_RC_ACT",),
+        "what PX4 does when our setpoints stop",
+        forbidden(
+            UNSAFE,
+            {
+                2.0: "PX4 goes to manual flight, and falls or drifts unless a pilot acts at once",
+                6.0: _STOPS_MOTORS,
+                7.0: _STOPS_MOTORS,
+            },
+            set_to=5.0,
+        ),
+        f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
+    ),
+    ParameterRule(
+        ("COM_RC_OVERRIDE",),
+        "whether the pilot's sticks take the vehicle from us (before 1.18)",
+        bit_set(INEFFECTIVE, 2, _STICKS_DO_NOTHING),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_RC_STICK_OV",),
+        "how far the sticks must be moved to take over, in percent (before 1.18)",
+        at_most(INEFFECTIVE, 60.0, "a pilot in a hurry may not move the sticks that far", 30.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MAN_OVERRIDE_SPD",),
+        "how quickly the sticks must be moved to take over (1.18 on)",
+        positive(INEFFECTIVE, _STICKS_DO_NOTHING, 1.0),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_RC_IN_MODE",),
+        "whether there is a pilot's transmitter at all",
+        forbidden(
+            UNSAFE, {4.0: "stick input is disabled, so that no pilot can take over"}, set_to=0.0
+        ),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("MAV_FWDEXTSP",),
+        "whether setpoints that arrive by MAVLink are obeyed",
+        required(INEFFECTIVE, 1.0, "our setpoints are not obeyed, and OFFBOARD is not entered"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("NAV_DLL_ACT",),
+        "what PX4 does when the ground station's heartbeat stops, although our setpoints continue",
+        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
+    ),
+    ParameterRule(
+        ("NAV_RCL_ACT",),
+        "what PX4 does when the pilot's transmitter is lost",
+        forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("COM_RCL_EXCEPT",),
+        "in which modes a lost transmitter is ignored",
+        bit_clear(INEFFECTIVE, 4, "in OFFBOARD nothing is done about a lost transmitter"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("MPC_THR_HOVER",), "at which thrust PX4 expects to hover", hover_thrust, _REFERENCE
+    ),
+    ParameterRule(
+        ("THR_MDL_FAC",), "whether PX4 makes up for the thrust curve", thrust_curve, _REFERENCE
+    ),
+    ParameterRule(
+        ("MC_BAT_SCALE_EN",),
+        "whether PX4 makes up for the battery's voltage",
+        battery_scaling,
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("COM_DISARM_PRFLT",),
+        "after how long on the ground PX4 disarms itself",
+        positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
+        f"{_REFERENCE}; {_MEASURED}",
+        universal=True,
+    ),
+    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
+    ParameterRule(
+        ("MAV_SIGN_CFG",),
+        "whether PX4 obeys only what is signed",
+        _signing,
+        _REFERENCE,
+        reboot=True,
+    ),
+    ParameterRule(
+        ("IMU_INTEG_RATE",),
+        "how often attitude is estimated, Hz",
+        _attitude_rate,
+        _MEASURED,
+        reboot=True,
+    ),
+    ParameterRule(
+        ("GF_ACTION",),
+        "what PX4 does at its own geofence",
+        forbidden(UNSAFE, {4.0: _STOPS_MOTORS}, set_to=2.0),
+        _REFERENCE,
+        universal=True,
+    ),
+    ParameterRule(
+        ("COM_LOW_BAT_ACT",),
+        "what PX4 does about an empty battery",
+        forbidden(
+            INEFFECTIVE,
+            {0.0: "PX4 only warns; nobody lands should our program have ended"},
+            set_to=3.0,
+        ),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("CBRK_SUPPLY_CHK",),
+        "whether arming checks the power supply",
+        forbidden(INEFFECTIVE, {894281.0: "the power supply is not checked before arming"}, 0.0),
+        _REFERENCE,
+        reboot=True,
+    ),
+    ParameterRule(
+        ("CBRK_FLIGHTTERM",),
+        "whether the failure detector stops motors",
+        _termination,
+        _REFERENCE,
+        universal=True,
+        reboot=True,
+    ),
+    ParameterRule(
+        ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", _failure_tilt, _REFERENCE
+    ),
+    ParameterRule(
+        ("FD_FAIL_P",), "beyond which pitch PX4 reports a failure", _failure_tilt, _REFERENCE
+    ),
+)

@@ -1,0 +1,347 @@
+"""What is known of the vehicle, from its telemetry. Values that are not finite are never kept."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from math import inf, isfinite
+
+from companion.attitude import Quaternion, is_unit
+from companion.mavlink.codec import Message
+from companion.mavlink.errors import UnsupportedAutopilot
+from companion.mavlink.router import Router
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.texts import TextAssembler
+from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.readiness import Readiness
+from companion.vehicle.records import (
+    GPS_FIX_3D,
+    AttitudeTarget,
+    Battery,
+    CurrentMode,
+    Estimator,
+    GlobalPosition,
+    Gps,
+    Heartbeat,
+    Home,
+    Landed,
+    LocalPosition,
+    Prearm,
+    ToldThrust,
+    Vector,
+    gps_fault,
+    outdated,
+)
+from companion.vehicle.registry import MULTIROTORS, family_for
+
+GROUND_HEIGHT = 1.5
+"""Height above home that may be read on the ground, m: the estimate drifts."""
+_ARMED = 128
+_UNKNOWN_U16 = 65535
+_AUTOPILOT_INVALID = 8
+_STATE_CRITICAL = 5
+_PREARM_CHECK = 0x10000000
+_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
+
+
+@dataclass
+class _Values:
+    heartbeat: Heartbeat | None = None
+    current_mode: CurrentMode | None = None
+    landed_state: Landed | None = None
+    position: LocalPosition | None = None
+    battery: Battery | None = None
+    told_thrust: ToldThrust | None = None
+    attitude_target: AttitudeTarget | None = None
+    global_position: GlobalPosition | None = None
+    gps: Gps | None = None
+    home: Home | None = None
+    estimator: Estimator | None = None
+    armings: int = 0
+    positions: int = 0
+    prearm: Prearm | None = None
+    gps_was_good: bool = False
+    reset_counter: int | None = None
+
+
+class VehicleState(_Values):
+    """The newest of each, `None` until it came; stamped with the time of arrival.
+
+    Attributes:
+        heartbeat: See `Heartbeat`.
+        current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
+        landed_state: See `Landed`; `landed` and `taking_off` heed its age.
+        position: See `LocalPosition`; the newest by its own time stamp.
+        battery: See `Battery`.
+        told_thrust: See `ToldThrust`.
+        attitude_target: See `AttitudeTarget`; only of a family with `rates_along_target`. One that
+            is no unit quaternion is passed over.
+        global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
+        gps: See `Gps`.
+        home: See `Home`.
+        estimator: See `Estimator`.
+        positions: How many positions were taken.
+        heartbeat_is_newest: Whether HEARTBEAT told the mode last, and so tells of arming as newly.
+        armings: How often it was seen to become armed.
+        prearm: See `Prearm`.
+        gps_was_good: Whether GPS has had a 3D fix since the link was opened.
+        reset_counter: ODOMETRY: rises whenever the estimator jumps.
+        family: The autopilot's family, once its first heartbeat was heard.
+        unsupported: The error to raise if it has none.
+        texts: What it said, newest last.
+    """
+
+    def __init__(
+        self,
+        router: Router,
+        stats: LinkStats,
+        texts: TextAssembler,
+        clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
+    ) -> None:
+        super().__init__()
+        self._stats, self._assembler, self._clock = stats, texts, clock
+        self._vehicle_clock = vehicle_clock
+        self.texts = texts.texts
+        self.heartbeat_is_newest = True
+        self._base_mode = 0
+        self.family: AutopilotFamily | None = None
+        self.unsupported: UnsupportedAutopilot | None = None
+        for name, callback in {
+            "HEARTBEAT": self._on_heartbeat,
+            "CURRENT_MODE": self._on_current_mode,
+            "EXTENDED_SYS_STATE": self._on_extended_sys_state,
+            "LOCAL_POSITION_NED": self._on_local_position,
+            "SYS_STATUS": self._on_sys_status,
+            "BATTERY_STATUS": self._on_battery,
+            "ATTITUDE_TARGET": self._on_attitude_target,
+            "GLOBAL_POSITION_INT": self._on_global_position,
+            "GPS_RAW_INT": self._on_gps,
+            "HOME_POSITION": self._on_home,
+            "ESTIMATOR_STATUS": self._on_estimator,
+            "EKF_STATUS_REPORT": self._on_estimator,
+            "ODOMETRY": self._on_odometry,
+            "STATUSTEXT": self._on_text,
+        }.items():
+            router.subscribe(name, callback)
+
+    def forget(self) -> None:
+        """Know nothing but the newest heartbeat: another vehicle may have told the rest."""
+        fresh = _Values(heartbeat=self.heartbeat)
+        for field in fields(_Values):
+            setattr(self, field.name, getattr(fresh, field.name))
+
+    @property
+    def mode(self) -> str | None:
+        """Name of the present mode, by whichever of HEARTBEAT and CURRENT_MODE came last."""
+        heartbeat, current = self.heartbeat, self.current_mode
+        if heartbeat is None:
+            return None
+        return heartbeat.mode if current is None or self.heartbeat_is_newest else current.mode
+
+    @property
+    def mode_received(self) -> float:
+        """When the present mode was last told, s of our clock; -inf if it never was."""
+        told = (self.heartbeat, self.current_mode)
+        return max((each.received for each in told if each is not None), default=-inf)
+
+    @property
+    def armed(self) -> bool | None:
+        """Whether the motors may turn."""
+        return self.heartbeat.armed if self.heartbeat else None
+
+    @property
+    def failsafe(self) -> bool:
+        """Whether the autopilot says that it is in a failsafe."""
+        return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
+
+    @property
+    def mode_by_failsafe(self) -> bool:
+        """Whether a failsafe chose the present mode, as far as the autopilot tells."""
+        current = self.current_mode
+        if current is None or self.heartbeat_is_newest:
+            return self.failsafe
+        return self.failsafe or current.mode != current.intended
+
+    @property
+    def landed(self) -> bool:
+        """Whether the autopilot says that it stands on the ground; unknown is not landed."""
+        return self._landed_state() == LANDED_ON_GROUND
+
+    @property
+    def flying(self) -> bool:
+        """Whether the autopilot says that it is in the air; unknown is not flying."""
+        return self._landed_state() not in (None, _UNDEFINED, LANDED_ON_GROUND)
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether the autopilot says that its take-off is not over yet."""
+        return self._landed_state() == LANDED_TAKEOFF
+
+    @property
+    def battery_silent(self) -> bool:
+        """Whether the battery was told of, and is not any more."""
+        return self.battery is not None and outdated(self.battery.received, self._clock())
+
+    @property
+    def height(self) -> float | None:
+        """Height above home, m."""
+        if self.position is None or self.home is None:
+            return None
+        return self.home.down - self.position.position_ned[2]
+
+    @property
+    def readiness(self) -> Readiness:
+        """What the family judges before arming; what was not told for a while is not known."""
+        now = self._clock()
+        prearm, estimator, position = self.prearm, self.estimator, self.position
+        return Readiness(
+            None if prearm is None or outdated(prearm.received, now) else prearm.good,
+            None if estimator is None or outdated(estimator.received, now) else estimator.flags,
+            position is not None and not outdated(position.received, now),
+            self.home is not None,
+        )
+
+    @property
+    def gps_fault(self) -> str | None:
+        """What is wrong with a GPS that was good, in words, or `None`."""
+        return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
+
+    @property
+    def position_ned(self) -> Vector | None:
+        """Newest position, m."""
+        return self.position.position_ned if self.position else None
+
+    @property
+    def velocity_ned(self) -> Vector | None:
+        """Newest velocity, m/s."""
+        return self.position.velocity_ned if self.position else None
+
+    def _on_heartbeat(self, message: Message) -> None:
+        if message.autopilot == _AUTOPILOT_INVALID:
+            return  # some other part of the vehicle, under the autopilot's own id
+        kind = message.autopilot, message.type in MULTIROTORS
+        if self.family is not None and kind != (self.family.autopilot, True):
+            return  # an autopilot does not change its kind; this is some other part of the vehicle
+        if self.family is None:
+            try:
+                self.family, self.unsupported = family_for(message.autopilot, message.type), None
+            except UnsupportedAutopilot as error:
+                self.family, self.unsupported = None, error
+        armed = bool(message.base_mode & _ARMED)
+        self.armings += armed and not self.armed
+        mode = str(message.custom_mode)
+        if self.family is not None:
+            mode = self.family.mode_name(message.base_mode, message.custom_mode)
+        self.heartbeat = Heartbeat(
+            self._clock(),
+            message.autopilot,
+            message.type,
+            mode,
+            message.custom_mode,
+            armed,
+            message.system_status,
+        )
+        self._base_mode = message.base_mode
+        self.heartbeat_is_newest = True
+
+    def _on_current_mode(self, message: Message) -> None:
+        if self.family is None:
+            return  # what the number means is not known yet
+        mode, intended = (
+            self.family.mode_name(self._base_mode, number)
+            for number in (message.custom_mode, message.intended_custom_mode)
+        )
+        self.current_mode = CurrentMode(self._clock(), mode, intended)
+        self.heartbeat_is_newest = False
+
+    def _on_extended_sys_state(self, message: Message) -> None:
+        self.landed_state = Landed(self._clock(), message.landed_state)
+
+    def _landed_state(self) -> int | None:
+        told = self.landed_state
+        return None if told is None or outdated(told.received, self._clock()) else told.state
+
+    def _on_local_position(self, message: Message) -> None:
+        values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
+        if not all(map(isfinite, values)):
+            self._stats.non_finite += 1
+            return
+        clock, now, last = self._vehicle_clock, self._clock(), self.position
+        stamp = clock.vehicle_time(message.time_boot_ms)
+        if clock.is_ahead(stamp, now):
+            self._stats.stamped_ahead += 1
+        elif (
+            last is not None
+            and stamp <= last.vehicle_time
+            and not clock.is_ahead(last.vehicle_time, now)  # it came before the clock was known
+        ):
+            self._stats.outdated += 1
+        else:
+            self.positions += 1
+            self.position = LocalPosition(now, stamp, values[:3], values[3:])
+
+    def _on_sys_status(self, message: Message) -> None:
+        millivolts = message.voltage_battery
+        self._take_battery(
+            None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
+        )
+        good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
+        self.prearm = Prearm(self._clock(), good)
+
+    def _on_odometry(self, message: Message) -> None:
+        self.reset_counter = message.reset_counter
+
+    def _on_battery(self, message: Message) -> None:
+        if message.id != 0:
+            return
+        # A battery without known cells reports its whole voltage in parts of 65534 mV.
+        cells = [cell for cell in message.voltages if cell != _UNKNOWN_U16]
+        self._take_battery(sum(cells) / 1000.0 if cells else None, message.battery_remaining)
+
+    def _take_battery(self, voltage_v: float | None, percent: int) -> None:
+        remaining = None if percent < 0 else percent / 100.0
+        self.battery = Battery(self._clock(), voltage_v, remaining)
+
+    def _on_attitude_target(self, message: Message) -> None:
+        if 0.0 <= message.thrust <= 1.0:
+            self.told_thrust = ToldThrust(self._clock(), message.thrust)
+        elif not isfinite(message.thrust):
+            self._stats.non_finite += 1
+        family = self.family
+        if family is not None and family.rates_along_target:
+            self._take_attitude_target(message.time_boot_ms, tuple(message.q))
+
+    def _take_attitude_target(self, time_boot_ms: int, q: Quaternion) -> None:
+        if is_unit(q):
+            self.attitude_target = AttitudeTarget(time_boot_ms, q)
+        elif not all(map(isfinite, q)):
+            self._stats.non_finite += 1
+
+    def _on_global_position(self, message: Message) -> None:
+        if message.lat == message.lon == 0:
+            return  # ArduPilot sends zeros until it knows
+        self.global_position = GlobalPosition(self._clock(), message.lat / 1e7, message.lon / 1e7)
+
+    def _on_gps(self, message: Message) -> None:
+        seen = message.satellites_visible
+        satellites = None if seen == 255 else seen
+        self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
+        self.gps_was_good = self.gps_was_good or message.fix_type >= GPS_FIX_3D
+
+    def _on_home(self, message: Message) -> None:
+        if not isfinite(message.z):
+            self._stats.non_finite += 1
+            return
+        self.home = Home(
+            self._clock(),
+            message.latitude / 1e7,
+            message.longitude / 1e7,
+            message.altitude / 1000.0,
+            message.z,
+        )
+
+    def _on_estimator(self, message: Message) -> None:
+        self.estimator = Estimator(self._clock(), message.flags)
+
+    def _on_text(self, message: Message) -> None:
+        self._assembler.take(message, self._clock())

@@ -1,0 +1,85 @@
+"""The loop that guidance closes, on one axis: our own code around a vehicle of four lines.
+
+The vehicle rolls as it is told after a dead time and a lag, and is pulled east by its tilt. What
+the program believes of it is the configuration's; what it is may differ.
+"""
+
+from collections import deque
+from math import cos, exp, sin, tan
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.attitude import BodyRates
+from companion.config import Config
+from companion.control.command import Command
+from companion.control.outer_loop import linear_guidance, motion_estimate
+from companion.flight.assembly import planner
+from companion.guidance import GRAVITY, Reference
+from companion.vehicle.records import LocalPosition
+from companion.vehicle.samples import AttitudeSample
+
+DT = 0.004
+_GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
+"""Steps between commands, between positions, and how late these come: 50 Hz, 12 ms."""
+
+
+class Airframe(NamedTuple):
+    """What the vehicle really is: s, s, 1/s; `strength` multiplies what its tilt gives."""
+
+    lag: float
+    dead_time: float
+    drag: float = 0.5
+    strength: float = 1.0
+
+
+def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0.0), seed=0):
+    """(S,) east position in m while 0 is held, begun at rest `off` away; NaN once it has toppled.
+
+    Args:
+        config: as it is flown.
+        vehicle: as it is.
+        seconds: how long.
+        off: m.
+        noise: standard deviation of the measured position (m) and velocity (m/s), white.
+        seed: of the noise.
+    """
+    rng, law, guidance = np.random.default_rng(seed), planner(config), linear_guidance(config)
+    estimate = motion_estimate(config, lambda: 0.0)
+    late = round(vehicle.dead_time / DT)
+    asked, fade = deque([0.0] * (late + 1), maxlen=late + 1), exp(-DT / vehicle.lag)
+    told = deque(maxlen=_POSITION_LATE + 1)
+    roll = rate = place = speed = 0.0
+    command, places = None, np.full(round(seconds / DT), np.nan)
+    place = off
+    for n in range(len(places)):
+        time = n * DT
+        q = (cos(0.5 * roll), sin(0.5 * roll), 0.0, 0.0)
+        rates = BodyRates(rate, 0.0, 0.0)
+        estimate.note_attitude(AttitudeSample(0, time, time, 0, q, rates))
+        told.append((time, place, speed))
+        if n % _POSITION == 0:
+            at, east, fast = told[0]
+            east, fast = east + noise[0] * rng.normal(), fast + noise[1] * rng.normal()
+            position = LocalPosition(time, at, (0.0, east, -5.0), (0.0, fast, 0.0))
+            estimate.note_position(position, obeyed=True)
+        if n % _GUIDANCE == 0:
+            situation = estimate.situation(time, guidance.acts_after, (2.0, 18.0))
+            held = Reference((0.0, 0.0, -5.0))
+            target, later, down = guidance.command(lambda _, held=held: held, time, situation)
+            command = Command(target, down, time, later=later, period=_GUIDANCE * DT)
+        asked.append(law.rates(q, command.target_at(time), DT, rates).roll)
+        rate = asked[0] + fade * (rate - asked[0])
+        roll += DT * rate
+        if abs(roll) > 1.2:
+            return places
+        speed += DT * (vehicle.strength * GRAVITY * tan(roll) - vehicle.drag * speed)
+        place += DT * speed
+        places[n] = place
+    return places
+
+
+def settled(places: np.ndarray, off: float) -> bool:
+    """Whether it has come to rest, but for a tenth: nothing swings on, nothing grows."""
+    last = len(places) // 4
+    return bool(np.isfinite(places).all() and np.abs(places[-last:]).max() < 0.1 * off)

@@ -1,0 +1,446 @@
+"""The way of one sample: what is answered, what is not, and why."""
+
+import math
+from time import perf_counter_ns
+from types import SimpleNamespace
+
+import pytest
+
+from companion.attitude import BodyRates, Limits, Target, make_planner
+from companion.control.command import Command
+from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.unanswered import Unanswered
+from companion.guidance import HoverThrust, ThrustSettings
+from companion.mavlink.codec import SetpointEncoder
+from companion.recording.trace import FlightTrace
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.records import AttitudeTarget
+from companion.vehicle.samples import AttitudeSample
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+TARGET = Target(0.1, 0.0, 0.0)
+LIMITS = Limits(0.6, 1.5, 1.0)
+
+
+class Bench:
+    """A loop with its setpoints caught, and samples every 4 ms."""
+
+    def __init__(self, planner=None, send=None):
+        self.sent, self.clock = [], VehicleClock()
+        self.connected = True
+        self.asked = 0
+        self.time = 10.0
+        self.loop = ControlLoop(
+            planner or make_planner("first-order", limits=LIMITS),
+            HoverThrust(ThrustSettings(0.5, 0.4, 1.5, 0.1, 0.9)),
+            send or self.send,
+            Deadlines(telemetry_stale=0.1, target_stale=0.15, deadline=0.004),
+            FlightTrace(),
+            LIMITS,
+            lambda: self.time,
+        )
+        self.loop.ask_mode = self.ask
+        self.loop.on = True
+        self.refresh()
+
+    def send(self, stamp, rates, thrust):
+        if self.connected:
+            self.sent.append((stamp, rates, thrust))
+        return self.connected
+
+    def ask(self):
+        self.asked += 1
+
+    def refresh(self, **changes):
+        self.loop.command = Command(TARGET, 0.0, self.time)._replace(**changes)
+
+    def sample(self, vehicle_time=None, q=LEVEL, late=0.0, lead=0):
+        """One sample; `vehicle_time` is ours less 7 s unless told otherwise."""
+        stamp = self.time - 7.0 if vehicle_time is None else vehicle_time
+        stamp_ms, received = round(stamp * 1000), self.time + late
+        reading = self.clock.take(stamp_ms, received)
+        self.loop.on_sample(
+            AttitudeSample(
+                stamp_ms,
+                reading.vehicle_time,
+                received,
+                perf_counter_ns() - lead,
+                q,
+                BodyRates(0.0, 0.0, 0.0),
+                reading.age,
+                reading.misfit,
+            )
+        )
+
+    def run(self, count, **options):
+        for _ in range(count):
+            self.time += 0.004
+            self.refresh()
+            self.sample(**options)
+
+
+def test_every_fresh_sample_gets_one_answer_with_its_own_stamp():
+    bench = Bench()
+    bench.run(50)
+    assert len(bench.sent) == bench.loop.setpoints == bench.loop.samples == 50
+    stamps = [stamp for stamp, _, _ in bench.sent]
+    assert stamps == [3000 + 4 * k for k in range(1, 51)]
+    _, rates, thrust = bench.sent[0]
+    assert rates.pitch == pytest.approx(-0.5)  # towards north: nose down
+    assert thrust == pytest.approx(0.5)
+
+
+def test_a_process_that_is_stopped_while_it_answers_does_not_send():
+    """Measured on ArduPilot: stopped for 3 s, thawed, and one setpoint left 1 ms later."""
+    planner, away = make_planner("first-order", limits=LIMITS), 0.0
+
+    def rates(*arguments):
+        bench.time += away
+        return planner.rates(*arguments)
+
+    bench = Bench(SimpleNamespace(rates=rates, reset=planner.reset))
+    bench.run(10)
+    away = 3.0
+    bench.run(1)
+    assert (len(bench.sent), bench.loop.reason) == (10, Unanswered.LATE)
+
+
+def test_nothing_is_sent_while_off_or_before_the_first_target():
+    bench = Bench()
+    bench.loop.on = False
+    bench.run(5)
+    assert (bench.sent, bench.loop.samples) == ([], 0)
+    bench.loop.on, bench.loop.command = True, None
+    bench.sample(vehicle_time=9.0)
+    assert (bench.sent, bench.loop.stale) == ([], 1)
+
+
+def test_an_old_target_is_not_answered():
+    bench = Bench()
+    bench.run(2)
+    for _ in range(60):
+        bench.time += 0.004
+        bench.sample()
+    answered = len(bench.sent) - 2
+    assert answered == 37  # 0.15 s of 4 ms samples
+    assert bench.loop.stale == 60 - answered
+
+
+@pytest.mark.parametrize("stamp", [3.02, None])
+def test_repeated_and_reordered_samples_are_not_answered(stamp):
+    bench = Bench()
+    bench.run(10)
+    bench.sample(vehicle_time=stamp)
+    assert len(bench.sent) == 10
+    assert bench.loop.stale == 1
+
+
+def test_a_duplicate_in_the_same_instant_is_not_answered_twice():
+    bench = Bench()
+    bench.run(3)
+    bench.sample()
+    assert len(bench.sent) == 3
+
+
+def test_a_sample_that_was_long_under_way_is_not_answered():
+    bench = Bench()
+    bench.run(10)
+    bench.time += 0.004
+    bench.sample(late=0.11)
+    assert (len(bench.sent), bench.loop.stale) == (10, 1)
+
+
+@pytest.mark.parametrize("rates", [None, BodyRates(0.3, -0.4, 0.5)])
+@pytest.mark.parametrize(
+    "q",
+    [
+        (1.01, 0.0, 0.0, 0.0),
+        (math.nan, 0.0, 0.0, 0.0),
+        (0.0, 0.0, 0.0, 0.0),
+        (0.5, 9.0, 0.0, 0.0),
+        (math.inf, 0.0, 0.0, 0.0),
+    ],
+)
+def test_an_unusable_attitude_is_refused_and_counted(q, rates):
+    """Whether the planner was to answer it or guidance asks for rates."""
+    bench = Bench()
+    for _ in range(3):
+        bench.time += 0.004
+        bench.refresh(body_rates=rates)
+        bench.sample(q=q)
+    assert (bench.sent, bench.loop.refused, bench.loop.setpoints) == ([], 3, 0)
+
+
+def test_a_setpoint_that_could_not_leave_is_no_answer():
+    bench = Bench()
+    bench.run(3)
+    last = bench.loop.last_answer
+    bench.connected = False
+    bench.run(3)
+    assert (bench.loop.setpoints, bench.loop.refused) == (3, 3)
+    assert bench.loop.last_answer == last
+
+
+def test_idle_sends_neither_rates_nor_thrust():
+    bench = Bench()
+    bench.time += 0.004
+    bench.refresh(idle=True)
+    bench.sample(q=(0.8, 0.6, 0.0, 0.0))
+    bench.time += 0.004
+    bench.sample(q=(0.0, 0.0, 0.0, 0.0))  # on the ground it asks for nothing, whatever the attitude
+    assert [answer[1:] for answer in bench.sent] == 2 * [(BodyRates(0.0, 0.0, 0.0), 0.0)]
+
+
+@pytest.mark.parametrize("what", ["guarded", "taking_over"])
+def test_after_a_gap_it_waits_for_the_mode(what):
+    """The autopilot may obey us from the moment it is asked to, before it says that it does."""
+    bench = Bench()
+    setattr(bench.loop, what, True)
+    bench.run(10)
+    bench.time += 0.2
+    bench.run(10)
+    assert (len(bench.sent), bench.asked, bench.loop.held_back) == (10, 1, True)
+    bench.loop.resume()
+    bench.run(10)
+    assert (len(bench.sent), bench.asked) == (20, 1)
+    bench.time += 0.2
+    bench.run(1)
+    assert (len(bench.sent), bench.asked) == (20, 2)
+
+
+def test_without_guard_a_gap_needs_no_confirmation():
+    bench = Bench()
+    bench.run(10)
+    bench.time += 0.2
+    bench.run(10)
+    assert (len(bench.sent), bench.asked) == (20, 0)
+
+
+def test_a_late_answer_counts_as_a_missed_deadline():
+    bench = Bench()
+    bench.run(3, lead=-1_000_000_000)  # in time, however busy this computer is
+    assert bench.loop.missed_deadlines == 0
+    bench.run(2, lead=5_000_000)
+    assert bench.loop.missed_deadlines == 2
+
+
+def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
+    bench = Bench()
+    bench.loop.guarded = True
+    bench.run(10)
+    bench.sample()
+    bench.time += 0.004
+    bench.sample(vehicle_time=99.0)
+    bench.sample(late=0.12)
+    bench.time += 0.2
+    bench.sample()
+    bench.refresh()
+    bench.time += 0.004
+    bench.sample()
+    bench.loop.resume()
+    bench.run(1, q=(0.0, 0.0, 0.0, 0.0))
+    bench.connected = False
+    bench.run(2)
+    bench.loop.command = None
+    bench.time += 0.004
+    bench.sample()
+    counted = {reason: n for reason, n in bench.loop.unanswered.items() if n}
+    assert counted == {
+        Unanswered.NOT_NEWER: 1,
+        Unanswered.AHEAD: 1,
+        Unanswered.LATE: 1,
+        Unanswered.OLD_TARGET: 1,
+        Unanswered.AWAITING_MODE: 1,
+        Unanswered.INVALID_ATTITUDE: 1,
+        Unanswered.NOT_SENT: 2,
+        Unanswered.NO_TARGET: 1,
+    }
+    loop = bench.loop
+    assert (loop.stale, loop.refused) == (6, 3)
+    assert loop.samples == loop.setpoints + loop.stale + loop.refused
+    assert loop.reason is Unanswered.NO_TARGET
+    assert all(reason.words for reason in Unanswered)
+
+
+@pytest.mark.parametrize(
+    ("intervals", "rate"),
+    [
+        (250 * [0.004], 250.0),
+        (12 * [1 / 12], 12.0),
+        (12 * [0.08, *20 * [0.0]], 25.0),  # a pause and then 21 at once
+        (50 * [0.015, 0.025], 50.0),  # ordinary unevenness is no lower rate
+    ],
+)
+def test_the_rate_of_answers_counts_bursts_as_what_they_are(intervals, rate):
+    bench = Bench()
+    bench.run(10)
+    before, stamp = bench.loop.held.copy(), bench.time - 7.0
+    for interval in intervals:
+        bench.time += interval
+        stamp += sum(intervals) / len(intervals)
+        bench.refresh()
+        bench.sample(vehicle_time=min(stamp, bench.time - 7.0))
+    assert bench.loop.held.rate_since(before) == pytest.approx(rate, rel=0.01)
+
+
+def test_gaps_are_counted_and_are_no_part_of_the_rate():
+    bench = Bench()
+    bench.loop.guarded = True
+    bench.run(50)
+    before = bench.loop.held.copy()
+    for _ in range(3):
+        bench.time += 0.2
+        bench.run(1)
+        bench.loop.resume()
+        bench.run(10)
+    assert len(bench.loop.gaps) == 3
+    assert bench.loop.held.rate_since(before) == pytest.approx(250.0)
+
+
+ASKED = BodyRates(0.3, -0.4, 0.5)
+
+
+class CountingPlanner:
+    """Asks for nothing, and counts how often it was asked and told to begin anew."""
+
+    def __init__(self):
+        self.resets = self.asked = 0
+        self.periods = []
+
+    def reset(self, q, body_rates=None):
+        self.resets += 1
+
+    def rates(self, q, target, dt, body_rates=None):
+        self.asked += 1
+        self.periods.append(dt)
+        return BodyRates(0.0, 0.0, 0.0)
+
+
+def test_rates_that_guidance_asks_for_are_sent_instead_of_the_planners():
+    bench = Bench()
+    bench.refresh(body_rates=ASKED)
+    bench.sample(vehicle_time=3.1)
+    _, rates, thrust = bench.sent[-1]
+    assert rates == ASKED
+    assert thrust == pytest.approx(0.5)
+
+
+def test_they_are_sent_within_the_limits():
+    bench = Bench()
+    bench.refresh(body_rates=BodyRates(3.0, -4.0, 5.0))
+    bench.sample(vehicle_time=3.1)
+    rates = bench.sent[-1][1]
+    assert rates == pytest.approx((0.9, -1.2, 1.0))  # limits of 1.5 and 1.0 rad/s
+
+
+def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
+    bench = Bench()
+    bench.refresh(body_rates=ASKED)
+    bench.sample(vehicle_time=3.1)
+    bench.time += 0.2  # the command is older than 0.15 s
+    bench.sample(vehicle_time=3.3)
+    assert (len(bench.sent), bench.loop.stale) == (1, 1)
+    encoder = SetpointEncoder(1, 191, 1, 1, signed=False)
+
+    def send(stamp, rates, thrust):
+        encoder.frame(0, stamp, rates, thrust)
+        return True
+
+    bench = Bench(send=send)
+    bench.refresh(body_rates=BodyRates(math.nan, 0.0, 0.0))
+    bench.sample(vehicle_time=3.1)
+    assert (bench.loop.setpoints, bench.loop.refused) == (0, 1)
+
+
+def test_after_them_the_planner_begins_anew():
+    planner = CountingPlanner()
+    bench = Bench(planner=planner)
+    bench.run(10)
+    assert (planner.asked, planner.resets) == (10, 1)
+    for _ in range(50):
+        bench.time += 0.004
+        bench.refresh(body_rates=ASKED)
+        bench.sample()
+    assert (planner.asked, planner.resets) == (10, 1)
+    bench.run(1)
+    assert (planner.asked, planner.resets) == (11, 2)
+
+
+def test_the_step_after_a_gap_is_as_long_as_the_one_before_it():
+    planner = CountingPlanner()
+    bench = Bench(planner=planner)
+    bench.run(10)
+    bench.time += 0.3
+    bench.run(2)
+    assert planner.resets == 2
+    assert planner.periods[1:] == pytest.approx(11 * [0.004])
+
+
+def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
+    """By the time of the sample itself, not by when it came: it came 10 ms late."""
+    asked = []
+    planner = SimpleNamespace(
+        rates=lambda q, target, dt, rates: asked.append(target.north) or BodyRates(0.0, 0.0, 0.0),
+        reset=lambda *_: None,
+    )
+    bench = Bench(planner)
+    bench.run(20)  # the quickest of these tells the vehicle's clock
+    asked.clear()
+    bench.refresh(target=Target(0.0, 0.0, 0.0), later=Target(0.2, 0.0, 0.0), period=0.02)
+    begun = bench.time
+    for elapsed in (0.005, 0.010, 0.020, 0.040):
+        bench.time = begun + elapsed
+        bench.sample(late=0.010)
+    # The clock's rate is uncertain: by some 0.1 ms here.
+    assert asked == pytest.approx([0.05, 0.1, 0.2, 0.2], abs=0.006)
+
+
+class NotingPlanner:
+    """What the loop passes on of ATTITUDE_TARGET: heading in rad, age in s."""
+
+    def __init__(self):
+        self.noted = []
+
+    def rates(self, *_):
+        return BodyRates(0.0, 0.0, 0.0)
+
+    def reset(self, *_):
+        pass
+
+    def note_attitude_target(self, q, age):
+        self.noted.append((2.0 * math.atan2(q[3], q[0]), age))
+
+
+def facing(heading):
+    return (math.cos(heading / 2.0), 0.0, 0.0, math.sin(heading / 2.0))
+
+
+def test_the_attitude_target_is_passed_on_once_with_its_age_at_the_sample():
+    bench = Bench(planner := NotingPlanner())
+    told = None
+    bench.loop.attitude_target = lambda: told
+    bench.run(3)
+    assert planner.noted == []
+    told = AttitudeTarget(3000 + 4 * 3 - 10, facing(0.3))
+    bench.run(3)
+    assert planner.noted == [(pytest.approx(0.3), pytest.approx(0.014))]
+    told = AttitudeTarget(3000 + 4 * 6 + 6, facing(0.4))  # newer than the coming sample
+    bench.run(1)
+    assert len(planner.noted) == 1
+    bench.run(2)
+    assert planner.noted[1:] == [(pytest.approx(0.4), pytest.approx(0.002))]
+
+
+def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
+    """What was told before the jump may be in either frame, and is passed over."""
+    bench = Bench(planner := NotingPlanner())
+    told = None
+    bench.loop.attitude_target = lambda: told
+    bench.run(3)
+    told = AttitudeTarget(3000 + 4 * 4, facing(0.3))
+    bench.run(1, q=facing(0.5))
+    assert bench.loop.resets.turn == pytest.approx(0.5)
+    assert planner.noted == []
+    told = AttitudeTarget(3000 + 4 * 5, facing(0.8))
+    bench.run(1, q=facing(0.5))
+    assert planner.noted == [(pytest.approx(0.3), pytest.approx(0.0))]

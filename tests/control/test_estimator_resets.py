@@ -1,0 +1,134 @@
+"""Jumps of the estimate: found where nothing explains them, and not chased."""
+
+from math import atan2, cos, radians, sin
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+from scipy.spatial.transform import Rotation
+
+from companion.attitude import BodyRates, Target, coefficients, heading
+from companion.control.estimator_resets import EstimatorResets
+from companion.vehicle.records import LocalPosition
+from companion.vehicle.samples import AttitudeSample
+from tests.flight.fly import fly, mock_vehicle
+
+
+def quaternion(rotation):
+    x, y, z, w = rotation.as_quat()
+    return w, x, y, z
+
+
+def turn(angle):
+    return Rotation.from_euler("z", angle)
+
+
+class Tumbling:
+    """Attitudes of a body that turns quickly, by SciPy; with jumps about axes of the world."""
+
+    def __init__(self, dt=0.01):
+        self.resets, self.dt, self.time = EstimatorResets(), dt, 5.0
+        self.rotation, self.rates = Rotation.from_euler("xy", (0.3, -0.4)), np.zeros(3)
+
+    def step(self, jump=None):
+        rates = np.array([sin(9.0 * self.time), cos(7.0 * self.time), 1.0])
+        self.rotation *= Rotation.from_rotvec(0.5 * self.dt * (self.rates + rates))
+        self.rates, self.time = rates, self.time + self.dt
+        if jump is not None:
+            self.rotation = jump * self.rotation
+        q = quaternion(self.rotation)
+        sample = AttitudeSample(0, self.time, self.time, 0, q, BodyRates(*rates))
+        return self.resets.on_attitude(sample)
+
+
+@pytest.mark.parametrize("dt", [0.004, 0.02, 0.1])
+def test_a_tumbling_vehicle_is_not_taken_for_a_jump(dt):
+    body = Tumbling(dt)
+    assert not any(body.step() for _ in range(100))
+    assert (body.resets.turn, list(body.resets.times)) == (0.0, [])
+
+
+def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_them():
+    body = Tumbling()
+    for angle in (1.8, 1.8, -0.3):
+        body.step()
+        assert not body.step(turn(angle))
+        body.time += 1.0  # too long ago to compare with
+        body.step()
+    assert body.resets.turn == pytest.approx(3.3 - 2 * np.pi, abs=0.01)
+    assert len(body.resets.times) == 3
+    before = turn(-body.resets.turn) * body.rotation
+    assert body.resets.attitude(quaternion(body.rotation)) == pytest.approx(quaternion(before))
+
+
+def test_a_jump_of_the_thrust_axis_is_no_turn():
+    body = Tumbling()
+    body.step()
+    assert body.step(Rotation.from_euler("x", 0.2))
+    assert body.resets.turn == 0.0
+    assert body.resets.largest_tilt == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_target_is_turned_with_the_attitude_so_that_they_differ_as_before():
+    resets = EstimatorResets()
+    resets.turn = 0.4
+    tilted = turn(0.4) * Rotation.from_euler("zyx", (0.2, 0.1, -0.3))
+    there = coefficients(quaternion(tilted))
+    q = resets.attitude(quaternion(tilted))
+    assert resets.target(Target(*there, 1.0), 0.4)[:2] == pytest.approx(coefficients(q))
+    assert heading(q) == pytest.approx(heading(quaternion(tilted)) - 0.4)
+
+
+def test_positions_go_on_without_the_jumps():
+    resets, dt = EstimatorResets(), 0.02
+    for step in range(200):
+        time = step * dt
+        way = (sin(2.0 * time), 3.0 * time, -time)
+        jump = 0.5 if step >= 100 else 0.0
+        raw = (way[0] + jump, way[1], way[2] - jump)
+        speed = (2.0 * cos(2.0 * time), 3.0, -1.0)
+        shown = resets.without_jumps(LocalPosition(time, time, raw, speed))
+        assert shown.position_ned == pytest.approx(way, abs=1e-3)
+    assert resets.shift == pytest.approx((0.5, 0.0, -0.5), abs=1e-3)
+    assert len(resets.times) == 1
+
+
+def test_the_counter_tells_of_resets_too_small_to_see_and_counts_none_twice():
+    resets = EstimatorResets()
+    for now, counter in ((1.0, 7), (2.0, 7), (3.0, 8), (3.2, 9), (5.0, 0)):
+        resets.on_counter(counter, now)
+    assert list(resets.times) == [3.0, 5.0]
+
+
+def flown(summary):
+    """Positions (s, m NED) and headings (s, rad), as the autopilot estimated them."""
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    positions, headings = [], []
+    names = ["LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"]
+    for m in iter(lambda: log.recv_match(type=names), None):
+        if m.get_type() == "LOCAL_POSITION_NED":
+            positions.append((m.time_boot_ms / 1e3, m.x, m.y, m.z))
+        else:
+            headings.append((m.time_boot_ms / 1e3, 2.0 * atan2(m.q4, m.q1)))
+    return np.array(positions), np.array(headings)
+
+
+def test_in_flight_the_vehicle_stays_where_it_is_when_its_estimate_jumps(tmp_path):
+    jump, yaw = (0.3, -0.4, 0.0), 20.0
+    reset = {"kind": "estimator_reset", "yaw_deg": yaw, "position_ned_m": jump}
+    vehicle = {"lag_ms": 47.0, "dead_time_ms": 40.0, "yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}
+    faults, wind = [{**reset, "after_offboard_s": 3.0}], {"speed_m_s": 3.0}
+    with mock_vehicle(tmp_path, faults=faults, wind=wind) as mock:
+        summary = fly(mock, tmp_path / "log", vehicle=vehicle)
+    assert summary.result == "ok", summary.events
+    assert sum("the estimator was reset: 0.5 m and 20°" in text for _, text in summary.events) == 1
+    positions, headings = flown(summary)
+    at = int(np.argmax(np.linalg.norm(np.diff(positions[:, 1:], axis=0), axis=1)))
+    when = positions[at, 0]
+    truth = positions[:, 1:] - np.where(positions[:, :1] > when, jump, 0.0)
+    near = (positions[:, 0] > when - 0.2) & (positions[:, 0] < when + 2.5)
+    assert np.linalg.norm(truth[near] - truth[at], axis=1).max() < 0.15
+    turned = headings[:, 1] - np.where(headings[:, 0] > when, radians(yaw), 0.0)
+    turned = np.unwrap(turned)[(headings[:, 0] > when + 0.1) & (headings[:, 0] < when + 2.5)]
+    assert np.ptp(turned) < radians(1.0)
+    assert abs(turned[0] - headings[np.searchsorted(headings[:, 0], when) - 10, 1]) < radians(1.0)

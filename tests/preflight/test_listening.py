@@ -1,0 +1,119 @@
+"""What the ear hears of others, of clocks and of jumps, over a real socket."""
+
+import asyncio
+from math import inf, nan
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.preflight.link_listener import Ear
+from companion.vehicle.clock import VehicleClock
+from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
+
+COMPANION, GROUND_STATION = 18, 6
+
+
+def of_type(kind):
+    return dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3)
+
+
+def setpoint():
+    return dialect.MAVLink_set_attitude_target_message(
+        0, 1, 1, 128, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.5
+    )
+
+
+def target(thrust):
+    return dialect.MAVLink_attitude_target_message(
+        0, 0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.01, 0.0, thrust
+    )
+
+
+def odometry(resets):
+    zeros = (0.0,) * 21
+    return dialect.MAVLink_odometry_message(
+        0, 1, 1, *(0.0,) * 3, (1.0, 0.0, 0.0, 0.0), *(0.0,) * 6, zeros, zeros, resets
+    )
+
+
+def test_who_else_is_there_and_who_steers():
+    async def scene():
+        async with linked() as (link, vehicle):
+            with Ear(link, asyncio.get_running_loop().time) as ear:
+                for source, message in (
+                    ((255, 190), of_type(GROUND_STATION)),
+                    ((1, 192), of_type(COMPANION)),
+                    ((1, 193), setpoint()),
+                ):
+                    system, component = source
+                    vehicle.send_raw(frames_of(message, system=system, component=component)[0])
+                await until(lambda: len(ear.company.sources) == 3)
+            assert ear.company.companions == {(1, 192)}
+            assert ear.company.steering == {(1, 193)}
+            vehicle.send_raw(frames_of(setpoint(), system=9)[0])
+            await until(lambda: link.stats.ignored_foreign == 4)
+            assert len(ear.company.sources) == 3  # the ear is off
+
+    asyncio.run(scene())
+
+
+def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
+    async def scene():
+        async with linked() as (link, vehicle):
+            with Ear(link, asyncio.get_running_loop().time) as ear:
+                vehicle.send(target(0.0), odometry(7))
+                await until(lambda: link.state.reset_counter == 7)
+                assert not ear.company.echo
+                vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
+                await until(lambda: link.state.reset_counter == 9)
+                assert not ear.company.echo
+                assert ear.resets == 2
+                vehicle.send(heartbeat(), target(0.4), odometry(9))
+                await until(lambda: ear.company.echo)
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        (nan, 0, 0, 0, 0, 0, 0),
+        (0, 0, 0, 0, 0, 0, 0),
+        (1, 0, 0, 0, inf, 0, 0),
+        (2, 0, 0, 0, 0, 0, 0),
+    ],
+)
+def test_samples_that_cannot_be_answered(values):
+    callbacks = {}
+
+    def subscribe(name, callback):
+        callbacks[name] = callback
+        return lambda: None
+
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with Ear(link, lambda: 0.0) as ear:
+        callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
+        callbacks["ATTITUDE_QUATERNION"](attitude(4))
+    assert (ear.samples.heard, ear.samples.unusable) == (2, 1)
+
+
+def test_pauses_and_stamps_of_the_samples():
+    times = iter([0.0, 0.1, 0.2, 0.5, *(0.5 + 0.1 * n for n in range(1, 8))])
+    callbacks = {}
+
+    def subscribe(name, callback):
+        callbacks[name] = callback
+        return lambda: None
+
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with Ear(link, lambda: next(times)) as ear:
+        assert ear.samples.clock_rate is None
+        for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
+            callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
+    heard, pause, not_newer, rate, age, change, unusable, even = ear.samples
+    assert abs(even - 10 / 1.2) < 1e-9
+    assert (age, change) == (None, "")
+    assert (heard, not_newer, unusable) == (11, 2, 0)
+    assert abs(pause - 0.3) < 1e-9
+    assert abs(rate - 1.8 / 1.2) < 1e-9

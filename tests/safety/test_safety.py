@@ -1,0 +1,279 @@
+"""The safety ladder: every monitor by its own breach, how long it must last, and what follows."""
+
+from math import cos, inf, radians, sin
+from types import SimpleNamespace
+
+import pytest
+
+from companion.config import Config
+from companion.control.unanswered import Unanswered
+from companion.flight.snapshot_builder import Lookout
+from companion.guidance.fence import Place, inside, local_polygon
+from companion.safety import Action, SafetyLadder, monitors
+from companion.safety.monitor import Alarm, Monitor
+from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.records import Battery, Estimator, Gps
+
+CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
+NOW = 100.0
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+GOOD = 0x33F
+
+
+def roll(angle_deg):
+    half = 0.5 * radians(angle_deg)
+    return cos(half), sin(half), 0.0, 0.0
+
+
+FINE = Snapshot(
+    NOW,
+    Autopilot(
+        battery=Battery(inf, 16.0, 0.9), gps=Gps(inf, 3, 12, 500.0), estimator=Estimator(inf, GOOD)
+    ),
+    Motion(
+        LEVEL, (0.1, 0.0, 0.0), (1.0, 2.0, -1.0), (1.0, 1.0, 0.0), 6.0, 0.2, 0.5, Place(47.0, 8.0)
+    ),
+    Control(),
+    Health(0.01, 0.02, 0.01, 0.01),
+    had_gps=True,
+    good_flags=GOOD,
+)
+
+
+def autopilot(**changes):
+    return FINE._replace(autopilot=FINE.autopilot._replace(**changes))
+
+
+def motion(**changes):
+    return FINE._replace(motion=FINE.motion._replace(**changes))
+
+
+def health(**changes):
+    return FINE._replace(health=FINE.health._replace(**changes))
+
+
+def control(**changes):
+    return FINE._replace(control=Control(**changes))
+
+
+def unanswered(reason, **changes):
+    return control(answered=OLD, reason=reason, **changes)
+
+
+OLD = NOW - 0.6
+SILENT = {"answered": OLD, "sampled": OLD}
+WARN, HOLD, HAND_BACK, LAND, LET_GO = Action
+STOOD_STILL = "this computer stood still for 0.4 s"
+BREACHES = [
+    ("unheard", control(**SILENT, heard=OLD), LET_GO, 0.0, "no attitude from the vehicle for 0.6"),
+    ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
+    ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
+    ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
+    ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
+    ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
+    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LET_GO, 0.0, STOOD_STILL),
+    ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
+    (
+        "silence",
+        unanswered(Unanswered.OLD_TARGET, position_fresh=False),
+        HAND_BACK,
+        0.0,
+        "position_stale_ms",
+    ),
+    ("silence", unanswered(Unanswered.OLD_TARGET), HAND_BACK, 0.0, "guidance makes no"),
+    ("silence", unanswered(Unanswered.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
+    ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
+    ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot leave"),
+    ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
+    ("disarmed", autopilot(armed=False), LET_GO, 0.0, "disarmed in flight"),
+    ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
+    ("failsafe", autopilot(failsafe=True), HAND_BACK, 0.0, "failsafe"),
+    ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.2, "battery at 15 %"),
+    ("battery", autopilot(battery=Battery(NOW - 6.0, 16.0, 0.9)), LAND, 0.2, "not reported"),
+    ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.2, "GPS position lost"),
+    ("gps", autopilot(gps=Gps(NOW - 6.0, 3, 12, 500.0)), LAND, 0.2, "GPS is not reported"),
+    ("estimator", autopilot(estimator=Estimator(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),
+    ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x1)), LAND, 0.5, "0x1)"),
+    ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x18)), LAND, 0.5, "0x18)"),
+    ("reset", FINE._replace(resets=Resets(1, 0.5, 0.3)), WARN, 0.1, "0.5 m and 17°"),
+    ("resets", FINE._replace(resets=Resets(4)), LAND, 0.0, "reset 4 times"),
+    ("resets", FINE._replace(resets=Resets(1, 1.1)), LAND, 0.0, "reset by 1.1 m"),
+    ("resets", FINE._replace(resets=Resets(1, 0.0, -0.8)), LAND, 0.0, "46° of heading"),
+    ("resets", FINE._replace(resets=Resets(1, 0.0, 0.0, 0.4)), LAND, 0.0, "23° of tilt"),
+    ("tilt", motion(q=roll(57.0)), HAND_BACK, 0.3, "57° of tilt"),
+    ("body rate", motion(body_rates=(0.0, 0.0, -7.1)), HAND_BACK, 0.2, "407°/s"),
+    ("fence", motion(offset=(50.0, 35.0, 0.0)), LAND, 0.0, "61.0 m from where control began"),
+    ("fence", motion(offset=(0.0, 0.0, -30.1), velocity=(0, 0, 0)), LAND, 0.0, "ceiling"),
+    ("fence", motion(height=0.9, velocity=(0, 0, 0)), LAND, 0.0, "0.9 m above home"),
+    ("braking", motion(offset=(0.0, 50.0, 0.0), velocity=(0.0, 6.5, 0.0)), HOLD, 0.04, "60.4 m"),
+    ("braking", motion(velocity=(0.0, 0.0, 4.5), height=6.0), HOLD, 0.04, "0.6 m above home"),
+    ("speed", motion(velocity=(11.0, 11.0, 0.0)), HOLD, 0.3, "15.6 m/s"),
+    ("tracking", motion(off_course=5.1), HOLD, 1.0, "5.1 m off"),
+    ("thrust", motion(thrust=0.9), HOLD, 2.0, "limits.max_thrust"),
+    ("thrust", motion(thrust=0.1), HOLD, 2.0, "limits.min_thrust"),
+    ("answer gaps", health(gaps=3), HAND_BACK, 0.0, "could not be answered 3 times"),
+    ("answer rate", health(answer_rate=49.0), HAND_BACK, 1.0, "answered at 49 Hz, below link.min"),
+    ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
+    ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
+    ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
+    ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the answers"),
+    ("starvation", health(starved=0.6), HAND_BACK, 1.5, "60 %"),
+]
+
+
+class Climb:
+    """A ladder, looked at every 20 ms, that keeps what it tells."""
+
+    def __init__(self, config=CONFIG, table=None):
+        self.told = []
+        self.now = NOW
+        self.ladder = SafetyLadder(table or monitors(config), config.safety.hold_s)
+        self.ladder.note = self.told.append
+
+    def see(self, snapshot, seconds):
+        """The first verdict within so long, and after how many seconds it came."""
+        for step in range(round(seconds / 0.02) + 1):
+            verdict = self.ladder.step(snapshot._replace(now=self.now))
+            self.now += 0.02
+            if verdict is not None:
+                return verdict, 0.02 * step
+        return None, None
+
+
+def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
+    """A look comes every 20 ms, and one that is late by less than 10 ms is none."""
+    state = SimpleNamespace(reset_counter=None, positions=0)
+    link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
+    resets = SimpleNamespace(on_counter=lambda *_: None)
+    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0, held=HeldRates())
+    lookout = Lookout(link, loop, None, real_time=True)
+    for now in (0.0, 0.02, 0.05, 0.48, 0.5):
+        lookout.listen(now)
+    assert lookout.stood_still(since=0.02) == pytest.approx(0.4)
+    assert lookout.stood_still(since=0.49) == 0.0
+    lookout.listen(3.53)
+    assert lookout.stood_still(since=0.49) == pytest.approx(3.0)
+    assert lookout.stood_still(since=3.53) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "snapshot", "action", "lasts", "words"),
+    BREACHES,
+    ids=[f"{row[0]}-{row[4]}" for row in BREACHES],
+)
+def test_a_breach_leads_to_its_action_once_it_lasts(name, snapshot, action, lasts, words):
+    table = monitors(CONFIG)
+    alarms = {monitor.name: Alarm(monitor) for monitor in table}
+    wrong = [monitor.name for monitor in table if monitor.judge(snapshot, False)]
+    assert wrong == (["reset", "resets"] if name == "resets" else [name])
+    assert words in alarms[name].monitor.judge(snapshot, False)
+    monitor = alarms[name].monitor
+    assert (monitor.action, monitor.lasts) == (action, lasts)
+    assert alarms[name].step(snapshot) is (lasts == 0.0)
+    if lasts > 0.0:
+        assert not alarms[name].step(snapshot._replace(now=NOW + lasts - 0.01))
+        assert alarms[name].step(snapshot._replace(now=NOW + lasts + 0.001))
+
+
+def test_every_row_of_the_table_is_tried_here_and_a_calm_flight_raises_none():
+    table = monitors(CONFIG)
+    assert {row[0] for row in BREACHES} == {monitor.name for monitor in table}
+    assert [m.name for m in table if m.judge(FINE, False)] == []
+    assert [m.name for m in table if m.judge(Snapshot(NOW), False)] == []
+
+
+def test_a_breach_that_comes_and_goes_is_not_one_and_an_alarm_needs_calm_to_be_over():
+    monitor = Monitor("odd", lambda s, _: "wrong" if s.now % 1.0 < 0.4 else None, WARN, 0.5, 0.5)
+    alarm = Alarm(monitor)
+    assert not any(alarm.step(FINE._replace(now=NOW + 0.1 * k)) for k in range(50))
+    latched = Alarm(Monitor("odd", monitor.judge, WARN, lasts=0.25, calm=0.7))
+    changes = [k for k in range(50) if latched.step(FINE._replace(now=NOW + 0.1 * k))]
+    assert len(changes) == 1  # 0.6 s of calm in each second are not enough
+
+
+def test_over_the_limit_is_over_only_well_within_it():
+    climb = Climb()
+    speeding, less = (motion(velocity=(v, 0.0, 0.0)) for v in (15.1, 14.5))
+    verdict, after = climb.see(speeding, 1.0)
+    assert (verdict.action, after) == (HOLD, pytest.approx(0.3, abs=0.021))
+    verdict, after = climb.see(less, 5.0)
+    assert (verdict.action, after) == (LAND, pytest.approx(3.0, abs=0.021))
+    assert climb.told == ["safety: speed: 15.1 m/s, faster than safety.max_speed_m_s → hold"]
+
+
+def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
+    climb = Climb()
+    climb.see(motion(off_course=6.0), 2.0)
+    verdict, after = climb.see(FINE, 5.0)
+    assert verdict.action is LAND
+    assert "6.0 m off its course" in verdict.reason
+    assert after == pytest.approx(1.0, abs=0.021)
+    assert climb.told[-1] == "safety: tracking is over"
+
+
+def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
+    climb = Climb()
+    climb.see(motion(off_course=6.0), 2.0)
+    both = autopilot(armed=False, failsafe=True)
+    verdict, after = climb.see(both, 1.0)
+    assert (verdict.action, verdict.reason, after) == (
+        LET_GO,
+        "the vehicle disarmed in flight",
+        0.0,
+    )
+
+
+def test_a_warning_is_told_once_and_when_it_is_over():
+    climb = Climb()
+    assert climb.see(health(lost=0.5), 4.0) == (None, None)
+    assert climb.see(FINE, 4.0) == (None, None)
+    assert [text.split(":")[1] for text in climb.told] == [" link loss", " link loss is over"]
+
+
+def test_an_action_can_be_set_but_not_everywhere_to_a_warning():
+    warned = Config.model_validate({"safety": {"battery_action": "warn"}})
+    climb = Climb(warned)
+    assert climb.see(autopilot(battery=Battery(inf, 14.0, 0.1)), 1.0) == (None, None)
+    assert "→ warn" in climb.told[0]
+    with pytest.raises(ValueError, match="fence_action"):
+        Config.model_validate({"safety": {"fence_action": "warn"}})
+
+
+def test_in_silence_nothing_is_sent_any_more():
+    verdict, _ = Climb().see(control(**SILENT), 0.0)
+    assert verdict.mutes
+    verdict, _ = Climb().see(autopilot(landed=True), 0.0)
+    assert not verdict.mutes
+
+
+L_SHAPE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -1.0), (1.0, -1.0), (1.0, -10.0))
+
+
+@pytest.mark.parametrize(
+    ("north", "east", "within"),
+    [(5.0, 5.0, True), (-5.0, -5.0, True), (5.0, -5.0, False), (0.0, 11.0, False), (-11, 0, False)],
+)
+def test_a_polygon_has_an_inside(north, east, within):
+    assert inside(north, east, L_SHAPE) is within
+    assert inside(north, east, L_SHAPE[::-1]) is within
+
+
+def test_the_polygon_is_judged_about_where_control_began_or_on_the_map():
+    local = Config.model_validate({"safety": {"fence_polygon_m": L_SHAPE}})
+    verdict, _ = Climb(local).see(motion(offset=(5.0, -5.0, 0.0)), 0.0)
+    assert (verdict.action, verdict.reason) == (LAND, "outside the polygon of the fence")
+    degree = 111_194.9  # m of latitude
+    map_corners = [(47.0 + n / degree, 8.0 + e / degree / cos(radians(47.0))) for n, e in L_SHAPE]
+    flat = [
+        value for corner in local_polygon(tuple(map_corners), Place(47.0, 8.0)) for value in corner
+    ]
+    assert flat == pytest.approx([value for corner in L_SHAPE for value in corner], abs=0.01)
+    on_map = Config.model_validate({"safety": {"fence_polygon_deg": map_corners}})
+    assert Climb(on_map).see(motion(offset=(5.0, 5.0, 0.0), velocity=(0, 0, 0)), 0.1)[0] is None
+    verdict, _ = Climb(on_map).see(motion(offset=(5.0, -5.0, 0.0)), 0.0)
+    assert verdict.action is LAND
+    verdict, _ = Climb(on_map).see(motion(origin=None), 0.0)
+    assert "not known" in verdict.reason
