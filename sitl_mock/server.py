@@ -5,11 +5,11 @@ import time
 from collections.abc import Callable
 from math import ceil
 
+from sitl_mock.connections import Arrived, Connections
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import Message, decode
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
-from sitl_mock.wires import Arrived, Wires
 
 BEACON_FIRST_S = 0.05
 """The first beacon is sent again after this much wall time without an answer."""
@@ -51,8 +51,8 @@ class Server:
         self._settings = settings
         self._status = status
         self._simulation = Simulation(settings, system_id)
-        self._wires = Wires(settings, self._simulation)
-        self._companion = self._wires.companion
+        self._connections = Connections(settings, self._simulation)
+        self._companion = self._connections.companion
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
         self._answered = False
@@ -74,7 +74,7 @@ class Server:
             else:
                 self._await_client()
                 self._simulation.boot()
-                self._wires.flush()
+                self._connections.flush()
             self._rebase()
             while True:
                 self._step()
@@ -83,7 +83,7 @@ class Server:
 
     def close(self) -> None:
         """Close the sockets."""
-        self._wires.close()
+        self._connections.close()
 
     def _step(self) -> None:
         """Fly one slot: in lockstep after the answer to the latest beacon, else when it is time."""
@@ -92,11 +92,11 @@ class Server:
         self._handle_collected()
         self._simulation.tick()
         if self._settings.lockstep.enabled:
-            self._wires.flush(self._new_beacon())
+            self._connections.flush(self._new_beacon())
             if self._lockstep:
                 self._await_answer()
         else:
-            self._wires.flush()
+            self._connections.flush()
         if self._status is not None:
             self._status(self._simulation)
 
@@ -112,11 +112,11 @@ class Server:
 
         A client that speaks but does not answer has ``patience_s``.
         """
-        self._wires.send_beacon(self._new_beacon())
+        self._connections.send_beacon(self._new_beacon())
         heard_at: float | None = None
         while not self._answered:
             self._collect(BEACON_FIRST_S)
-            self._wires.send_beacon(self._beacon)
+            self._connections.send_beacon(self._beacon)
             now = time.monotonic()
             if heard_at is None and self._companion.heard:
                 heard_at = now
@@ -131,7 +131,7 @@ class Server:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_AGAIN_S
         while not self._answered and time.monotonic() < deadline:
-            self._wires.send_beacon(self._beacon)
+            self._connections.send_beacon(self._beacon)
             self._collect(BEACON_AGAIN_S)
         if not self._answered:
             self._lockstep = False
@@ -156,7 +156,7 @@ class Server:
 
     def _poll(self, timeout_s: float) -> None:
         """Collect from the companion and serve the others, once something came or in time."""
-        for endpoint in self._wires.ready(timeout_s):
+        for endpoint in self._connections.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()
             else:
@@ -184,14 +184,14 @@ class Server:
     def _handle_collected(self) -> None:
         """Handle what was collected while waiting, in its order."""
         collected, self._collected = self._collected, []
-        self._wires.deliver(collected, self._companion)
+        self._connections.deliver(collected, self._companion)
 
     # Paced time
 
     def _await_client(self) -> None:
         """Where the wire knows whether somebody is there, nothing boots before."""
         while not self._companion.connected:
-            self._wires.ready(BEACON_AGAIN_S)
+            self._connections.ready(BEACON_AGAIN_S)
 
     def _rebase(self) -> None:
         self._base_wall = time.monotonic()
@@ -212,7 +212,7 @@ class Server:
         if left < -MAX_LAG_S:
             self._rebase()
         while True:
-            for endpoint in self._wires.ready(max(0.0, left)):
+            for endpoint in self._connections.ready(max(0.0, left)):
                 self._serve(endpoint)
             left = due - time.monotonic()
             if left <= 0.0 or self._lockstep:
@@ -226,12 +226,12 @@ class Server:
         while (received := endpoint.receive()) is not None:
             datagram, from_partner = received
             messages = decode(datagram)
-            self._wires.deliver([(datagram, messages)], endpoint)
+            self._connections.deliver([(datagram, messages)], endpoint)
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
             if in_lockstep and from_partner and self._is_answer(messages):
                 # The latest beacon is answered after all.
                 self._answered = self._lockstep = True
-        self._wires.flush()
+        self._connections.flush()
 
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC: between slots it goes with the wall clock."""

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.faults import FaultEffects, FaultSchedule
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Parts
+from sitl_mock.autopilot.personality import VehicleParts
 from sitl_mock.autopilot.receiver import Receiver
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import State
@@ -68,7 +68,7 @@ class Simulation:
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
         self._beacon_framer = Framer(system_id, 1, signed=signed)
         self._rules = personality.rules(
-            Parts(
+            VehicleParts(
                 self.state,
                 self.parameters,
                 self.vehicle,

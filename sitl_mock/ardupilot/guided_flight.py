@@ -4,8 +4,8 @@ from math import isnan
 
 from sitl_mock.ardupilot.actuator_output import ActuatorOutput
 from sitl_mock.ardupilot.guided import Guided, Task
-from sitl_mock.ardupilot.hold import PositionHold, approach
-from sitl_mock.ardupilot.thrust import asked_climb, asked_thrust, boosted
+from sitl_mock.ardupilot.hold import PositionHold, approach_speed
+from sitl_mock.ardupilot.thrust import angle_boosted, climb_rate_of_setpoint, thrust_of_setpoint
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import PositionDemand
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint
@@ -72,7 +72,7 @@ class GuidedFlight:
             return self._output.rates((0.0, 0.0, 0.0), 0.0)
         left = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
         fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_SLOWEST_ARRIVAL, approach(left, ARRIVAL_ACCELERATION, fastest))
+        speed = max(_SLOWEST_ARRIVAL, approach_speed(left, ARRIVAL_ACCELERATION, fastest))
         if left < ARRIVED_M:
             guided.arrive()
         return self._output.follow(self._hold.step(speed, dt), dt)
@@ -91,15 +91,15 @@ class GuidedFlight:
         if climbs:
             up = 0.01 * parameters["WPNAV_SPEED_UP"]
             down = 0.01 * parameters["WPNAV_SPEED_DN"]
-            climb = 0.0 if self._silent else asked_climb(asked.thrust, up, down)
+            climb = 0.0 if self._silent else climb_rate_of_setpoint(asked.thrust, up, down)
             thrust = self._hold.step(climb, dt, level=True).thrust
             state.position_target.active = False
         else:
-            thrust = asked_thrust(asked.thrust)
+            thrust = thrust_of_setpoint(asked.thrust)
         self._output.thrust = state.attitude_target.thrust = thrust
         # What a climb needs is boosted in any case; what was asked as thrust, if it is so set.
         if climbs or parameters["ATC_ANGLE_BOOST"]:
-            thrust = boosted(thrust, self._output.cos_tilt)
+            thrust = angle_boosted(thrust, self._output.cos_tilt)
         if self._silent:
             return self._output.attitude(from_yaw(self._hold.yaw), thrust)
         rates = asked.rates or (0.0, 0.0, 0.0)

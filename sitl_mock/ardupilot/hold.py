@@ -13,7 +13,7 @@ from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 
-class Climb:
+class ClimbProfile:
     """The height, climb rate and acceleration that are followed now; SI, up positive."""
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class Climb:
         self.height += self.rate * dt
 
 
-def approach(way: float, acceleration: float, fastest: float) -> float:
+def approach_speed(way: float, acceleration: float, fastest: float) -> float:
     """Return the speed from which ``acceleration`` still stops within the ``way``, m/s."""
     return min(fastest, sqrt(2.0 * acceleration * max(0.0, way)))
 
@@ -61,7 +61,7 @@ class PositionHold:
         self._state = state
         self._parameters = parameters
         self._controller = PositionController(self._gains)
-        self.climb = Climb()
+        self.climb = ClimbProfile()
         self.point = (0.0, 0.0)
         """Held, NED, m."""
         self.yaw = 0.0

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from sitl_mock.ardupilot.actuator_output import ActuatorOutput
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.guided_flight import GuidedFlight
-from sitl_mock.ardupilot.hold import PositionHold, approach
+from sitl_mock.ardupilot.hold import PositionHold, approach_speed
 from sitl_mock.ardupilot.return_home import Leg, Return
-from sitl_mock.ardupilot.thrust import boosted
+from sitl_mock.ardupilot.thrust import angle_boosted
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Vector, from_yaw
@@ -101,7 +101,7 @@ class ArduPilotModeControl:
             # Somebody holds the sticks in the middle; upright at a hover.
             hover = float(self._parameters["MOT_THST_HOVER"])
             return self._output.attitude(
-                from_yaw(self._hold.yaw), boosted(hover, self._output.cos_tilt)
+                from_yaw(self._hold.yaw), angle_boosted(hover, self._output.cos_tilt)
             )
         if self.landing:
             return self._land(dt)
@@ -119,7 +119,9 @@ class ArduPilotModeControl:
         left = way.height - self._hold.climb.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         fastest = 0.01 * parameters["WPNAV_SPEED_UP"]
-        return self._output.follow(self._hold.step(approach(left, acceleration, fastest), dt), dt)
+        return self._output.follow(
+            self._hold.step(approach_speed(left, acceleration, fastest), dt), dt
+        )
 
     def _land(self, dt: float) -> ActuatorCommand:
         """Descend: fast to LAND_ALT_LOW, then at LAND_SPEED; the thrust falls on the ground."""
@@ -131,7 +133,7 @@ class ArduPilotModeControl:
         above = state.home_ned[2] - state.estimate.position_ned[2]
         left = above - 0.01 * parameters["LAND_ALT_LOW"]
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
-        sink = max(slow, approach(left, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"]))
+        sink = max(slow, approach_speed(left, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"]))
         level = not state.position_valid
         state.position_controlled = not level
         return self._output.follow(self._hold.step(-sink, dt, level=level), dt)

@@ -17,9 +17,9 @@ MODE_NUMBERS: dict[Mode, int] = {
 MODES_BY_NUMBER = {number: mode for mode, number in MODE_NUMBERS.items()}
 NEEDS_POSITION = frozenset({Mode.GUIDED, Mode.LOITER, Mode.RTL, Mode.BRAKE})
 """Modes that need a horizontal position."""
-NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
+NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
 
-STICKS_HOLD = {
+PILOT_MODES = {
     Mode.POSCTL: Mode.LOITER,
     Mode.ALTCTL: Mode.ALT_HOLD,
     Mode.STABILIZED: Mode.STABILIZE,
@@ -73,7 +73,7 @@ def arming_problem(
         (crashed, "Vehicle has crashed"),
         (not home_set, "AHRS: waiting for home"),
         (mode in NEEDS_POSITION and not state.position_valid, "Need Position Estimate"),
-        (mode in NEVER_ARMED_IN, "Mode not armable"),
+        (mode in NOT_ARMABLE, "Mode not armable"),
         (state.battery_warning > BatteryWarning.OK, "Battery failsafe on"),
         (gcs_failsafe, "GCS failsafe on"),
     )

@@ -6,7 +6,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
+from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Notifier
 from sitl_mock.ardupilot.commander import ArduPilotCommander
 from sitl_mock.ardupilot.commands import ArduPilotCommands
 from sitl_mock.ardupilot.defaults import (
@@ -22,12 +22,12 @@ from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
 from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
 from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.occasions import Event, Occasion
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Identity, Parts, Rules
+from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
@@ -73,7 +73,7 @@ _SUPPORTED = frozenset(
 class ArduPilot:
     """The ArduPilot personality, a Copter."""
 
-    events: Mapping[Occasion, Event] = ARDUPILOT_EVENTS
+    events: Mapping[EventKind, Event] = ARDUPILOT_EVENTS
     boot_mode = Mode.STABILIZE
     any_component = True
     system_id_parameter = "MAV_SYSID"
@@ -109,21 +109,21 @@ class ArduPilot:
         """Return the mode a custom_mode means, None if the mock has none such."""
         return MODES_BY_NUMBER.get(custom_mode)
 
-    def rules(self, parts: Parts) -> Rules:
+    def rules(self, parts: VehicleParts) -> Rules:
         """Put ArduCopter's rules together."""
         state, parameters, links = parts.state, parts.parameters, parts.links
         announce = ArduPilotAnnouncer(links)
         protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
         guided = Guided()
         control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
-        voice = Voice(
+        notifier = Notifier(
             announce,
-            tell_home=lambda: _tell(commands, _HOME, links),
-            tell_parameter=lambda name: protocol.tell(name, [x for x in links if x.heard]),
+            send_home=lambda: _tell(commands, _HOME, links),
+            send_parameter=lambda name: protocol.send_changed(name, [x for x in links if x.heard]),
         )
-        boot = Boot(state, voice, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
+        boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
         commander = ArduPilotCommander(
-            state, parameters, parts.vehicle, control, guided, parts.stream, voice, boot
+            state, parameters, parts.vehicle, control, guided, parts.stream, notifier, boot
         )
         builders = self._builders(parts, boot)
         commands = ArduPilotCommands(state, commander, builders, announce)
@@ -145,7 +145,7 @@ class ArduPilot:
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )
 
-    def _builders(self, parts: Parts, boot: Boot) -> dict[int, Builder]:
+    def _builders(self, parts: VehicleParts, boot: Boot) -> dict[int, Builder]:
         motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin)
         system = ArduPilotSystemTelemetry(
             parts.state,

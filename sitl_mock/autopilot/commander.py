@@ -31,7 +31,7 @@ class Commander(Protocol):
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
 
-    def tell_problem(self) -> None:
+    def announce_problem(self) -> None:
         """Say what forbids arming now, if anything does."""
 
     def disarm(self, *, force: bool = False) -> int:

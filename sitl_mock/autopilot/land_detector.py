@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from sitl_mock.autopilot.occasions import Announce, Occasion
+from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
@@ -42,7 +42,7 @@ class LandDetector:
         was_landed = state.landed
         self._look(contact=contact)
         if was_landed != state.landed and state.armed:
-            landed = Occasion.LANDING_DETECTED if state.landed else Occasion.TAKEOFF_DETECTED
+            landed = EventKind.LANDING_DETECTED if state.landed else EventKind.TAKEOFF_DETECTED
             self._announce(landed, "")
         state.landed_state = self._landed_state()
 

@@ -1,7 +1,7 @@
 """What differs between autopilot families, as one interface.
 
 A personality has numbers and words of its own, and puts its family's rules together (`Rules`) from
-what every vehicle has (`Parts`). Nothing else of the mock knows a family.
+what every vehicle has (`VehicleParts`). Nothing else of the mock knows a family.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, Protocol
 
 from sitl_mock.autopilot.commander import Commander, ModeControl
 from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.occasions import Event, Occasion
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import Parameter, ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
@@ -33,7 +33,7 @@ class Identity(NamedTuple):
     flight_custom_version: tuple[int, ...]
 
 
-class Parts(NamedTuple):
+class VehicleParts(NamedTuple):
     """What every vehicle has, whatever its autopilot."""
 
     state: State
@@ -67,7 +67,7 @@ class Rules(NamedTuple):
 class Personality(Protocol):
     """One autopilot family."""
 
-    events: Mapping[Occasion, Event]
+    events: Mapping[EventKind, Event]
     """What is said on each occasion."""
     boot_mode: Mode
     system_id_parameter: str
@@ -91,5 +91,5 @@ class Personality(Protocol):
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode a custom_mode means, None if there is no such mode."""
 
-    def rules(self, parts: Parts) -> Rules:
+    def rules(self, parts: VehicleParts) -> Rules:
         """Put the family's rules together for one vehicle."""

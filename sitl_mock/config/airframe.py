@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, meaning
+from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, preset
 
 AIRFRAMES: dict[str, dict[str, object]] = {
     "sih": {},
@@ -63,7 +63,7 @@ class AirframeConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        return meaning(AIRFRAMES, value, "airframes")
+        return preset(AIRFRAMES, value, "airframes")
 
 
 class WindConfig(Section):

@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section, meaning
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
 
 
 class AxisShaping(Section):
@@ -117,7 +117,7 @@ class RateLoopConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        return meaning(RATE_LOOPS, value, "rate loops")
+        return preset(RATE_LOOPS, value, "rate loops")
 
     @model_validator(mode="after")
     def _shaped_whole(self) -> Self:

@@ -19,7 +19,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def meaning(words: Mapping[str, object], value: object, what: str) -> object:
+def preset(words: Mapping[str, object], value: object, what: str) -> object:
     """Return what a word stands for, and anything else as it is.
 
     Raises:

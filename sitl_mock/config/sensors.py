@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section, meaning
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
 
 Gains = tuple[NonNegative, NonNegative]
 """Of a state: per position innovation, and per velocity innovation."""
@@ -105,4 +105,4 @@ class SensorConfig(Section):
     @field_validator("ekf", mode="before")
     @classmethod
     def _named(cls, value: object) -> object:
-        return meaning(EKFS, value, "navigation filters")
+        return preset(EKFS, value, "navigation filters")

@@ -6,11 +6,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator
 
 from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
+from sitl_mock.config.endpoint import for_vehicle, parse_endpoint
 from sitl_mock.config.faults import Fault
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section
 from sitl_mock.config.sensors import SensorConfig
-from sitl_mock.config.wiring import for_vehicle, parse_wiring
 
 PORT_OFFSET = 40
 """The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
@@ -94,7 +94,7 @@ class VehicleSettings(Section):
     @field_validator("endpoint")
     @classmethod
     def _known_endpoint(cls, endpoint: str) -> str:
-        parse_wiring(endpoint)
+        parse_endpoint(endpoint)
         return endpoint
 
     def for_vehicle(self, index: int) -> Self:

@@ -38,7 +38,7 @@ _decoder = dialect.MAVLink(None)
 def decode(datagram: bytes) -> list[Message]:
     """Return the valid messages of a datagram in their order; whatever else is in it is skipped.
 
-    MAVLink 1 and 2 frames are taken, signed ones without checking the signature (`Link.admits`
+    MAVLink 1 and 2 frames are taken, signed ones without checking the signature (`Link.accepts`
     does that). A frame may not span datagrams.
     """
     messages: list[Message] = []

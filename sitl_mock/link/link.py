@@ -65,6 +65,6 @@ class Link:
         """Return a frame as it leaves on this link."""
         return frame if self.signing is None else self.signing.sign(frame)
 
-    def admits(self, message: Message) -> bool:
+    def accepts(self, message: Message) -> bool:
         """Whether a message that arrived here may be obeyed."""
-        return self.signing is None or self.signing.admits(message)
+        return self.signing is None or self.signing.accepts(message)

@@ -97,7 +97,7 @@ class Signing:
         carrier.sign_packet(self._mav)
         return bytes(carrier.get_msgbuf())
 
-    def admits(self, message: Message) -> bool:
+    def accepts(self, message: Message) -> bool:
         """Whether a message that arrived may be obeyed; counts it."""
         frame = bytearray(message.get_msgbuf())
         if frame[0] != _MAGIC_V2 or not frame[_FLAGS_AT] & SIGNED:

@@ -1,13 +1,13 @@
 """Whether PX4 may be armed, and when it disarms by itself on the ground."""
 
-from sitl_mock.autopilot.occasions import Occasion
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.modes import PILOTED
 
-NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND})
+NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND})
 """PX4 cannot be armed in these modes, and does not return to them when it disarms."""
 PREFLIGHT_MARGIN_US = 1_000_000
 """Armed but not flown, PX4 disarms this long after COM_DISARM_PRFLT (measured: 11 s for 10 s)."""
@@ -62,7 +62,7 @@ class ArmingChecks:
             (self._gcs_required and not gcs_alive, "no connection to the ground station"),
             (state.mode is Mode.OFFBOARD and not self.offboard_alive, "no offboard signal"),
             (state.mode in PILOTED and not pilot, "no manual control input"),
-            (state.mode in NEVER_ARMED_IN, "mode is not suitable for arming"),
+            (state.mode in NOT_ARMABLE, "mode is not suitable for arming"),
         )
         found = next((problem for present, problem in problems if present), None)
         state.prearm_problem = found
@@ -99,7 +99,7 @@ class AutoDisarm:
         """Start the time on the ground: the vehicle was armed."""
         self._landed_since_us = self._state.time_us
 
-    def due(self) -> Occasion | None:
+    def due(self) -> EventKind | None:
         """Return why the vehicle disarms now, None if it does not."""
         state, parameters = self._state, self._parameters
         if not state.landed:
@@ -108,7 +108,7 @@ class AutoDisarm:
         waited = state.time_us - self._landed_since_us
         if state.flown:
             limit = parameters["COM_DISARM_LAND"]
-            return Occasion.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
+            return EventKind.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
         limit = parameters["COM_DISARM_PRFLT"]
         late = waited >= limit * 1e6 + PREFLIGHT_MARGIN_US
-        return Occasion.DISARMED_ON_GROUND if limit > 0 and late else None
+        return EventKind.DISARMED_ON_GROUND if limit > 0 and late else None

@@ -3,14 +3,14 @@
 import struct
 
 from sitl_mock.autopilot.commander import ACCEPTED, TEMPORARILY_REJECTED
-from sitl_mock.autopilot.occasions import Occasion
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.px4.arming import NEVER_ARMED_IN, ArmingChecks, AutoDisarm
+from sitl_mock.px4.arming import NOT_ARMABLE, ArmingChecks, AutoDisarm
 from sitl_mock.px4.failsafe import Failsafe
 from sitl_mock.px4.failsafe_actions import Announce
 from sitl_mock.px4.mode_control import Px4ModeControl
@@ -30,7 +30,7 @@ class Px4Commander:
         parameters: its parameters.
         control: told of every mode entered.
         stream: the offboard setpoints.
-        announce: tells the outside of an occasion, with a detail.
+        announce: tells the outside of an kind, with a detail.
         checks: finds what forbids arming.
     """
 
@@ -66,8 +66,8 @@ class Px4Commander:
             return ACCEPTED
         problem = self._problem()
         if problem is not None and (not force or self._checks.crashed):
-            self._announce(Occasion.ARMING_DENIED, "")
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+            self._announce(EventKind.ARMING_DENIED, "")
+            self._announce(EventKind.PREFLIGHT_FAIL, problem)
             return TEMPORARILY_REJECTED
         state.armed = True
         state.armed_at_us = state.time_us
@@ -76,7 +76,7 @@ class Px4Commander:
         state.home_ned = state.estimate.position_ned
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
-        self._announce(Occasion.ARMED, "")
+        self._announce(EventKind.ARMED, "")
         self._enter(state.mode)
         return ACCEPTED
 
@@ -85,9 +85,9 @@ class Px4Commander:
         if not self._state.armed:
             return ACCEPTED
         if not self._state.landed and not force:
-            self._announce(Occasion.DISARM_DENIED, "")
+            self._announce(EventKind.DISARM_DENIED, "")
             return TEMPORARILY_REJECTED
-        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
+        self._stop_motors(EventKind.DISARMED_BY_COMMAND)
         return ACCEPTED
 
     def request_mode(
@@ -106,7 +106,7 @@ class Px4Commander:
         state = self._state
         if state.armed and not self._can_run(mode):
             asked = struct.pack("<I", custom_mode(mode))
-            self._announce(Occasion.MODE_DENIED, mode.name.capitalize(), asked)
+            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), asked)
             return TEMPORARILY_REJECTED
         self._intend(mode)
         self.failsafe.clear()
@@ -119,13 +119,13 @@ class Px4Commander:
         """Land here, and return a MAV_RESULT; it is told, as a change of mode is not."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
-            self._announce(Occasion.LANDING_COMMANDED, "")
+            self._announce(EventKind.LANDING_COMMANDED, "")
         return result
 
     def take_over(self, mode: Mode) -> None:
         """Let the pilot's sticks change the mode (fault injection)."""
         self.pilot = True
-        self._announce(Occasion.PILOT_TOOK_OVER, "")
+        self._announce(EventKind.PILOT_TOOK_OVER, "")
         self.request_mode(mode)
 
     def heard(self, heartbeat: Message) -> None:
@@ -147,18 +147,18 @@ class Px4Commander:
         """Whether it is armed in OFFBOARD."""
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
-    def tell_problem(self) -> None:
+    def announce_problem(self) -> None:
         """Say what forbids arming now, if anything does."""
         problem = self._problem()
         if problem is not None:
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+            self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
     def step(self, *, crashed: bool) -> None:
         """Run the rules once; called at 20 Hz of vehicle time."""
         state = self._state
         self._checks.crashed = crashed
         if state.armed and crashed:
-            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
+            self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self._problem()
         self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._at_sticks)
         self._watch_sticks()
@@ -168,9 +168,9 @@ class Px4Commander:
                 if state.intended_mode is Mode.TAKEOFF:
                     self._intend(Mode.LOITER)
                 self._enter(Mode.LOITER)
-            occasion = self._auto_disarm.due()
-            if occasion is not None:
-                self._stop_motors(occasion)
+            kind = self._auto_disarm.due()
+            if kind is not None:
+                self._stop_motors(kind)
         self._publish_status()
 
     @property
@@ -190,17 +190,17 @@ class Px4Commander:
         if not flies_itself or self.failsafe.holds_before_acting:
             return
         if self._sticks.override(state.time_us):
-            self._announce(Occasion.PILOT_TOOK_OVER, "")
+            self._announce(EventKind.PILOT_TOOK_OVER, "")
             self.request_mode(Mode.POSCTL)
 
-    def _stop_motors(self, occasion: Occasion) -> None:
+    def _stop_motors(self, kind: EventKind) -> None:
         state = self._state
         state.armed = False
         # Measured: a landing entered from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
         state.intended_mode = state.after_disarming
         self.failsafe.clear()
         self._enter(state.intended_mode)
-        self._announce(occasion, "")
+        self._announce(kind, "")
 
     def _intend(self, mode: Mode) -> None:
         """Note the mode that the user wants.
@@ -208,7 +208,7 @@ class Px4Commander:
         On disarming the last one comes back that may be armed; measured: TAKEOFF does not count.
         """
         self._state.intended_mode = mode
-        if mode not in NEVER_ARMED_IN and mode is not Mode.TAKEOFF:
+        if mode not in NOT_ARMABLE and mode is not Mode.TAKEOFF:
             self._state.after_disarming = mode
 
     def _publish_status(self) -> None:
@@ -238,5 +238,5 @@ class Px4Commander:
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
             packed = struct.pack("<f", altitude)
-            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
+            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
         return self._state.home_ned[2] - altitude

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.occasions import Occasion
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.personality import Personality
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.event_messages import (
@@ -144,15 +144,15 @@ class Announcer:
         self._events = events
         self._text_id = 0
 
-    def __call__(self, occasion: Occasion, detail: str, arguments: bytes = b"") -> None:
+    def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
         """Tell of an occasion.
 
         Args:
-            occasion: what happened.
+            kind: what happened.
             detail: goes where its text has room for it.
             arguments: values of its event that differ from time to time, packed.
         """
-        event = self._personality.events[occasion]
+        event = self._personality.events[kind]
         if event.event_id and self._events is not None:
             self._events.send(
                 event.event_id, event.severity, event.internal, arguments or event.arguments

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.occasions import Occasion
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
@@ -30,9 +30,9 @@ _ACTED = -1
 _COMPANION_MARGIN_US = 1_500_000
 """A lost companion is told of this much after COM_OBC_LOSS_T (measured 6.5 s for 5 s)."""
 _WARNINGS = {
-    BatteryWarning.LOW: Occasion.BATTERY_LOW,
-    BatteryWarning.CRITICAL: Occasion.BATTERY_CRITICAL,
-    BatteryWarning.EMERGENCY: Occasion.BATTERY_EMERGENCY,
+    BatteryWarning.LOW: EventKind.BATTERY_LOW,
+    BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
+    BatteryWarning.EMERGENCY: EventKind.BATTERY_EMERGENCY,
 }
 
 
@@ -58,7 +58,7 @@ class Failsafe:
         stream: OffboardStream,
         announce: Announce,
         enter: EnterMode,
-        stop: Callable[[Occasion], None],
+        stop: Callable[[EventKind], None],
     ) -> None:
         self._state = state
         self._parameters = parameters
@@ -116,7 +116,7 @@ class Failsafe:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
         return self._actions.holds_before_acting
 
-    def _excepted(self, parameter: str) -> bool:
+    def _exempt(self, parameter: str) -> bool:
         """Whether a loss is of no matter in the intended mode."""
         bits = int(self._parameters[parameter])
         mode = self._state.intended_mode
@@ -130,12 +130,12 @@ class Failsafe:
         if pilot:
             self._pilot_lost_us = None
         elif self._pilot:
-            self._announce(Occasion.PILOT_LOST, "")
+            self._announce(EventKind.PILOT_LOST, "")
         self._pilot = pilot
         # A pilot who was not there at arming is not missed until he has been.
         self._pilot_optional = not pilot and (self._pilot_optional or not state.armed)
         expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
-        optional = not expected or self._pilot_optional or self._excepted("COM_RCL_EXCEPT")
+        optional = not expected or self._pilot_optional or self._exempt("COM_RCL_EXCEPT")
         if pilot or not state.armed or (optional and state.intended_mode not in PILOTED):
             return
         if self._pilot_lost_us is None:
@@ -164,7 +164,7 @@ class Failsafe:
         lost = not state.armed and state.mode is Mode.OFFBOARD and not alive
         if lost and not self._warned:
             mode = custom_mode(state.mode).to_bytes(4, "little")
-            self._announce(Occasion.FAILSAFE_WARNING, "", mode)
+            self._announce(EventKind.FAILSAFE_WARNING, "", mode)
         self._warned = lost
 
     def _watch_gcs(self) -> None:
@@ -173,13 +173,13 @@ class Failsafe:
             return
         if self.gcs_alive:
             if self._gcs_lost_us is not None:
-                self._announce(Occasion.GCS_REGAINED, "")
+                self._announce(EventKind.GCS_REGAINED, "")
             self._gcs_lost_us = None
             return
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
-            self._announce(Occasion.GCS_LOST, "")
-        ignored = state.intended_mode is Mode.LAND or self._excepted("COM_DLL_EXCEPT")
+            self._announce(EventKind.GCS_LOST, "")
+        ignored = state.intended_mode is Mode.LAND or self._exempt("COM_DLL_EXCEPT")
         if state.armed and not ignored and self._gcs_lost_us != _ACTED:
             self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
@@ -190,7 +190,7 @@ class Failsafe:
         lost = self._state.time_us - self._companion_us > limit
         if lost != self._companion_lost:
             self._companion_lost = lost
-            self._announce(Occasion.COMPANION_LOST if lost else Occasion.COMPANION_REGAINED, "")
+            self._announce(EventKind.COMPANION_LOST if lost else EventKind.COMPANION_REGAINED, "")
 
     def _watch_position(self) -> None:
         state = self._state

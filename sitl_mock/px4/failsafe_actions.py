@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import Enum
 from typing import NamedTuple, Protocol
 
-from sitl_mock.autopilot.occasions import Occasion
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.px4.modes import NEEDS_POSITION, custom_mode
@@ -70,8 +70,8 @@ _DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 class Announce(Protocol):
     """Tells the outside of what happens."""
 
-    def __call__(self, occasion: Occasion, detail: str, arguments: bytes = b"", /) -> None:
-        """Tell of an occasion, with a detail for its text and the values of its event."""
+    def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
+        """Tell of an kind, with a detail for its text and the values of its event."""
 
 
 class EnterMode(Protocol):
@@ -98,7 +98,7 @@ class FailsafeActions:
         parameters: ParameterTable,
         announce: Announce,
         enter: EnterMode,
-        stop: Callable[[Occasion], None],
+        stop: Callable[[EventKind], None],
     ) -> None:
         self._state = state
         self._parameters = parameters
@@ -138,7 +138,7 @@ class FailsafeActions:
         state.failsafe = True
         mode = action.mode
         if mode is None:
-            self._stop(Occasion.DISARMED_BY_FAILSAFE)
+            self._stop(EventKind.DISARMED_BY_FAILSAFE)
             return
         if state.landed:
             mode = Mode.LOITER  # stays where it stands, and disarms
@@ -150,13 +150,13 @@ class FailsafeActions:
         if then is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
             values = _ENTER_HOLD.pack(intended, then.number, delay, cause.number)
-            self._announce(Occasion.FAILSAFE_HOLD, str(delay), values)
+            self._announce(EventKind.FAILSAFE_HOLD, str(delay), values)
         elif cause.number:
             values = _ENTER.pack(intended, action.number, cause.number)
-            self._announce(Occasion.FAILSAFE, "", values)
+            self._announce(EventKind.FAILSAFE, "", values)
         else:
             values = _ENTER.pack(intended, action.number, 0)
-            self._announce(Occasion.FAILSAFE_UNNAMED, "", values)
+            self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
         """Hold for COM_FAIL_ACT_T, then do what a parameter says."""

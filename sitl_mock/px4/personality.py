@@ -6,12 +6,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
-from sitl_mock.autopilot.occasions import Event, Occasion
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Identity, Parts, Rules
+from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import StreamSchedule
@@ -82,7 +82,7 @@ _GCS_RATES: dict[int, float] = {
 class Px4:
     """The PX4 personality."""
 
-    events: Mapping[Occasion, Event] = PX4_EVENTS
+    events: Mapping[EventKind, Event] = PX4_EVENTS
     boot_mode = Mode.LOITER
     any_component = False
     system_id_parameter = "MAV_SYS_ID"
@@ -118,7 +118,7 @@ class Px4:
         """Return the mode a custom_mode means, None if there is no such mode."""
         return mode_of(custom_mode)
 
-    def rules(self, parts: Parts) -> Rules:
+    def rules(self, parts: VehicleParts) -> Rules:
         """Put PX4's rules together."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)

@@ -51,38 +51,38 @@ def test_what_it_signs_pymavlink_accepts(tmp_path):
 def test_it_admits_each_frame_of_the_right_key_once():
     signing, mav = ours(), signer()
     first, second = packed(mav, 1), packed(mav, 2)
-    assert signing.admits(first)
-    assert signing.admits(second)
-    assert not signing.admits(second)
-    assert not signing.admits(first)
+    assert signing.accepts(first)
+    assert signing.accepts(second)
+    assert not signing.accepts(second)
+    assert not signing.accepts(first)
     assert signing.counts() == {"accepted": 2, "unsigned": 0, "refused": 2}
 
 
 def test_another_key_or_none_is_refused_and_an_old_recording_too():
     signing = ours()
-    assert not signing.admits(packed(signer(bytes(32))))
-    assert not signing.admits(packed(signer(ticks=TICKS - 61 * 100_000)))
+    assert not signing.accepts(packed(signer(bytes(32))))
+    assert not signing.accepts(packed(signer(ticks=TICKS - 61 * 100_000)))
     unsigned = packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
-    assert not signing.admits(unsigned)
+    assert not signing.accepts(unsigned)
     assert signing.counts() == {"accepted": 0, "unsigned": 1, "refused": 2}
 
 
 def test_a_forged_stamp_does_not_silence_the_true_sender():
     signing = ours()
-    assert not signing.admits(packed(signer(bytes(32), ticks=TICKS + 10**9)))
-    assert signing.admits(packed(signer()))
+    assert not signing.accepts(packed(signer(bytes(32), ticks=TICKS + 10**9)))
+    assert signing.accepts(packed(signer()))
 
 
 def test_streams_have_stamps_of_their_own():
     signing = ours()
-    assert signing.admits(packed(signer(ticks=TICKS + 50, link_id=1)))
-    assert signing.admits(packed(signer(ticks=TICKS + 10, link_id=2)))
+    assert signing.accepts(packed(signer(ticks=TICKS + 50, link_id=1)))
+    assert signing.accepts(packed(signer(ticks=TICKS + 10, link_id=2)))
 
 
 def test_unsigned_frames_may_be_asked_for_wrongly_signed_ones_never():
     signing = Signing(KEY, 0, accept_unsigned=True, clock=lambda: NOW)
-    assert signing.admits(packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190)))
-    assert not signing.admits(packed(signer(bytes(32))))
+    assert signing.accepts(packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190)))
+    assert not signing.accepts(packed(signer(bytes(32))))
 
 
 def test_only_what_is_signed_arms_the_vehicle(tmp_path):
@@ -109,7 +109,7 @@ def test_ardupilot_obeys_what_is_unsigned_on_its_first_link_only(tmp_path):
         rig = Rig(boot=False, autopilot="ardupilot", gcs_port=14550, signing=signing)
         unsigned = ARM.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
         [message] = decode(bytes(unsigned))
-        assert [link.signing.admits(message) for link in rig.simulation.links] == obeyed
+        assert [link.signing.accepts(message) for link in rig.simulation.links] == obeyed
 
 
 def test_a_passphrase_that_cannot_be_used_is_one_clear_error(tmp_path):

@@ -2,8 +2,8 @@
 
 import select
 
+from sitl_mock.config.endpoint import SerialLine, TcpIn, parse_endpoint
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
-from sitl_mock.config.wiring import SerialLine, TcpIn, parse_wiring
 from sitl_mock.control_channel import reply
 from sitl_mock.link.endpoint import Endpoint, bundles
 from sitl_mock.link.framing import Message, decode
@@ -19,7 +19,7 @@ Arrived = tuple[bytes, list[Message]]
 """A datagram and the messages in it."""
 
 
-class Wires:
+class Connections:
     """The endpoints with their links, and the faults of the companion's.
 
     Attributes:
@@ -100,7 +100,7 @@ class Wires:
 
 
 def _companion_endpoint(settings: MockSettings) -> Endpoint:
-    match parse_wiring(settings.endpoint):
+    match parse_endpoint(settings.endpoint):
         case TcpIn(host, port):
             return TcpEndpoint(host, port)
         case SerialLine(path):

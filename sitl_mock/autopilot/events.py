@@ -7,7 +7,7 @@ from enum import Enum, auto
 from typing import NamedTuple
 
 
-class Occasion(Enum):
+class EventKind(Enum):
     """Something that an autopilot tells of."""
 
     ARMED = auto()
@@ -55,5 +55,5 @@ class Event(NamedTuple):
     internal: int | None = None
 
 
-Announce = Callable[[Occasion, str], None]
-"""Tells the outside of an occasion, with a detail."""
+Announce = Callable[[EventKind, str], None]
+"""Tells the outside of an kind, with a detail."""

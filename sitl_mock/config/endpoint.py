@@ -28,10 +28,10 @@ class SerialLine:
     path: Path | None
 
 
-Wiring = Udp | TcpIn | SerialLine
+EndpointAddress = Udp | TcpIn | SerialLine
 
 
-def parse_wiring(text: str) -> Wiring:
+def parse_endpoint(text: str) -> EndpointAddress:
     """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
 
     Raises:
@@ -62,7 +62,7 @@ def for_vehicle(text: str, index: int) -> str:
     """Return the endpoint of the vehicle with this index: the next port, a path with its number."""
     if index == 0:
         return text
-    match parse_wiring(text):
+    match parse_endpoint(text):
         case TcpIn(host, port):
             return f"tcpin://{host}:{port + index}"
         case SerialLine(Path() as path):
