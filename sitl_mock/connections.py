@@ -1,4 +1,4 @@
-"""All that one vehicle is connected to: the companion, a ground station, the control channel."""
+"""The connections of one vehicle: companion, ground station, control channel."""
 
 import select
 
@@ -20,13 +20,13 @@ Arrived = tuple[bytes, list[Message]]
 
 
 class Connections:
-    """The endpoints with their links, and the faults of the companion's.
+    """The endpoints and their links, and the faults of the companion link.
 
     Attributes:
         companion: the companion's endpoint.
 
     Args:
-        settings: this vehicle's own.
+        settings: of this vehicle.
         simulation: takes what arrives; its links are emptied.
 
     Raises:
@@ -50,14 +50,14 @@ class Connections:
         self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
 
     def close(self) -> None:
-        """Let go of everything."""
+        """Close all sockets."""
         for endpoint in self._links:
             endpoint.close()
         if self._control is not None:
             self._control.close()
 
     def ready(self, timeout_s: float) -> list[Endpoint]:
-        """Wait, and return the endpoints on which something came; the control channel is served."""
+        """Wait for input, serve the control channel, and return the endpoints with input."""
         by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.readable}
         control = self._control
         asking = [] if control is None else control.readable
@@ -83,7 +83,10 @@ class Connections:
         self.companion.send([self._simulation.companion.sign(beacon)])
 
     def flush(self, beacon: bytes | None = None) -> None:
-        """Send what waits on every link, the companion's through the faults; a beacon last."""
+        """Send the queued frames of every link; the beacon, if any, comes last.
+
+        The faults of the companion link apply to all but the beacon.
+        """
         simulation = self._simulation
         for endpoint, link in self._links.items():
             frames = link.take()

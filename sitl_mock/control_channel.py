@@ -1,11 +1,11 @@
-"""The control channel: JSON requests that ask for faults or for the truth (pure).
+"""The control channel: JSON requests that inject faults or return the true state (pure).
 
 Requests, one object each:
 
 - ``{"fault": {"kind": "drop", "probability": 0.5, "duration_s": 3}}``: any fault of the
-  configuration; without a start condition it begins at once -> ``{"ok": true}``
+  configuration; without a start it begins at once -> ``{"ok": true}``
 - ``{"clear": true}``: end all faults -> ``{"ok": true}``
-- ``{"state": true}``: the truth -> see `truth`
+- ``{"state": true}``: return the true state -> see `truth`
 
 Anything else -> ``{"error": "..."}``.
 """
@@ -22,7 +22,7 @@ _USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
 
 
 def reply(simulation: Simulation, request: bytes) -> bytes:
-    """Carry out one request and return the answer, both JSON."""
+    """Execute one request and return the answer, both JSON."""
     return json.dumps(_answer(simulation, request), allow_nan=False).encode()
 
 
@@ -54,14 +54,14 @@ def _add_fault(simulation: Simulation, fault: dict[str, Any]) -> dict[str, Any]:
 
 
 def truth(simulation: Simulation) -> dict[str, Any]:
-    """Return what is really so: SI, NED (origin: home on the ground), FRD, q body to world.
+    """Return the true state: SI, NED (origin: home on the ground), FRD, q body to world.
 
     Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
-    ``aborted`` (the autopilot's process has ended: nothing moves or answers any more),
+    ``aborted`` (the autopilot's process has ended: it neither flies nor answers),
     ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
-    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
-    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
-    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
+    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (number
+    accepted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or the number
+    of the companion's frames that were ``accepted``, ``unsigned``, ``refused``).
     """
     state, stream = simulation.state, simulation.stream
     now = simulation.vehicle.truth

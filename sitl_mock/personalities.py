@@ -1,4 +1,4 @@
-"""The registry of autopilots: the only place that names the folders of both."""
+"""The registry of autopilots: the only module that imports their folders."""
 
 from collections.abc import Mapping
 

@@ -45,12 +45,12 @@ class MockSettings(VehicleSettings):
 
 
 def _with_ekf(section: dict[str, Any]) -> object:
-    """Return the sensors' settings, with the errors of the autopilot's own navigation filter."""
+    """Return the ``sensors`` section with the navigation filter of this autopilot as default."""
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
     filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    # What a navigation filter tells is smooth, and no older than the attitude.
+    # The output of a navigation filter is smooth, and as recent as the attitude.
     return filled if filled["ekf"] in (None, "none") else {**SMOOTH, **filled}
 
 
@@ -58,11 +58,11 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
     """Read the ``mock:`` section of a YAML file; without a file, the defaults.
 
     Args:
-        path: the file; its other sections are not looked at.
+        path: the file; its other sections are ignored.
         overrides: values of top-level keys (and of ``lockstep``) from the command line.
 
     Raises:
-        ConfigError: the file cannot be read, or says something that cannot be.
+        ConfigError: the file cannot be read, or a key or value is invalid.
     """
     where = "the command line" if path is None else str(path)
     section = {} if path is None else _mock_section(path)

@@ -1,4 +1,4 @@
-"""What the mock's vehicle is made of: typed, frozen, units in the key names.
+"""Airframe, battery and wind of the vehicle. The key names carry the units.
 
 The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; see README.
 """
@@ -20,13 +20,13 @@ AIRFRAMES: dict[str, dict[str, object]] = {
         "thrust_offset_m_s2": 0.22 / 1.2,
     },
 }
-"""What the words that may stand for a whole airframe mean: what differs from the defaults."""
+"""Preset name -> the keys that differ from the defaults."""
 
 
 class AirframeConfig(Section):
-    """Body and rotors of an X quadrotor, and how it meets the ground.
+    """Body and rotors of an X quadrotor, and its limits at touchdown.
 
-    The word `sih` or `unlike-axes` in its place stands for all of it.
+    The preset names `sih` and `unlike-axes` can replace the whole section.
     """
 
     physics_rate_hz: Annotated[int, Field(ge=1000, le=10000)] = 1000
@@ -36,17 +36,17 @@ class AirframeConfig(Section):
     """Principal moments of inertia about body x, y, z."""
     gravity_m_s2: Positive = 9.80665
     drag_n_s_per_m: NonNegative = 1.0
-    """Linear drag against the air: force in N per m/s, equal in all directions."""
+    """Linear drag: force in N per m/s of airspeed, equal in all directions."""
     quadratic_drag_n_s2_per_m2: NonNegative = 0.0
-    """The same with the square of the airspeed: force in N per (m/s)^2."""
+    """Quadratic drag: force in N per (m/s)^2 of airspeed."""
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""
     thrust_slope_m_s2: Positive = 19.55
-    """Specific thrust (T/m) gained from throttle 0 to 1, on the linear part."""
+    """Slope of the linear part: specific thrust (T/m) per throttle."""
     thrust_offset_m_s2: NonNegative = 0.22
-    """Specific thrust the linear part would have at throttle 0."""
+    """Specific thrust of the linear part, extrapolated to throttle 0."""
     thrust_linear_from: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.15
-    """Throttle from which the thrust is linear; below, a straight line through 0."""
+    """Above this throttle the thrust is linear; below it, a straight line through 0."""
     rotor_lag_ms: Positive = 50.0
     """Time constant of each rotor's thrust (first order)."""
     rotor_arm_m: Positive = 0.2
@@ -54,11 +54,11 @@ class AirframeConfig(Section):
     rotor_drag_ratio_m: Positive = 0.02
     """Reaction torque about body z per thrust of a rotor, N m per N."""
     crash_tilt_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 45.0
-    """Touching the ground at more tilt than this tips the vehicle over."""
+    """A touchdown at more tilt than this is a crash."""
     crash_speed_m_s: Positive = 5.0
-    """Touching the ground faster than this (down) breaks the vehicle."""
+    """A touchdown at more sink speed than this is a crash."""
     ground_levelling_ms: Positive = 50.0
-    """Time constant with which the landing gear levels the standing vehicle."""
+    """Time constant with which the vehicle levels on the ground."""
 
     @model_validator(mode="before")
     @classmethod
@@ -67,11 +67,11 @@ class AirframeConfig(Section):
 
 
 class WindConfig(Section):
-    """Wind: a steady mean, and gusts as first-order coloured noise about it."""
+    """Wind: a steady mean plus gusts (first-order coloured noise)."""
 
     speed_m_s: NonNegative = 0.0
     from_deg: Finite = 0.0
-    """Direction the mean wind blows from, clockwise from north."""
+    """Direction from which the mean wind blows, clockwise from north."""
     gust_m_s: NonNegative = 0.0
     """Standard deviation of each horizontal gust component."""
     vertical_gust_m_s: NonNegative = 0.0
@@ -81,7 +81,7 @@ class WindConfig(Section):
 
 
 class BatteryConfig(Section):
-    """A lithium-polymer pack whose voltage, and with it the thrust, sags."""
+    """A lithium-polymer battery whose voltage sags; the thrust falls with it."""
 
     cells: Annotated[int, Field(ge=1, le=14)] = 4
     capacity_ah: Positive = 5.0
@@ -90,12 +90,12 @@ class BatteryConfig(Section):
     full_cell_v: Positive = 4.2
     """Open-circuit voltage of a full cell."""
     empty_cell_v: Positive = 3.6
-    """Open-circuit voltage of an empty cell; linear in the charge between."""
+    """Open-circuit voltage of an empty cell; it is linear in the charge."""
     resistance_ohm: NonNegative = 0.005
     """Internal resistance of the pack."""
     idle_current_a: NonNegative = 0.5
-    """Drawn by the electronics, always."""
+    """Current of the electronics."""
     hover_current_a: NonNegative = 10.0
-    """Drawn by the rotors in a hover; grows with thrust to the power 1.5."""
+    """Current of the rotors in a hover; it grows with thrust to the power 1.5."""
     thrust_exponent: NonNegative = 2.0
-    """Thrust goes with (voltage / voltage of the full pack in a hover) to this power."""
+    """Thrust grows with (voltage / voltage of the full battery in a hover) to this power."""

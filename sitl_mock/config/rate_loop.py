@@ -9,15 +9,15 @@ from sitl_mock.config.section import Finite, NonNegative, Positive, Section, pre
 
 
 class AxisShaping(Section):
-    """How one axis shapes its rate setpoint before the controller sees it (ArduPilot)."""
+    """Shaping of one axis's rate setpoint before the controller (ArduPilot)."""
 
     acceleration_limit_rad_s2: Positive
-    """The shaped rate changes no faster."""
+    """Limit on the change of the shaped rate."""
     attitude_gain_1_s: NonNegative = 4.5
-    """Body rate per angle from the attitude to the attitude target, for small angles; larger ones
-    are closed as half the acceleration limit allows."""
+    """Body rate per angle between attitude and attitude target, for small angles. Larger angles
+    close at the rate that half the acceleration limit can stop."""
     delay_ms: NonNegative = 0.0
-    """From a rate setpoint's arrival to the shaping, which turns the attitude target."""
+    """Delay from the arrival of a rate setpoint to its shaping."""
 
 
 class AxisGains(Section):
@@ -32,17 +32,17 @@ class AxisGains(Section):
     damping_n_m_s2: NonNegative = 0.0
     """Torque against the angular acceleration, N m per rad/s^2 (PX4's D term)."""
     integral_limit_n_m: NonNegative = 0.3
-    """Largest torque the integral may hold."""
+    """Limit on the torque of the integral."""
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
     setpoint_delay_ms: NonNegative = 7.0
-    """From a rate setpoint's arrival (or its shaping) to the controller using it."""
+    """Delay from the arrival of a rate setpoint, or from its shaping, to the controller."""
     shaping: AxisShaping | None = None
-    """Before the controller: none, or for all three axes."""
+    """Shaping before the controller; give it for all three axes or for none."""
 
 
-# Poles at wn 19.1 rad/s, zeta 0.70 (with the 50 ms rotor lag; fits the measured response together
-# with its overshoot), and a slow one at 0.5 1/s that the feed-forward cancels.
+# With the 50 ms rotor lag: poles at wn 19.1 rad/s, zeta 0.70, which fit the measured response and
+# its overshoot, and a slow pole at 0.5 1/s, which the feed-forward cancels.
 TILT_GAINS = AxisGains(
     proportional_n_m_s=0.448,
     integral_n_m=0.228,
@@ -50,20 +50,18 @@ TILT_GAINS = AxisGains(
     damping_n_m_s2=0.0078,
 )
 
-
-# The low pass and the rotor lag make the slow response. Without an integral the yaw rate stays
-# 8 % short, as measured.
+# The low pass and the rotor lag make the response slow. There is no integral, so the yaw rate
+# stays 8 % below the setpoint, as measured.
 YAW_GAINS = AxisGains(
     proportional_n_m_s=0.064,
     feed_forward_n_m_s=0.0179,
     torque_filter_ms=75.0,
 )
 
-
 # Fitted to ATTITUDE_TARGET and the body's attitude, recorded at 200 Hz: poles at wn 94 rad/s, zeta
-# 1.4 (tilt) and 9.4, 0.87 (yaw). All but 6 ms of the delay lies behind the attitude target, so the
-# body lags it, in yaw by up to 7 degrees. The negative feed-forward makes the rates fall short by
-# what the attitude gain adds while the body lags.
+# 1.4 (tilt) and 9.4, 0.87 (yaw). Only 6 ms of the delay lie before the attitude target, so the body
+# lags the target, in yaw by up to 7 degrees. The negative feed-forward offsets the body rates that
+# the attitude gain adds during this lag.
 ARDUPILOT_TILT_GAINS = AxisGains(
     proportional_n_m_s=11.0,
     feed_forward_n_m_s=-0.9,
@@ -71,8 +69,6 @@ ARDUPILOT_TILT_GAINS = AxisGains(
     setpoint_delay_ms=0.0,
     shaping=AxisShaping(acceleration_limit_rad_s2=radians(1100.0), delay_ms=6.0),
 )
-
-
 ARDUPILOT_YAW_GAINS = AxisGains(
     proportional_n_m_s=0.146,
     feed_forward_n_m_s=-0.032,
@@ -80,7 +76,6 @@ ARDUPILOT_YAW_GAINS = AxisGains(
     setpoint_delay_ms=4.0,
     shaping=AxisShaping(acceleration_limit_rad_s2=radians(270.0), delay_ms=6.0),
 )
-
 
 RATE_LOOPS = {
     "px4": {"roll": TILT_GAINS, "pitch": TILT_GAINS, "yaw": YAW_GAINS},
@@ -90,13 +85,13 @@ RATE_LOOPS = {
         "yaw": ARDUPILOT_YAW_GAINS,
     },
 }
-"""What the words that may stand for a whole rate loop mean."""
+"""Preset name -> gains of all axes."""
 
 
 class RateLoopConfig(Section):
-    """The autopilot's body-rate controller, tuned to PX4's measured responses.
+    """The autopilot's body-rate controller; the defaults reproduce PX4's measured responses.
 
-    The word `px4` or `ardupilot` in its place stands for all of it.
+    The preset names `px4` and `ardupilot` can replace the whole section.
     """
 
     roll: AxisGains = TILT_GAINS
@@ -105,13 +100,13 @@ class RateLoopConfig(Section):
 
     @property
     def shaping(self) -> tuple[AxisShaping, AxisShaping, AxisShaping] | None:
-        """How roll, pitch and yaw setpoints are shaped before the controller, if they are."""
+        """Shaping of roll, pitch and yaw setpoints, None if they are not shaped."""
         roll, pitch, yaw = self.roll.shaping, self.pitch.shaping, self.yaw.shaping
         return (roll, pitch, yaw) if roll and pitch and yaw else None
 
     @classmethod
     def ardupilot(cls) -> Self:
-        """Tuned to ArduPilot's measured responses, on the default airframe."""
+        """Return gains that reproduce ArduPilot's measured responses on the default airframe."""
         return cls(**RATE_LOOPS["ardupilot"])
 
     @model_validator(mode="before")
@@ -123,5 +118,5 @@ class RateLoopConfig(Section):
     def _shaped_whole(self) -> Self:
         shaped = [axis.shaping is not None for axis in (self.roll, self.pitch, self.yaw)]
         if any(shaped) and not all(shaped):
-            raise ValueError("shaping must be given for all three axes or for none")
+            raise ValueError("give shaping for all three axes or for none")
         return self

@@ -1,4 +1,4 @@
-"""What every section of the configuration has in common, and its errors in one sentence."""
+"""Base class and number types of every configuration section, and its error messages."""
 
 import difflib
 import typing
@@ -14,16 +14,21 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Section(BaseModel):
-    """Base of every configuration section: unknown keys are refused, values never change."""
+    """Base of every configuration section: unknown keys are errors, values are constant."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def preset(words: Mapping[str, object], value: object, what: str) -> object:
-    """Return what a word stands for, and anything else as it is.
+    """Return the preset that a word names; return anything but a word as it is.
+
+    Args:
+        words: preset by word.
+        value: from the configuration.
+        what: the presets in the plural, for the message.
 
     Raises:
-        ValueError: the word is not known.
+        ValueError: no preset has this name.
     """
     if not isinstance(value, str):
         return value
@@ -33,7 +38,7 @@ def preset(words: Mapping[str, object], value: object, what: str) -> object:
 
 
 _LISTED = 20
-"""Lists of known words longer than this are not shown."""
+"""A message shows the list of known words up to this length."""
 
 
 class ConfigError(Exception):
@@ -50,7 +55,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """Return the first problem of a validation as one sentence."""
+    """Return the first validation error as one sentence: key, problem, value given."""
     detail = error.errors()[0]
     path = [str(part) for part in detail["loc"]]
     where = ".".join(["mock", *path])
@@ -65,9 +70,9 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:
-    """Return the model that a path of keys leads to, None if none does.
+    """Return the model at a path of keys, None if there is none.
 
-    Positions in lists lead nowhere new; in a union, the path names the member's ``kind``.
+    Positions in lists are skipped. In a union, the path names the member's ``kind``.
     """
     candidates = [model]
     for key in path:
@@ -85,7 +90,7 @@ def _kinds(model: type[BaseModel]) -> tuple[str, ...]:
 
 
 def _models_of(annotation: Any) -> Iterable[type[BaseModel]]:
-    """Yield the models that a type hint mentions."""
+    """Yield the models named in a type hint."""
     arguments = typing.get_args(annotation)
     if arguments:
         for argument in arguments:

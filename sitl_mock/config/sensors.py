@@ -7,64 +7,63 @@ from pydantic import Field, field_validator
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
 
 Gains = tuple[NonNegative, NonNegative]
-"""Of a state: per position innovation, and per velocity innovation."""
+"""Gains of one state: per position innovation, per velocity innovation."""
 
 
 class EkfConfig(Section):
-    """Errors of the navigation filter: what drives them, and how it holds them down.
+    """Errors of the navigation filter, and the gains with which satellite fixes correct them.
 
-    The filter integrates an acceleration that is off by its attitude's error, and corrects itself
-    by satellite fixes, some time later. Standard deviations; the defaults are PX4's.
+    The filter integrates an acceleration that is wrong because its attitude is wrong. Delayed
+    satellite fixes correct it. Noise is given as standard deviation; the defaults are PX4's.
     """
 
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Age of the motion that the filter corrects itself by."""
+    """Age of the motion at the filter's fusion time."""
     position_late_ms: Finite = 0.0
-    """A fix's position is older than the filter believes by this."""
+    """Unmodelled delay of a fix's position."""
     velocity_late_ms: Finite = 0.0
-    """The same of its velocity."""
+    """Unmodelled delay of a fix's velocity."""
     position_noise_m: NonNegative = 0.0246
-    """Of a fix's horizontal position."""
+    """Noise of a fix's horizontal position."""
     velocity_noise_m_s: NonNegative = 0.0238
-    """Of a fix's horizontal velocity."""
+    """Noise of a fix's horizontal velocity."""
     noise_time_s: Positive = 0.25
-    """Correlation time of both."""
+    """Correlation time of the noise of position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
-    """By this the attitude's roll and pitch wander within a second; the fixes hold them down."""
+    """Random walk of roll and pitch within one second; the fixes limit it."""
     yaw_error_deg: NonNegative = 0.3
-    """Of the heading; it rotates the acceleration that is integrated."""
+    """Error of the heading; it rotates the integrated acceleration."""
     yaw_time_s: Positive = 15.0
-    """Correlation time of the heading's error, and that with which a turn changes it."""
+    """Correlation time of the heading error, and time constant with which a turn changes it."""
     turn_yaw_ms: Finite = -4.0
-    """In a turn the heading is learned wrongly, from fixes that are late: by minus the course's
-    turn rate times this."""
+    """Heading error in a turn, from delayed fixes: minus this times the turn rate of the course."""
     acceleration_lead_ms: Finite = 0.0
-    """The acceleration that is integrated leads the true one by this."""
+    """Lead of the integrated acceleration over the true one."""
     acceleration_scale: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
-    """It is larger than the true one by this share."""
+    """Scale error of the integrated acceleration."""
     vertical_share: NonNegative = 0.3
-    """Noise of the vertical direction, per noise of a horizontal one."""
+    """Ratio of vertical to horizontal noise."""
     height_offset_m: Finite = 0.0
-    """The estimated height is lower than the true one by this."""
+    """Constant error of the height: true minus estimated."""
     height_sag_s4_per_m: Finite = 0.0024
-    """And by this times the square of the horizontal acceleration, some seconds later."""
+    """Error of the height per squared horizontal acceleration; it lags by seconds."""
     position_gains: Gains = (0.0774, 0.0494)
-    """Of the position, m per m and m per m/s."""
+    """Gains of the position, m per m and m per m/s."""
     velocity_gains: Gains = (0.0316, 0.0411)
-    """Of the velocity, m/s per m and m/s per m/s."""
+    """Gains of the velocity, m/s per m and m/s per m/s."""
     acceleration_gains: Gains = (0.0056, 0.0102)
-    """Of the acceleration's error, m/s^2 per m and m/s^2 per m/s."""
+    """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
     predictor_ms: Positive = 250.0
-    """Time constant with which a correction reaches the output."""
+    """Time constant of the output predictor: a correction reaches the output with it."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
     "none": None,
     "px4": EkfConfig(),
-    # Gains, lateness and lead fit circles of 2, 5 and 8 m/s and a figure-eight of 5 m/s within
-    # 1.4 ms (root mean square of position and velocity errors per speed, complex).
+    # Fitted to circles at 2, 5 and 8 m/s and a figure-eight at 5 m/s. The position and velocity
+    # errors per speed agree within 1.4 ms (root mean square).
     "ardupilot": EkfConfig(
         fix_period_ms=200.0,
         fix_delay_ms=220.0,
@@ -84,14 +83,14 @@ EKFS: dict[str, EkfConfig | None] = {
         acceleration_gains=(0.0057, 0.0433),
     ),
 }
-"""What the words that may stand for a whole navigation filter mean."""
+"""Preset name -> navigation filter."""
 
 
 class SensorConfig(Section):
-    """Errors of what the autopilot believes: white noise (standard deviations) and delays."""
+    """Errors of the autopilot's estimate: white noise (standard deviations) and delays."""
 
     ekf: EkfConfig | None = None
-    """Errors of the navigation filter, added to the rest: px4, ardupilot, none, or keys."""
+    """Errors of the navigation filter, in addition: px4, ardupilot, none, or keys of its own."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01

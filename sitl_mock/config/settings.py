@@ -1,4 +1,4 @@
-"""All keys of the ``mock:`` section."""
+"""All keys of the ``mock:`` section, apart from the checks that depend on the autopilot."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -13,14 +13,14 @@ from sitl_mock.config.section import Finite, NonNegative, Positive, Section
 from sitl_mock.config.sensors import SensorConfig
 
 PORT_OFFSET = 40
-"""The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
+"""The vehicle binds ``port`` plus this for the companion link, as PX4's simulation does."""
 GCS_PORT_OFFSET = 4020
-"""The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
+"""The vehicle binds ``gcs_port`` plus this for the ground station link (18570 for 14550)."""
 Port = Annotated[int, Field(ge=0, le=65535)]
 
 
 class HomeConfig(Section):
-    """Where the vehicle stands at boot."""
+    """Position and heading at boot."""
 
     latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
@@ -30,57 +30,57 @@ class HomeConfig(Section):
 
 
 class LockstepConfig(Section):
-    """The vehicle waits for an answer to each step."""
+    """Lockstep: the vehicle waits for an answer to each step."""
 
     enabled: bool = False
     period_ms: Annotated[int, Field(ge=1, le=100)] = 4
     bundle: bool = True
-    """Send the frames of a step in one datagram (PX4 sends one each); the beacon stays alone."""
+    """Send the frames of a step in one datagram, as PX4 does not. The beacon is separate."""
     patience_s: Positive = 2.0
-    """Wall time without an answer after which the vehicle runs on in paced time."""
+    """After this wall time without an answer the vehicle continues in real time."""
 
 
 class SigningConfig(Section):
-    """MAVLink 2 signing, on every link of the vehicle."""
+    """MAVLink 2 signing on every link of the vehicle."""
 
     passphrase_file: Path
-    """Its first line is the passphrase; the key is its SHA-256, as ground stations make it."""
+    """The first line is the passphrase. The key is its SHA-256, as in ground stations."""
     accept_unsigned: bool | None = None
-    """Obey frames without a signature, too; wrongly signed ones never. Null: as the autopilot does,
-    ArduPilot on the companion's link (its SERIAL0), PX4 on none."""
+    """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
+    autopilot does. ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link."""
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
-    """Of the companion's link in our signatures; the ground station's has the next."""
+    """Link id of the companion link in signatures; the ground station link has the next."""
 
 
 class VehicleSettings(Section):
     """Every key of one vehicle, with the defaults that do not depend on the autopilot."""
 
     autopilot: Literal["px4", "ardupilot"] = "px4"
-    """Whose rules it follows; each brings the errors of its navigation filter along, ArduPilot's
-    its own airframe, battery and rate loop, too."""
+    """The autopilot simulated. It sets the default of ``sensors.ekf``; ArduPilot also sets those of
+    airframe, battery and rate loop."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
-    """The companion's wire: udp (by ``port``), tcpin://HOST:PORT (for one client, and nothing boots
-    before it is there) or serial:///PATH (a pseudo-terminal, PATH a link to it)."""
+    """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
+    client connects; serial:///PATH, a pseudo-terminal with a symbolic link at PATH."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
     """0 = no ground station link."""
     control_port: Port = 0
     """JSON control channel on 127.0.0.1; 0 = none."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
-    """Vehicle seconds per wall second, when not in lockstep."""
+    """Vehicle seconds per wall second; lockstep ignores it."""
     inner_loop_hz: Literal[250, 800] = 250
-    """Sets which telemetry rates PX4 achieves; ArduPilot has SCHED_LOOP_RATE for it."""
+    """Limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE instead."""
     exact_rates: bool | None = None
-    """Never skip a slot at the full rate, as PX4's loop does; null: only in lockstep."""
+    """Send at every slot; PX4's loop skips some at the full rate. Null: only in lockstep."""
     burst_ms: NonNegative = 0.0
-    """In paced time the vehicle lives in bursts, one in this vehicle time, as ArduPilot's simulator
-    does, whose default is 5.6; 0 = it does not."""
+    """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
+    simulator does (its default is 5.6); 0 = no bursts."""
     prearm_delay_s: NonNegative = 4.5
-    """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""
+    """Arming is refused before this time. Measured: PX4 4.3 to 6.5 s; ArduPilot 41.6 s."""
     lockstep: LockstepConfig = LockstepConfig()
     signing: SigningConfig | None = None
-    """None: nothing is signed, and signatures are not looked at."""
+    """Null: frames are not signed, and signatures are not checked."""
     home: HomeConfig = HomeConfig()
     parameters: dict[str, Finite] = Field(default_factory=dict)
     """Autopilot parameters that differ from their defaults."""
@@ -98,7 +98,7 @@ class VehicleSettings(Section):
         return endpoint
 
     def for_vehicle(self, index: int) -> Self:
-        """Return the settings of the vehicle with this index: its own ports and its own luck."""
+        """Return the settings of the vehicle with this index: its own ports and its own seed."""
         return self.model_copy(
             update={
                 "port": self.port + index,

@@ -1,4 +1,4 @@
-"""One MAVLink link of the vehicle: its streams, what was heard on it, what waits to be sent."""
+"""One MAVLink link of the vehicle: telemetry streams, signing, queue of outgoing frames."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -8,30 +8,30 @@ from sitl_mock.link.signing import Signing
 
 
 class StreamSchedule(Protocol):
-    """The streams of one link."""
+    """Decides when each telemetry message of a link is due; each autopilot has its own rules."""
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
-        """Ask for a message every ``interval_us``; 0 = the rate at boot, negative = never.
+        """Set the interval of a message; 0 = the rate at boot, negative = never.
 
         Returns:
-            why it is refused, in words; None: it is not.
+            the reason for a refusal, None if accepted.
         """
 
     def interval(self, message_id: int) -> int:
-        """Return the interval in us that is set for a message, -1 if it is not streamed."""
+        """Return the interval of a message in us, -1 if it is not streamed."""
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
-        """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent."""
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
 
 
 class Link:
-    """One link. The server empties ``outbox`` and owns the socket; here are only frames.
+    """One link, without its socket: `Connections` sends the frames in ``outbox``.
 
     Args:
         name: for logs and faults, e.g. ``companion`` or ``gcs``.
-        framer: packs this link's frames.
-        streams: this link's telemetry.
-        signing: signs and judges this link's frames; None = nothing is signed or asked to be.
+        framer: packs frames.
+        streams: schedules telemetry.
+        signing: signs and verifies frames; None = no signing.
     """
 
     def __init__(
@@ -53,18 +53,18 @@ class Link:
         self.outbox.append(self._framer.frame(message))
 
     def send_raw(self, message_id: int, crc_extra: int, payload: bytes) -> None:
-        """Queue a message that the dialect module lacks, by its wire payload."""
+        """Queue a message that the dialect lacks, given as its payload."""
         self.outbox.append(self._framer.frame_raw(message_id, crc_extra, payload))
 
     def take(self) -> list[bytes]:
-        """Return the frames that wait, in order, signed as they leave, and forget them."""
+        """Return the queued frames in order, signed, and clear the queue."""
         frames, self.outbox = self.outbox, []
         return [self.sign(frame) for frame in frames]
 
     def sign(self, frame: bytes) -> bytes:
-        """Return a frame as it leaves on this link."""
+        """Return the frame, signed if this link signs."""
         return frame if self.signing is None else self.signing.sign(frame)
 
     def accepts(self, message: Message) -> bool:
-        """Whether a message that arrived here may be obeyed."""
+        """Whether the signature policy of this link accepts a received message."""
         return self.signing is None or self.signing.accepts(message)

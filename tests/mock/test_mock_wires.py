@@ -133,7 +133,7 @@ def test_a_link_that_cannot_be_made_is_one_clear_error(tmp_path):
 
 @pytest.mark.parametrize("bad", ["tcp://127.0.0.1:1", "tcpin://h", "tcpin://h:70000", "serial://a"])
 def test_an_endpoint_that_is_none_is_one_clear_error(bad):
-    with pytest.raises(ConfigError, match=r"mock\.endpoint: this is no endpoint: write udp"):
+    with pytest.raises(ConfigError, match=r"mock\.endpoint: not an endpoint; write udp"):
         load_settings(None, {"endpoint": bad})
 
 
