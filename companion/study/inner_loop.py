@@ -98,7 +98,7 @@ class InnerLoop:
             raise ValueError(f"seconds must hold one sample at least, not {seconds}")
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust(q))
-        setpoints = self._held_back(multirotor.throttle(_thrust(q)))
+        setpoints = self._awaiting_mode(multirotor.throttle(_thrust(q)))
         attitudes, turning, commanded, saturated = [q], [multirotor.body_rates], [], []
         for _ in range(samples):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
@@ -158,7 +158,7 @@ class InnerLoop:
             )
         return steps
 
-    def _held_back(self, throttle: float) -> deque[tuple[BodyRates, float]]:
+    def _awaiting_mode(self, throttle: float) -> deque[tuple[BodyRates, float]]:
         """The setpoints under way, newest last: at the start no rates and this throttle."""
         length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)

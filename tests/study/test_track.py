@@ -19,10 +19,10 @@ from companion import demo
 from companion.attitude import PLANNER_NAMES
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
-from companion.study.track import fleet, flight, study
+from companion.study.track import flights, study
 from companion.study.track.findings import find
-from companion.study.track.flight import Off, Tracked
-from companion.study.track.task import WINDY, Course, Task, tasks
+from companion.study.track.flights import PositionError, Tracked
+from companion.study.track.tasks import WINDY, Course, Task, tasks
 
 OURS = "model-following"
 BRIEF = Course("figure-eight", 4.0, 1.0)
@@ -33,7 +33,7 @@ TASKS = (Task(BRIEF, OURS), Task(BRIEF, OURS, lead=False), Task(BRIEF, OURS, win
 def flown():
     """Three flights, side by side; and what was ticked."""
     ticked = []
-    return fleet.fly_all(TASKS, ticked.append), ticked
+    return flights.fly_all(TASKS, ticked.append), ticked
 
 
 @pytest.fixture
@@ -55,10 +55,10 @@ def vehicle(tmp_path, monkeypatch):
 def test_a_trajectory_is_followed_closely_only_if_led(flown):
     led, not_led, windy = (flown[0][task] for task in TASKS)
     assert led.ok
-    assert led.told.rms < 0.04
-    assert led.told.rms < led.told.largest < 0.1
-    assert not_led.told.rms > 3.0 * led.told.rms
-    assert 2.0 * led.told.rms < windy.told.rms < 0.15
+    assert led.telemetry.rms < 0.04
+    assert led.telemetry.rms < led.telemetry.largest < 0.1
+    assert not_led.telemetry.rms > 3.0 * led.telemetry.rms
+    assert 2.0 * led.telemetry.rms < windy.telemetry.rms < 0.15
 
 
 @pytest.mark.slow
@@ -76,9 +76,9 @@ def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
     """Told without noise and without delay, the two are one."""
     names = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
     vehicle(sensors={**dict.fromkeys(names, 0.0), "position_delay_ms": 0.0, "ekf": "none"})
-    tracked = flight.fly(TASKS[0])
-    assert tracked.told.rms == pytest.approx(tracked.true.rms, abs=2e-3)
-    assert tracked.true.rms < 0.03
+    tracked = flights.fly(TASKS[0])
+    assert tracked.telemetry.rms == pytest.approx(tracked.truth.rms, abs=2e-3)
+    assert tracked.truth.rms < 0.03
 
 
 @pytest.mark.slow
@@ -92,18 +92,18 @@ def test_each_flight_is_told_as_it_begins(flown):
 
 @pytest.mark.slow
 def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
-    alone, company = flight.fly(TASKS[0]), flown[0][TASKS[0]]
-    assert (alone.told, alone.true) == (company.told, company.true)
+    alone, company = flights.fly(TASKS[0]), flown[0][TASKS[0]]
+    assert (alone.telemetry, alone.truth) == (company.telemetry, company.truth)
     assert np.array_equal(alone.path, company.path)
 
 
 @pytest.mark.slow
 def test_a_flight_that_fails_has_no_error_to_show(vehicle):
     vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 2.5}])
-    tracked = flight.fly(TASKS[0])
+    tracked = flights.fly(TASKS[0])
     assert not tracked.ok
     assert tracked.result
-    assert (tracked.told, tracked.true) == (Off(inf, inf), Off(inf, inf))
+    assert (tracked.telemetry, tracked.truth) == (PositionError(inf, inf), PositionError(inf, inf))
 
 
 def test_what_cannot_be_flown_ends_the_study_before_more_is_begun():
@@ -111,23 +111,24 @@ def test_what_cannot_be_flown_ends_the_study_before_more_is_begun():
     too_fast = [Task(Course("circle", 50.0, 1.0), planner) for planner in PLANNER_NAMES]
     many = [task._replace(wind=wind) for task in too_fast for wind in range(9)]
     with pytest.raises(ConfigError, match=r"limits\.max_tilt_rate_deg_s allows 250"):
-        fleet.fly_all(many, ticked.append)
+        flights.fly_all(many, ticked.append)
     assert len(ticked) <= len(os.sched_getaffinity(0))
 
 
 def made_up(**others):
     """Flights of the whole study that were not flown; `others` are errors of ours, by text."""
     rank = {planner: n for n, planner in enumerate(PLANNER_NAMES)}
-    flights = {}
+    flown = {}
     for task in tasks():
         rms = 1e-3 * (20.0 + rank[task.planner] + task.course.speed) + 0.01 * task.wind
         if task.planner == OURS:
             rms *= 0.5 if task.lead else 5.0
         rms = others.get(str(task), rms)
         path = np.linspace((0.0, 0.0, 0.0, 0.1), (1.0, 2.0, 1.1, 2.1), 50)
-        off = Off(rms, 2.0 * rms)
-        flights[task] = Tracked("ok" if rms < inf else "lost", off, Off(0.9 * rms, 1.8 * rms), path)
-    return flights
+        telemetry = PositionError(rms, 2.0 * rms)
+        truth = PositionError(0.9 * rms, 1.8 * rms)
+        flown[task] = Tracked("ok" if rms < inf else "lost", telemetry, truth, path)
+    return flown
 
 
 def studied(monkeypatch, capsys, out, *options, **others):
@@ -198,7 +199,7 @@ def test_the_findings_follow_from_the_numbers():
     assert not verdicts(**{windy: 0.13})[-1]
     beaten = find(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
     assert "circle, 3 m/s: 23.3 mm, first-order 23.0 mm" in beaten
-    assert "on 6 of 7 courses, farther off than the best on 1" in beaten
+    assert "on 6 of 7 courses, larger than the best on 1" in beaten
 
 
 def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, capsys):
@@ -225,8 +226,8 @@ def test_json_goes_with_this_study_alone(tmp_path, capsys):
 SHORT = """
 import sys
 from companion.cli.main import main
-from companion.study.track import study, task
-arcs = [task.Task(task.Course(task.CIRCLE, 2.0, 0.1), name) for name in task.PLANNER_NAMES]
+from companion.study.track import study, tasks
+arcs = [tasks.Task(tasks.Course(tasks.CIRCLE, 2.0, 0.1), name) for name in tasks.PLANNER_NAMES]
 study.tasks = lambda: arcs
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.study.drawing import draw, new_figure
 from companion.study.methods import EXACT, FOLLOWING, PAPERS, PROPOSED, REFERENCE, Line
-from companion.study.track.fleet import Flown
-from companion.study.track.task import (
+from companion.study.track.flights import Flown
+from companion.study.track.tasks import (
     CALM,
     CIRCLES,
     EIGHTS,
@@ -23,10 +23,10 @@ from companion.study.track.task import (
 )
 
 CAPTION = (
-    "Circles on the left, figure-eights on the right. First row: where the vehicle really was at"
-    " the highest speed, in still air, by model-following. Second row: error of every planner in"
-    " still air by telemetry. Third row: of the same flights, by where the vehicle really was."
-    " Last row: led and not led, in still air (solid) and in wind (dotted)."
+    "Circles on the left, figure-eights on the right. First row: true path at the highest speed in"
+    " still air, with model-following. Second row: error of every planner in still air by"
+    " telemetry. Third row: true error of the same flights. Last row: with lead (led) and without"
+    " (not led), in still air (solid) and in wind (dotted)."
 )
 
 _METHODS = (*PAPERS, EXACT, FOLLOWING)
@@ -35,28 +35,28 @@ _STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewid
 _IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
 _ROUND_MM = (10, 20, 50, 100, 200, 500, 1000)
 _MARKERS = ("o", "s")
-"""Of the guidances, in their order."""
+"""For each of `GUIDANCES`."""
 
 
 def draw_figure(flown: Flown) -> Figure:
-    """All panels, as `CAPTION` tells them."""
-    told = {task: 1e3 * tracked.told.rms for task, tracked in flown.items()}
-    true = {task: 1e3 * tracked.true.rms for task, tracked in flown.items()}
+    """All panels, as `CAPTION` describes them."""
+    telemetry = {task: 1e3 * tracked.telemetry.rms for task, tracked in flown.items()}
+    truth = {task: 1e3 * tracked.truth.rms for task, tracked in flown.items()}
     figure, panels = new_figure(4, 2)
     for column, courses in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
         _draw_paths(column[0], flown, courses[-1])
-        _draw_planners(column[1], told, courses)
+        _draw_planners(column[1], telemetry, courses)
         column[1].set_title("All planners in still air, by telemetry")
-        _draw_planners(column[2], true, courses)
+        _draw_planners(column[2], truth, courses)
         column[2].set_title("All planners in still air, by the truth")
-        _draw_lead_and_wind(column[3], told, courses)
+        _draw_lead_and_wind(column[3], telemetry, courses)
     for row in (0, 1, 3):
         panels[row, 0].legend()
     return figure
 
 
 def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
-    """The way that was asked for, flown, and flown without lead; the fastest of its kind."""
+    """The reference path, and the paths flown with and without lead."""
     led = flown[Task(course, MODEL_FOLLOWING)]
     not_led = flown[Task(course, MODEL_FOLLOWING, lead=False)]
     draw(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
@@ -78,7 +78,7 @@ def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Cour
 
 
 def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
-    """Error (mm) over speed, led and not led, in still air and in wind."""
+    """Error (mm) over speed, with and without lead, in still air and in wind."""
     for wind, look in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
         where = f", wind of {wind:g} m/s" if wind else ""
         for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):

@@ -1,4 +1,4 @@
-"""What the numbers of the study bear out, and what they do not."""
+"""What the numbers of the study say of the statements on its page."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -6,9 +6,8 @@ from math import isfinite
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.outcome import Finding
-from companion.study.track.fleet import Flown
-from companion.study.track.flight import Tracked
-from companion.study.track.task import (
+from companion.study.track.flights import Flown, Tracked
+from companion.study.track.tasks import (
     CALM,
     CIRCLE_AT_5,
     COURSES,
@@ -19,17 +18,17 @@ from companion.study.track.task import (
     Task,
 )
 
-_EVEN = 2e-4
-"""Errors that differ by less are even, m: with noise by another seed the other one is smaller."""
+_EQUAL = 2e-4
+"""Errors that differ by less count as equal, m: another seed of the noise can reverse them."""
 _OTHERS = tuple(planner for planner in PLANNER_NAMES if planner != MODEL_FOLLOWING)
-_TIMES_ASKED = 3.0
-"""By which the error without lead is asked to be the larger."""
-_ASKED = {
+_REQUIRED_RATIO = 3.0
+"""Of the error without lead to the error with lead."""
+_REQUIRED = {
     Task(CIRCLE_AT_5, MODEL_FOLLOWING): 0.08,
     Task(EIGHT_AT_5, MODEL_FOLLOWING): 0.06,
     Task(EIGHT_AT_5, MODEL_FOLLOWING, wind=WINDY): 0.12,
 }
-"""Largest error asked for, m."""
+"""Largest error allowed, m."""
 
 Error = Callable[[Tracked], float]
 
@@ -37,56 +36,62 @@ Error = Callable[[Tracked], float]
 def find(flown: Flown) -> tuple[Finding, ...]:
     """All findings, those on the planners first."""
     return (
-        _nearest(
+        _smallest(
             flown,
-            "In still air no other planner is nearer to a trajectory than model-following, as far"
-            " as telemetry tells.",
-            _told,
+            "In still air no planner has a smaller position error by telemetry than"
+            " model-following.",
+            _by_telemetry,
         ),
-        _nearest(flown, "Nor by where the vehicle really is.", lambda tracked: tracked.true.rms),
+        _smallest(
+            flown,
+            "In still air no planner has a smaller true position error than model-following.",
+            lambda tracked: tracked.truth.rms,
+        ),
         _in_wind(flown),
-        *(_led(flown, wind) for wind in (CALM, WINDY)),
-        _as_asked(flown),
+        *(_lead(flown, wind) for wind in (CALM, WINDY)),
+        _small_enough(flown),
     )
 
 
-def _told(tracked: Tracked) -> float:
-    return tracked.told.rms
+def _by_telemetry(tracked: Tracked) -> float:
+    """Position error by telemetry, rms, m."""
+    return tracked.telemetry.rms
 
 
-def _nearest(flown: Flown, statement: str, error: Error) -> Finding:
+def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
     def of(course: Course, planner: str) -> float:
         return error(flown[Task(course, planner)])
 
     ours = {course: of(course, MODEL_FOLLOWING) for course in COURSES}
-    nearest = {course: min(_OTHERS, key=lambda other: of(course, other)) for course in COURSES}
-    apart = {course: ours[course] - of(course, nearest[course]) for course in COURSES}
-    beaten = [course for course in COURSES if not apart[course] <= _EVEN]
-    ahead = [course for course in COURSES if apart[course] < -_EVEN]
-    told = "; ".join(
-        f"{course}: {_in_mm(ours[course])}, {nearest[course]} {_in_mm(of(course, nearest[course]))}"
+    best = {course: min(_OTHERS, key=lambda other: of(course, other)) for course in COURSES}
+    apart = {course: ours[course] - of(course, best[course]) for course in COURSES}
+    beaten = [course for course in COURSES if not apart[course] <= _EQUAL]
+    ahead = [course for course in COURSES if apart[course] < -_EQUAL]
+    listed = "; ".join(
+        f"{course}: {_in_mm(ours[course])}, {best[course]} {_in_mm(of(course, best[course]))}"
         for course in beaten
     )
     return Finding(
         "asked",
         statement,
         not beaten,
-        f"By more than {1e3 * _EVEN:g} mm nearer than all others on {len(ahead)} of {len(COURSES)}"
-        f" courses, farther off than the best on {len(beaten)}{': ' if beaten else ''}{told}.",
+        f"Smaller than all others by more than {1e3 * _EQUAL:g} mm on {len(ahead)} of"
+        f" {len(COURSES)} courses, larger than the best on {len(beaten)}"
+        f"{': ' if beaten else ''}{listed}.",
     )
 
 
 def _in_wind(flown: Flown) -> Finding:
     pairs = {
         course: tuple(
-            _told(flown[Task(course, planner, wind=WINDY)])
+            _by_telemetry(flown[Task(course, planner, wind=WINDY)])
             for planner in (MODEL_FOLLOWING, FIRST_ORDER)
         )
         for course in COURSES
     }
     return Finding(
         "asked",
-        f"In {WINDY:g} m/s of wind model-following is nearer than first-order.",
+        f"In {WINDY:g} m/s of wind model-following has a smaller error than first-order.",
         all(following < first for following, first in pairs.values()),
         "; ".join(
             f"{course}: {_in_mm(following)} against {_in_mm(first)}"
@@ -96,27 +101,27 @@ def _in_wind(flown: Flown) -> Finding:
     )
 
 
-def _led(flown: Flown, wind: float) -> Finding:
+def _lead(flown: Flown, wind: float) -> Finding:
     times = {}
     for course in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(course, MODEL_FOLLOWING, LINEAR, wind)
-        times[course] = _told(flown[task._replace(lead=False)]) / _told(flown[task])
+        times[course] = _by_telemetry(flown[task._replace(lead=False)]) / _by_telemetry(flown[task])
     return Finding(
         "asked",
-        f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'}, what is not led is at"
-        f" least {_TIMES_ASKED:g} times as far off.",
-        all(ratio >= _TIMES_ASKED for ratio in times.values()),
+        f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'} the error without lead is"
+        f" at least {_REQUIRED_RATIO:g} times the error with lead.",
+        all(ratio >= _REQUIRED_RATIO for ratio in times.values()),
         "; ".join(f"{course}: {ratio:.1f} times" for course, ratio in times.items()) + ".",
     )
 
 
-def _as_asked(flown: Flown) -> Finding:
-    found = {task: _told(flown[task]) for task in _ASKED}
-    told = (f"{task}: {_in_mm(found[task])} of {_in_mm(most)}" for task, most in _ASKED.items())
+def _small_enough(flown: Flown) -> Finding:
+    found = {task: _by_telemetry(flown[task]) for task in _REQUIRED}
+    told = (f"{task}: {_in_mm(found[task])} of {_in_mm(most)}" for task, most in _REQUIRED.items())
     return Finding(
         "asked",
-        "model-following with linear guidance is as near as was asked for.",
-        all(found[task] <= most for task, most in _ASKED.items()),
+        "model-following with linear guidance has an error as small as required.",
+        all(found[task] <= most for task, most in _REQUIRED.items()),
         "; ".join(told) + ".",
     )
 

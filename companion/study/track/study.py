@@ -1,18 +1,43 @@
-"""The study put together: what is flown, and the page's section made of it."""
+"""The study `track`: what is flown, its tables, its rows for `--json`, its section of the page."""
 
-from companion.study.outcome import Outcome, Tick
+from math import isfinite
+from typing import Any
+
+from companion.attitude import PLANNER_NAMES
+from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
+from companion.study.outcome import Cell, Outcome, Table, Tick
 from companion.study.track.figure import CAPTION, draw_figure
 from companion.study.track.findings import find
-from companion.study.track.fleet import fly_all
-from companion.study.track.flight import GUSTS, MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, POSITION_RATE_HZ
-from companion.study.track.tables import rows, series, tables
-from companion.study.track.task import HALF_WIDTH_M, RADIUS_M, WINDY, tasks
+from companion.study.track.flights import (
+    GUSTS,
+    MAX_TILT_DEG,
+    MAX_TILT_RATE_DEG_S,
+    POSITION_RATE_HZ,
+    Flown,
+    PositionError,
+    fly_all,
+)
+from companion.study.track.tasks import (
+    CALM,
+    COURSES,
+    GUIDANCES,
+    HALF_WIDTH_M,
+    LINEAR,
+    RADIUS_M,
+    WINDY,
+    Course,
+    Task,
+    planners,
+    tasks,
+)
 
 PARTS = len(tasks())
 
+_FAILED = "failed"
+
 
 def run(tick: Tick) -> Outcome:
-    """Fly every task, and tell how far off each was.
+    """Fly every task, and measure its position error.
 
     Raises:
         ConfigError, VehicleStoppedError: as `fly_all`.
@@ -20,25 +45,179 @@ def run(tick: Tick) -> Outcome:
     flown = fly_all(tasks(), tick)
     return Outcome(
         name="track",
-        title="Track: how near to a trajectory",
+        title="Track: position error on trajectories",
         conditions=(
             f"A circle of {RADIUS_M:g} m radius at a steady speed and a figure-eight (Gerono) of"
-            f" {HALF_WIDTH_M:g} m half width at its fastest, each from rest to rest: whole flights"
-            " over MAVLink with the bundled PX4-like vehicle, in lockstep. Its rate loop answers"
-            " as measured on PX4, it has 1 s⁻¹ of drag and its usual noise; its position comes at"
-            f" {POSITION_RATE_HZ:g} Hz, 10 ms old and with 1 cm of noise. The companion is as"
-            f" configs/mock-px4.yaml has it, with {MAX_TILT_DEG:g}° of tilt and"
-            f" {MAX_TILT_RATE_DEG_S:g} °/s. The wind is {WINDY:g} m/s from north with gusts of"
-            f" {GUSTS * WINDY:g} m/s (standard deviation, north and east). All flights have the"
-            " same seed, and so the same noise and the same gusts: with another one the differences"
-            " between planners come out the same within 0.2 mm. By telemetry an error is told from"
-            " the position that guidance works with. The vehicle really is ahead of that by what it"
-            " flies in 10 ms, so that by the truth a planner gains that is late by as much."
+            f" {HALF_WIDTH_M:g} m half width, named by its largest speed, each from rest to rest:"
+            " whole flights over MAVLink with the bundled PX4-like vehicle, in lockstep. Its rate"
+            " loop responds as measured on PX4. It has 1 s⁻¹ of drag and its usual noise. Its"
+            f" position arrives at {POSITION_RATE_HZ:g} Hz, 10 ms old, with 1 cm of noise. The"
+            " companion uses configs/mock-px4.yaml, with limits of"
+            f" {MAX_TILT_DEG:g}° and {MAX_TILT_RATE_DEG_S:g} °/s. The wind is {WINDY:g} m/s from"
+            f" north, with gusts of {GUSTS * WINDY:g} m/s (standard deviation, north and east). All"
+            " flights have the same seed, so the same noise and the same gusts; with another seed"
+            " the differences between planners change by at most 0.2 mm. The error by telemetry is"
+            " that of the position that guidance receives. The true position is ahead of it by 10"
+            " ms of flight, so a planner that is late by as much has a smaller true error."
         ),
         figure=draw_figure(flown),
         caption=CAPTION,
-        tables=tables(flown),
+        tables=_tables(flown),
         findings=find(flown),
-        series=(series(flown),),
-        rows=rows(flown),
+        series=(_series(flown),),
+        rows=_rows(flown),
     )
+
+
+def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
+    """What `--json` prints: one row for each flight with lead; m, null if the flight failed.
+
+    The row also has the errors of the same flight without lead, if there was one.
+    """
+    listed = []
+    for task, tracked in flown.items():
+        if not task.lead:
+            continue
+        not_led = flown.get(task._replace(lead=False))
+        listed.append(
+            {
+                "trajectory": task.course.trajectory,
+                "speed_mps": task.course.speed,
+                "planner": task.planner,
+                "guidance": task.guidance,
+                "wind_mps": task.wind,
+                "position_rms_m": _or_null(tracked.telemetry.rms),
+                "position_max_m": _or_null(tracked.telemetry.largest),
+                "true_rms_m": _or_null(tracked.truth.rms),
+                "true_max_m": _or_null(tracked.truth.largest),
+                "not_led_rms_m": None if not_led is None else _or_null(not_led.telemetry.rms),
+                "not_led_max_m": None if not_led is None else _or_null(not_led.telemetry.largest),
+                "result": tracked.result,
+            }
+        )
+    return tuple(listed)
+
+
+def _tables(flown: Flown) -> tuple[Table, ...]:
+    """Every planner in still air by telemetry and by the truth; lead and wind."""
+    return (
+        _planners_table(
+            "track",
+            "Position error in still air by telemetry, rms, mm.",
+            {task: tracked.telemetry.rms for task, tracked in flown.items()},
+        ),
+        _planners_table(
+            "track-largest",
+            "The largest position error of the same flights, mm.",
+            {task: tracked.telemetry.largest for task, tracked in flown.items()},
+        ),
+        _planners_table(
+            "track-true",
+            "Error of the true position in the same flights, rms, mm.",
+            {task: tracked.truth.rms for task, tracked in flown.items()},
+        ),
+        _lead_and_wind_table(flown),
+    )
+
+
+def _series(flown: Flown) -> Table:
+    """Every flight."""
+    return Table(
+        "track-flights",
+        "Every flight.",
+        (
+            "trajectory",
+            "speed, m/s",
+            "planner",
+            "guidance",
+            "wind, m/s",
+            "led",
+            "rms, m",
+            "largest, m",
+            "true rms, m",
+            "true largest, m",
+            "result",
+        ),
+        tuple(
+            (
+                task.course.trajectory,
+                task.course.speed,
+                task.planner,
+                task.guidance,
+                task.wind,
+                "yes" if task.lead else "no",
+                *_cells(tracked.telemetry),
+                *_cells(tracked.truth),
+                tracked.result,
+            )
+            for task, tracked in flown.items()
+        ),
+    )
+
+
+def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table:
+    return Table(
+        name,
+        caption,
+        ("trajectory, guidance", *PLANNER_NAMES),
+        tuple(
+            (
+                f"{course}, {guidance}",
+                *(
+                    _in_mm(errors[Task(course, planner, guidance)])
+                    if planner in planners(guidance)
+                    else ""
+                    for planner in PLANNER_NAMES
+                ),
+            )
+            for guidance in GUIDANCES
+            for course in COURSES
+        ),
+    )
+
+
+def _lead_and_wind_table(flown: Flown) -> Table:
+    def rms(course: Course, planner: str, wind: float, *, lead: bool = True) -> Cell:
+        return _in_mm(flown[Task(course, planner, LINEAR, wind, lead)].telemetry.rms)
+
+    return Table(
+        "track-lead-and-wind",
+        f"Position error by telemetry, rms, mm: in still air and in {WINDY:g} m/s of wind, with"
+        " lead and without (not led). In wind the circle at 7 m/s needs more thrust than the"
+        " vehicle has.",
+        (
+            "trajectory",
+            "still: model-following",
+            "still: not led",
+            "wind: model-following",
+            "wind: not led",
+            "wind: first-order",
+        ),
+        tuple(
+            (
+                str(course),
+                rms(course, MODEL_FOLLOWING, CALM),
+                rms(course, MODEL_FOLLOWING, CALM, lead=False),
+                rms(course, MODEL_FOLLOWING, WINDY),
+                rms(course, MODEL_FOLLOWING, WINDY, lead=False),
+                rms(course, FIRST_ORDER, WINDY),
+            )
+            for course in COURSES
+        ),
+    )
+
+
+def _cells(error: PositionError) -> tuple[Cell, Cell]:
+    return _cell(error.rms), _cell(error.largest)
+
+
+def _in_mm(metres: float) -> Cell:
+    return _cell(1e3 * metres)
+
+
+def _cell(value: float) -> Cell:
+    return value if isfinite(value) else _FAILED
+
+
+def _or_null(value: float) -> float | None:
+    return value if isfinite(value) else None

@@ -1,4 +1,4 @@
-"""What the study flies: which trajectories, how fast, with whom, in which wind."""
+"""What the study flies: trajectories, speeds, planners and winds."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ CALM, WINDY = 0.0, 3.0
 """Mean wind, m/s."""
 LINEAR, PREDICTIVE = "linear", "nmpc"
 GUIDANCES = (LINEAR, PREDICTIVE)
-"""Of the configuration's `guidance.kind`."""
+"""Values of the configuration's `guidance.kind`."""
 _IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
 
 
@@ -19,9 +19,9 @@ class Course(NamedTuple):
     """A trajectory at one speed, from rest to rest.
 
     Attributes:
-        trajectory: which.
-        speed: m/s; of the figure-eight, at its fastest place.
-        laps: so many that the speed is held for a while.
+        trajectory: `CIRCLE` or `EIGHT`.
+        speed: m/s; on the figure-eight the largest.
+        laps: enough to hold the speed for a while.
     """
 
     trajectory: str
@@ -33,7 +33,7 @@ class Course(NamedTuple):
 
     @property
     def file(self) -> dict[str, Any]:
-        """What a trajectory file says of it."""
+        """The content of its trajectory file."""
         if self.trajectory == CIRCLE:
             return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
         eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
@@ -44,11 +44,11 @@ class Task(NamedTuple):
     """One flight.
 
     Attributes:
-        course: what is followed.
-        planner: by whom.
-        guidance: by which outer loop.
+        course: the trajectory and its speed.
+        planner: by name.
+        guidance: the outer loop.
         wind: mean, m/s, with gusts; 0 is still air.
-        lead: whether linear guidance leads its targets through the inner response.
+        lead: whether linear guidance leads its targets by the response of the attitude loop.
     """
 
     course: Course
@@ -75,12 +75,12 @@ COURSES = (*CIRCLES, *EIGHTS)
 
 
 def planners(guidance: str) -> tuple[str, ...]:
-    """Who flies with this guidance in still air: predictive control is made for one."""
+    """The planners flown with this guidance in still air; predictive control needs its own."""
     return PLANNER_NAMES if guidance == LINEAR else (MODEL_FOLLOWING,)
 
 
 def tasks() -> tuple[Task, ...]:
-    """Every planner in still air, some in wind, one not led, and one with predictive control."""
+    """Every planner in still air, two in wind, one without lead, one with predictive control."""
     calm = [
         Task(course, planner, guidance)
         for course in COURSES

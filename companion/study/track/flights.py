@@ -1,0 +1,242 @@
+"""The flights: the bundled vehicle follows one course, in lockstep over a socket."""
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from math import inf
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from companion import demo
+from companion.config import Config
+from companion.config.files import changed, load
+from companion.files import bounded_yaml
+from companion.flight.observer import Silent
+from companion.flight.session import Session
+from companion.mavlink import lockstep
+from companion.study.outcome import Tick
+from companion.study.step import Floats
+from companion.study.track.tasks import Task
+
+POSITION_RATE_HZ = 30.0
+MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
+"""The circle at 7 m/s needs 51° of tilt against its own drag, and more in wind."""
+GUSTS = 1.0 / 3.0
+"""Standard deviation of the gusts north and east, as a share of the mean wind."""
+HOLD_S = 2.0
+"""Hover before the course, so that the takeover is not part of the measurement."""
+_HEIGHT_M = 3.0
+_SHORT_PHASES = {
+    "prearm_delay_s": 0.2,
+    "parameters": {
+        "COM_DISARM_LAND": 0.2,
+        "COM_SPOOLUP_TIME": 0.1,
+        "MPC_LAND_SPEED": 2.0,
+        "MPC_TKO_RAMP_T": 0.3,
+        "MPC_TKO_SPEED": 3.0,
+    },
+}
+"""Vehicle settings that shorten take-off and landing."""
+_TRUTH_PERIOD = 0.02
+"""Between two requests of the true position, s of vehicle time."""
+_TRUTH_TIMEOUT = 1.0
+"""For an answer, s of wall time; an answer takes about 0.1 ms."""
+_MEASURED_PHASE = "maneuvers"
+
+
+class PositionError(NamedTuple):
+    """Distance from the reference position over a course, m."""
+
+    rms: float
+    largest: float
+
+
+class Tracked(NamedTuple):
+    """The result of a flight; the errors of a failed flight are infinite.
+
+    Attributes:
+        result: "ok", or why the flight ended.
+        telemetry: error of the position that guidance received.
+        truth: error of the vehicle's true position.
+        path: (n, 4): reference north and east, true north and east, m.
+    """
+
+    result: str
+    telemetry: PositionError
+    truth: PositionError
+    path: Floats
+
+    @property
+    def ok(self) -> bool:
+        """Whether the course was flown to its end."""
+        return self.result == "ok"
+
+
+Flown = dict[Task, Tracked]
+
+
+def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
+    """Fly every task, one flight for each core; ticks as each begins.
+
+    A flight is the same to the bit whether it flies alone or beside others. On Ctrl-C this waits
+    for the flights in progress, so that no vehicle process is left behind.
+
+    Raises:
+        ConfigError, VehicleStoppedError: a flight raised it (see `fly`); no more are started.
+    """
+    cores = len(os.sched_getaffinity(0))
+    flown: dict[Task, Future[Tracked]] = {}
+    with ProcessPoolExecutor(min(cores, len(tasks)), get_context("spawn")) as pool:
+        for task in tasks:
+            _await_a_free_core(list(flown.values()), cores)
+            tick(str(task))
+            with _interrupts_blocked():
+                flown[task] = pool.submit(fly, task)
+        return {task: future.result() for task, future in flown.items()}
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Processes started here inherit the block, so Ctrl-C reaches only the first process."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _await_a_free_core(flights: Sequence[Future[Tracked]], cores: int) -> None:
+    flying = [flight for flight in flights if not flight.done()]
+    if len(flying) >= cores:
+        wait(flying, return_when=FIRST_COMPLETED)
+    for flight in flights:
+        if flight.done():
+            flight.result()  # raises here what went wrong, before more flights are started
+
+
+def fly(task: Task) -> Tracked:
+    """Start the bundled vehicle, fly the task with it, and measure.
+
+    Raises:
+        ConfigError: the configuration that ships cannot be found or used.
+        VehicleStoppedError: the vehicle ended before the flight did.
+    """
+    with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
+        folder = Path(name)
+        wire, truth_port = demo.udp_wire(), demo.free_port()
+        shipped = load(demo.default_config())
+        vehicle, course = folder / "vehicle.yaml", folder / "course.yaml"
+        vehicle.write_text(bounded_yaml.dump({"mock": _vehicle(shipped, task, truth_port)}))
+        course.write_text(bounded_yaml.dump(task.course.file))
+        config = _configured(shipped, task, course, wire.endpoint)
+        truth = TruthRecorder(truth_port)
+        session = Session(config, folder, truth, _never)
+        with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
+            summary = lockstep.run(session.fly())
+    if summary.result != "ok":
+        failed = PositionError(inf, inf)
+        return Tracked(summary.result, failed, failed, np.empty((0, 4)))
+    return _measured(summary.trace.tracking_rows(), truth.rows())
+
+
+def _vehicle(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
+    """The bundled vehicle as it ships, in the wind of the task."""
+    wind = {"speed_m_s": task.wind, "gust_m_s": GUSTS * task.wind}
+    return {**(shipped.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
+
+
+def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
+    """The configuration that ships, with the changes that the task needs."""
+    changes: dict[str, dict[str, Any]] = {
+        "link": {
+            "endpoint": endpoint,
+            "lockstep": True,
+            "position_rate_hz": POSITION_RATE_HZ,
+        },
+        "planner": {"name": task.planner},
+        "limits": {
+            "max_tilt_deg": MAX_TILT_DEG,
+            "max_tilt_rate_deg_s": MAX_TILT_RATE_DEG_S,
+            "max_thrust": MAX_THRUST,
+        },
+        "guidance": {"kind": task.guidance, "lead": task.lead},
+        "flight": {
+            "maneuvers": ("hover", "trajectory"),
+            "trajectory": course,
+            "takeoff_height_m": _HEIGHT_M,
+            "arm": True,
+        },
+        "hover": {"duration_s": HOLD_S},
+    }
+    return changed(shipped, changes, "study track")
+
+
+async def _never() -> bool:
+    return False
+
+
+class TruthRecorder(Silent):
+    """Asks the vehicle's control channel for its true position during the measured phase.
+
+    In lockstep the vehicle stands still until its sample is answered. So a request may block our
+    event loop, and its answer belongs to the present vehicle time.
+
+    Args:
+        port: of the control channel, on this machine.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._address = ("127.0.0.1", port)
+        self._rows: list[tuple[float, ...]] = []
+        self._asking: asyncio.Task[None] | None = None
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Start with the measured phase, stop with the next one."""
+        if name == _MEASURED_PHASE:
+            self._asking = asyncio.create_task(self._ask())
+        elif self._asking is not None:
+            self._asking.cancel()
+
+    def rows(self) -> Floats:
+        """(n, 4): vehicle time, s, and position north, east and down of home, m."""
+        return np.array(self._rows).reshape(-1, 4)
+
+    async def _ask(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel, suppress(OSError):
+            # No answer means that the vehicle is gone; the result of the flight will say so.
+            channel.settimeout(_TRUTH_TIMEOUT)
+            channel.connect(self._address)
+            while True:
+                channel.send(b'{"state": true}')
+                truth = json.loads(channel.recv(65536))
+                self._rows.append((truth["time"], *truth["position"]))
+                await asyncio.sleep(_TRUTH_PERIOD)
+
+
+def _measured(tracking: Floats, truth: Floats) -> Tracked:
+    """Measure over the course alone: from the end of the hold to the last true position.
+
+    Args:
+        tracking: rows as `FlightTrace.tracking`.
+        truth: rows as `TruthRecorder.rows`.
+    """
+    time = truth[:, 0]
+    flown = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
+    reference, telemetry = flown[:, 1:4], flown[:, 4:7]
+    true = np.column_stack([np.interp(flown[:, 0], time, axis) for axis in truth[:, 1:].T])
+    path = np.hstack([reference[:, :2], true[:, :2]])
+    return Tracked("ok", _error(telemetry - reference), _error(true - reference), path)
+
+
+def _error(offsets: Floats) -> PositionError:
+    distance = np.linalg.norm(offsets, axis=1)
+    return PositionError(float(np.sqrt(np.mean(distance**2))), float(distance.max()))
