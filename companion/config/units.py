@@ -1,7 +1,7 @@
 """The one place where the units of the YAML keys become SI units."""
 
 from math import pi
-from typing import Any
+from typing import Any, Self, overload
 
 MS = 1e-3
 DEG = pi / 180.0
@@ -25,6 +25,10 @@ class Si(property):
         factor = next(factor for end, factor in _FACTORS.items() if key.endswith(end))
         super().__init__(lambda section: factor * getattr(section, key))
 
-    def __get__(self, section: Any, owner: type | None = None, /) -> float:
+    @overload
+    def __get__(self, section: None, owner: type, /) -> Self: ...
+    @overload
+    def __get__(self, section: Any, owner: type | None = None, /) -> float: ...
+    def __get__(self, section: Any, owner: type | None = None, /) -> Self | float:
         """The number of that section, in rad, rad/s, s or as a share."""
-        return float(super().__get__(section, owner))
+        return self if section is None else float(super().__get__(section, owner))
