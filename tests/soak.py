@@ -106,7 +106,7 @@ def flight_config(folder: Path, port: int, seconds: float) -> Path:
         "include": str(Path(__file__).parents[1] / "configs" / "vehicle-px4.yaml"),
         "link": {"endpoint": f"udpin://127.0.0.1:{port}"},
         "thrust": {"hover_thrust": 0.49},
-        "flight": {"arm": True, "programme": ["hover", "circle"], "takeoff_height_m": 2.0},
+        "flight": {"arm": True, "maneuvers": ["hover", "circle"], "takeoff_height_m": 2.0},
         "hover": {"duration_s": 1.0},
         "circle": {"radius_m": RADIUS_M, "speed_m_s": SPEED_M_S, "laps": laps},
         "realtime": {"scheduler": "fifo"},
@@ -141,7 +141,7 @@ class Disturber(threading.Thread):
 
 
 def soak(folder: Path, seconds: float, seed: int, every: float = SAMPLE_PERIOD_S) -> Report:
-    """Fly for about `seconds` in the programme; looks at the memory `every` s of it."""
+    """Fly for about `seconds` in the maneuver; looks at the memory `every` s of it."""
     settings = {"speed": 1.0, "seed": seed, "exact_rates": True, "parameters": {}}
     with mock_vehicle(
         folder, in_lockstep=False, battery={"capacity_ah": 500.0}, **settings

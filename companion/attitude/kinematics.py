@@ -41,18 +41,18 @@ def speed_to_rates(
     ax: float,
     ay: float,
     inverse: float,
-    steepness: float,
+    inverse_cos_tilt: float,
     e_x: float,
     e_y: float,
 ) -> tuple[float, float, float]:
     """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
 
     Equations 21 to 24, their common term (y·e_x − x·e_y) taken out, then 28. `inverse` is 1/a²;
-    `steepness` is 1/cos(tilt), or its bound where the caller has to keep the rates bounded.
+    `inverse_cos_tilt` is 1/cos(tilt), or its bound where the caller has to keep the rates bounded.
     """
     across = 2.0 * inverse * (ay * e_x - ax * e_y)
-    r_x = steepness * (e_x - ay * across)
-    r_y = steepness * (e_y + ax * across)
+    r_x = inverse_cos_tilt * (e_x - ay * across)
+    r_y = inverse_cos_tilt * (e_y + ax * across)
     cosine = (w * w - z * z) * inverse
     sine = 2.0 * w * z * inverse
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x, (ay * r_x - ax * r_y) * inverse

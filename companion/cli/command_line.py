@@ -36,7 +36,7 @@ _USAGE_ERRORS = (
     RealtimeError,
     SigningError,
 )
-_PROGRAMMES = get_args(get_args(FlightConfig.model_fields["programme"].annotation)[0])
+_MANEUVERS = get_args(get_args(FlightConfig.model_fields["maneuvers"].annotation)[0])
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -104,10 +104,10 @@ def _add_flights(commands: Commands) -> None:
     show.set_defaults(run=flights.demo)
     for command in (fly, show):
         command.add_argument(
-            "--programme",
-            type=_programmes,
+            "--maneuvers",
+            type=_maneuvers,
             metavar="NAME[,NAME]",
-            help=f"fly these instead of flight.programme: {', '.join(_PROGRAMMES)}",
+            help=f"fly these instead of flight.maneuvers: {', '.join(_MANEUVERS)}",
         )
         command.add_argument(
             "--trajectory",
@@ -267,12 +267,12 @@ def _add_tools(commands: Commands) -> None:
     check.set_defaults(run=tools.check_config)
 
 
-def _programmes(text: str) -> tuple[str, ...]:
+def _maneuvers(text: str) -> tuple[str, ...]:
     names = tuple(text.split(","))
-    unknown = [name for name in names if name not in _PROGRAMMES]
+    unknown = [name for name in names if name not in _MANEUVERS]
     if unknown:
         raise argparse.ArgumentTypeError(
-            f"unknown programme {unknown[0]!r}; known: {', '.join(_PROGRAMMES)}"
+            f"unknown maneuver {unknown[0]!r}; known: {', '.join(_MANEUVERS)}"
         )
     return names
 

@@ -17,8 +17,8 @@ from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
 from companion.flight.assembly import open_link
-from companion.flight.maneuvers import programme
-from companion.guidance import Sequence
+from companion.flight.maneuvers import configured_maneuvers
+from companion.guidance import ManeuverSequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
@@ -70,14 +70,14 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     return changed(config, {"link": link}, "the command line")
 
 
-def _flown(config: Config) -> tuple[Sequence | None, list[Finding]]:
+def _flown(config: Config) -> tuple[ManeuverSequence | None, list[Finding]]:
     """What is to be flown, or why it cannot be."""
     try:
-        return programme(config), []
+        return configured_maneuvers(config), []
     except ConfigError as error:
         found = f"what is configured cannot be flown: {error}"
         because = "`companion fly` refuses it"
-        return None, [Finding(Key.PROGRAMME, Verdict.INEFFECTIVE, found, because)]
+        return None, [Finding(Key.MANEUVERS, Verdict.INEFFECTIVE, found, because)]
 
 
 class _Visit:
@@ -101,7 +101,7 @@ class _Visit:
             except (LinkTimeout, LinkLost) as error:
                 return self._told(vehicle.silent(error))
             flown, refusals = _flown(config)
-            evidence = replace(evidence, programme=flown)
+            evidence = replace(evidence, maneuvers=flown)
             findings = [*refusals, *examine(config, evidence)]
             code = self._told(findings)
             if fix:

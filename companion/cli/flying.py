@@ -16,7 +16,7 @@ from companion.config.files import changed, load
 from companion.control.outer_loop import predictive_settings
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
@@ -39,10 +39,10 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
         link["endpoint"] = options.endpoint
     if options.lockstep:
         link["lockstep"] = True
-    if options.programme:
-        flight["programme"] = options.programme
+    if options.maneuvers:
+        flight["maneuvers"] = options.maneuvers
     if options.trajectory:
-        flight["programme"], flight["trajectory"] = ("trajectory",), options.trajectory
+        flight["maneuvers"], flight["trajectory"] = ("trajectory",), options.trajectory
     if options.slow_down:
         flight["slow_down"] = True
     if options.arm:
@@ -50,7 +50,7 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
     told = changed(config, changes, "the command line")
     # What cannot be flown is to be found out before anything is begun.
-    programme(told)
+    configured_maneuvers(told)
     if told.guidance.kind == "nmpc":
         predictive_settings(told)
         require("casadi", "nmpc", "guidance.kind: nmpc")

@@ -29,7 +29,7 @@ from companion.vehicle.flight_log import read_flight_log
 
 SHIPPED = Path()
 """Stands for the configuration that ships, where `--bundled` names none."""
-_PROGRAMME = "identify"
+_MANEUVER = "identify"
 _PLANNER = "first-order"
 """It needs no knowledge of the vehicle: that is what is looked for."""
 _LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
@@ -82,7 +82,7 @@ def _writable(out: Path, force: bool) -> None:
 
 
 def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
-    options.programme = (_PROGRAMME,)
+    options.maneuvers = (_MANEUVER,)
     if options.bundled is not None:
         path = None if options.bundled == SHIPPED else options.bundled
         return flying.fly_bundled(path, options, console, _PLANNER)

@@ -11,7 +11,7 @@ from companion.config.files import json_schema, load
 from companion.demo import check_mock
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.mavlink.endpoint import parse_endpoint
 from companion.recording.figure import draw_flight
 from companion.study import registry
@@ -74,7 +74,7 @@ def check_config(options: argparse.Namespace) -> int:
         return EXIT_OK
     config = load(options.file)
     parse_endpoint(link_settings(config).endpoint)
-    programme(config)  # the trajectory too
+    configured_maneuvers(config)  # the trajectory too
     if config.mock is not None:
         check_mock(options.file)
     print(f"{options.file}: ok")

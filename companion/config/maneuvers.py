@@ -1,4 +1,4 @@
-"""The sections of the configuration that say how each programme is flown."""
+"""The sections of the configuration that say how each maneuver is flown."""
 
 from typing import Annotated
 
@@ -9,14 +9,14 @@ from companion.files.yaml_file import Section
 
 
 class HoverConfig(Section):
-    """Programme `hover`: stay where control began."""
+    """Maneuver `hover`: stay where control began."""
 
     duration_s: Seconds = 3.0
     """How long."""
 
 
 class StepsConfig(Section):
-    """Programme `steps`: acceleration doublets along north, east and a diagonal."""
+    """Maneuver `steps`: acceleration doublets along north, east and a diagonal."""
 
     coefficient: Annotated[float, Field(gt=0.0, le=0.7)] = 0.25
     """Size of a step: horizontal acceleration per specific thrust, the sine of the tilt."""
@@ -27,7 +27,7 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Programme `corners`: acceleration steps past level, where the planners differ."""
+    """Maneuver `corners`: acceleration steps past level, where the planners differ."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """North at each corner, but for the sign; the tilt has the sine √(north² + east²)."""
@@ -40,7 +40,7 @@ class CornersConfig(Section):
 
 
 class CircleConfig(Section):
-    """Programme `circle`: laps at a steady speed, heading held."""
+    """Maneuver `circle`: laps at a steady speed, heading held."""
 
     radius_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 3.0
     """Radius; the circle begins where the vehicle is and lies north of it."""
@@ -51,7 +51,7 @@ class CircleConfig(Section):
 
 
 class IdentifyConfig(Section):
-    """Programme `identify`, flown by `companion identify`: doublets of body rates and of climb."""
+    """Maneuver `identify`, flown by `companion identify`: doublets of body rates and of climb."""
 
     tilt_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 60.0
     """Roll and pitch rate of the larger doublets; the smaller ones have half of it."""

@@ -40,6 +40,7 @@ MOST_INCLUDED = 32
 """Files that one configuration may include, those of its includes among them."""
 
 FORMER_KEYS = {
+    "flight.maneuvers": "is now called `flight.maneuvers`",
     "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
     " no key of its own, only the extra `nmpc`",
 }
@@ -95,7 +96,7 @@ class Config(Section):
 
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
     """What no single section can know: (whether it is wrong, what to say)."""
-    limits, thrust, flown = config.limits, config.thrust, config.flight.programme
+    limits, thrust, flown = config.limits, config.thrust, config.flight.maneuvers
     tilt = radians(limits.max_tilt_deg)
     return [
         (
@@ -149,12 +150,12 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
 
 
 def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
-    """As `_contradictions`, of the programme `identify`."""
+    """As `_contradictions`, of the maneuver `identify`."""
     limits, identify = config.limits, config.identify
     return [
         (
-            len(config.flight.programme) > 1,
-            "flight.programme: identify is flown alone, with a calm hold between its doublets",
+            len(config.flight.maneuvers) > 1,
+            "flight.maneuvers: identify is flown alone, with a calm hold between its doublets",
         ),
         (
             identify.tilt_rate_deg_s * identify.tilt_duration_s > _TILT_SHARE * limits.max_tilt_deg,

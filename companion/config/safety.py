@@ -15,7 +15,7 @@ from companion.guidance.fence import inside
 Ending = Literal["hand_back", "land"]
 """hand_back: the autopilot holds, and is left holding. land: it lands."""
 Any = Literal["warn", "hold", "hand_back", "land"]
-"""warn: say so. hold: give the programme up, hold in offboard, then see. Or as `Ending`."""
+"""warn: say so. hold: give the maneuver up, hold in offboard, then see. Or as `Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -42,7 +42,7 @@ class SafetyConfig(Section):
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Time until it begins."""
     fence_action: Ending = "land"
-    """Outside the fence. Within braking distance of it the programme is given up for a hold."""
+    """Outside the fence. Within braking distance of it the maneuver is given up for a hold."""
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"

@@ -299,7 +299,7 @@ class FlightConfig(Section):
 
     takeoff_height_m: Annotated[float, Field(ge=1.5, le=100.0)] = 5.0
     """Height above home to which the autopilot takes off."""
-    programme: Annotated[
+    maneuvers: Annotated[
         tuple[Literal["hover", "steps", "circle", "corners", "identify", "trajectory"], ...],
         Field(min_length=1, max_length=20),
     ] = (
@@ -309,7 +309,7 @@ class FlightConfig(Section):
     )
     """Flown in this order."""
     trajectory: PathKey | None = None
-    """File of what the programme `trajectory` follows: configs/trajectories/figure8.yaml, say."""
+    """File of what the maneuver `trajectory` follows: configs/trajectories/figure8.yaml, say."""
     slow_down: bool = False
     """Slow a trajectory down that the limits do not allow, instead of refusing it."""
     arm: StrictBool = False

@@ -50,16 +50,16 @@ class Deadlines:
 class ControlLoop:
     """Answers each fresh attitude sample with one setpoint; there is no other way to send one.
 
-    While `taking_over` or `guarded` (the autopilot may obey us, or does), a gap in the answers is
-    not silently closed: the autopilot may have left offboard meanwhile, and PX4 would enter it
-    again on our next setpoint. So the loop asks for the mode and waits for `resume`.
+    While `taking_over` or `offboard_active` (the autopilot may obey us, or does), a gap in the
+    answers is not silently closed: the autopilot may have left offboard meanwhile, and PX4 would
+    enter it again on our next setpoint. So the loop asks for the mode and waits for `resume`.
 
     Attributes:
         command: the newest command; guidance writes it, None means none yet.
         on: whether samples are answered at all.
         taking_over: whether offboard was asked for, so that the autopilot may obey us any moment.
-        guarded: whether a gap needs the autopilot's mode confirmed.
-        held_back: a gap happened and `resume` has not come yet.
+        offboard_active: whether a gap needs the autopilot's mode confirmed.
+        awaiting_mode: a gap happened and `resume` has not come yet.
         resets: jumps of the estimate, which the planner does not see.
         ask_mode: called once a gap, when telemetry is back.
         is_same_vehicle: asked at each sample: whether it is of the vehicle that was checked.
@@ -71,7 +71,7 @@ class ControlLoop:
         samples, setpoints, missed_deadlines: counts since the loop was made.
         held: for how long each setpoint stood until the next one, gaps left out.
         gaps: when the latest gaps ended, s on our clock: nothing was answered for longer than
-            `Deadlines.telemetry_stale` while `guarded`.
+            `Deadlines.telemetry_stale` while `offboard_active`.
         unanswered: how many samples were not answered, by reason.
         reason: why the newest sample was not answered, or None.
     """
@@ -89,8 +89,8 @@ class ControlLoop:
         self.command: Command | None = None
         self.on = False
         self.taking_over = False
-        self.guarded = False
-        self.held_back = False
+        self.offboard_active = False
+        self.awaiting_mode = False
         self.resets = EstimatorResets()
         self.thrust = 0.0
         self.ask_mode: Callable[[], None] = lambda: None
@@ -118,7 +118,7 @@ class ControlLoop:
 
     def resume(self) -> None:
         """The autopilot still is in offboard: go on after a gap."""
-        self.held_back = False
+        self.awaiting_mode = False
         self._gap_from = inf
 
     def plan_anew(self) -> None:
@@ -238,13 +238,13 @@ class ControlLoop:
         return dt
 
     def _after_gap(self, now: float) -> bool:
-        if not (self.guarded or self.taking_over):
+        if not (self.offboard_active or self.taking_over):
             return False
-        if now - self._gap_from > self._deadlines.telemetry_stale and not self.held_back:
-            self.held_back = True
+        if now - self._gap_from > self._deadlines.telemetry_stale and not self.awaiting_mode:
+            self.awaiting_mode = True
             self.gaps.append(now)
             self.ask_mode()
-        return self.held_back
+        return self.awaiting_mode
 
     def _account(
         self,
@@ -262,7 +262,7 @@ class ControlLoop:
         latency = perf_counter_ns() - sample.received_ns
         self.missed_deadlines += latency > self._deadlines.deadline * 1e9
         self._trace.add_latency(latency)
-        if self.guarded:
+        if self.offboard_active:
             self._hover_thrust.sent(thrust, sample.q)
             self._trace.add_rates(
                 sample.vehicle_time,

@@ -14,13 +14,13 @@ from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Following, Predictive
 from companion.guidance import (
     GRAVITY,
+    GuidanceInput,
     HoverThrust,
     LinearCommand,
     LinearGuidance,
+    ManeuverSequence,
     Pose,
     Reference,
-    Sequence,
-    Situation,
     VehicleMotion,
 )
 from companion.guidance.follow import Follow
@@ -38,20 +38,20 @@ _REJOINED = 1.0
 _LEVEL = Target(0.0, 0.0, 0.0)
 
 
-class Guide:
+class GuidanceLoop:
     """Leaves a new `Command` with the control loop at a steady rate, while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. From then on, and without a
-    programme, it damps the motion where the vehicle is; `hold` keeps a pose; `follow` flies a
-    programme from it. A programme's open-loop rates are given up, and the vehicle held where it
+    maneuver, it damps the motion where the vehicle is; `hold` keeps a pose; `follow` flies a
+    maneuver from it. A maneuver's open-loop rates are given up, and the vehicle held where it
     is, once it tilts too far. Jumps of the autopilot's estimate are not chased: poses and
     references go on without them.
 
     Attributes:
-        begun_at: when the programme began, s on our clock, or None.
+        begun_at: when the maneuver began, s on our clock, or None.
         pose: the pose that is held, or None.
-        given_up: why the programme was given up, or None.
-        bound_to_hold: no programme is flown any more; set by `give_up`.
+        given_up: why the maneuver was given up, or None.
+        bound_to_hold: no maneuver is flown any more; set by `give_up`.
         motion: of the vehicle at the last step, without the jumps of the estimate, or None.
         off_course: distance from the reference at the last step, m; None where none is followed,
             and on the way back to it after open-loop commands.
@@ -96,7 +96,7 @@ class Guide:
         self._position_stale = position_stale
         self._clock = clock
         self._vehicle_clock = vehicle_clock
-        self._programme: Sequence | None = None
+        self._maneuvers: ManeuverSequence | None = None
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
@@ -118,7 +118,7 @@ class Guide:
 
     def stand_by(self) -> None:
         """Hold nothing: idle on the ground, damp the motion in the air."""
-        self.pose, self._programme, self.begun_at = None, None, None
+        self.pose, self._maneuvers, self.begun_at = None, None, None
 
     def hold_here(self) -> None:
         """Hold the present position and heading."""
@@ -126,25 +126,25 @@ class Guide:
         self.pose = Pose(self._situation(self._clock()).now.position_ned, self._heading())
 
     def give_up(self) -> None:
-        """Hold here, and fly no programme any more."""
+        """Hold here, and fly no maneuver any more."""
         self.bound_to_hold = True
         self.hold_here()
 
-    def follow(self, programme: Sequence) -> None:
-        """Fly `programme` from the pose that is held; after `give_up`, go on holding."""
+    def follow(self, maneuvers: ManeuverSequence) -> None:
+        """Fly `maneuvers` from the pose that is held; after `give_up`, go on holding."""
         if self.bound_to_hold:
             return
         if self.pose is None:
             self.hold_here()
-        self._programme = programme
+        self._maneuvers = maneuvers
         self.begun_at = self._clock()
 
     @property
     def finished(self) -> bool:
-        """Whether the programme has come to its end."""
-        if self._programme is None or self.begun_at is None:
+        """Whether the maneuver has come to its end."""
+        if self._maneuvers is None or self.begun_at is None:
             return False
-        return self._clock() - self.begun_at >= self._programme.duration
+        return self._clock() - self.begun_at >= self._maneuvers.duration
 
     async def run(self) -> None:
         """Make commands for ever; late ones are not made up for."""
@@ -163,7 +163,7 @@ class Guide:
             return
         # In control a vehicle that says it has landed is the watch's matter: no thrust would make
         # it true.
-        standing = self._ground.standing and not self._loop.guarded
+        standing = self._ground.standing and not self._loop.offboard_active
         if standing:
             self.learning.stand()
             self._loop.resets.forget()
@@ -172,7 +172,7 @@ class Guide:
                 return
         position = self._loop.resets.without_jumps(position)
         self.estimate.turn_to(self._loop.resets.turn)
-        self.estimate.note_position(position, obeyed=self._loop.guarded)
+        self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         situation = self._situation(now)
         self.motion = situation.now
         self._give_up_if_tilted()
@@ -181,7 +181,7 @@ class Guide:
         command = self._guidance.command(reference_at, now, situation)
         target, later, down = self._predicted(now, command, situation)
         target, later = (self._height_first(each, down) for each in (target, later))
-        self.estimate.vertical = GRAVITY - down if self._loop.guarded else GRAVITY
+        self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
         self._loop.command = Command(
             target,
             down,
@@ -195,9 +195,12 @@ class Guide:
         self.off_course = self._distance(reference, situation.now)
         if not standing:
             self.learning.step(
-                now, self._q, obeyed=self._loop.guarded, steady=reference.height_is_steady
+                now,
+                self._q,
+                offboard_active=self._loop.offboard_active,
+                steady=reference.height_is_steady,
             )
-        if self._loop.guarded:
+        if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
             self._note_tracking(measured_at, reference, situation.now)
 
@@ -214,7 +217,9 @@ class Guide:
         north, east = limited(target.north, target.east, most)
         return target._replace(north=north, east=east)
 
-    def _predicted(self, now: float, linear: LinearCommand, situation: Situation) -> LinearCommand:
+    def _predicted(
+        self, now: float, linear: LinearCommand, situation: GuidanceInput
+    ) -> LinearCommand:
         """What predictive control says, if it flies; its headings are the estimate's own.
 
         Its targets stay for a period, which it accounts for.
@@ -235,40 +240,40 @@ class Guide:
         self._astray = not reference.position_is_meant or (self._astray and distance > _REJOINED)
         return None if self.pose is None or self._astray else distance
 
-    def _situation(self, now: float) -> Situation:
+    def _situation(self, now: float) -> GuidanceInput:
         return self.estimate.situation(now, self._guidance.acts_after, self.learning.thrust_limits)
 
     def _reference(self, motion: VehicleMotion) -> ReferenceAt:
         """What is to be flown, by our clock."""
-        pose, programme, begun_at = self.pose, self._programme, self.begun_at
+        pose, maneuvers, begun_at = self.pose, self._maneuvers, self.begun_at
         if pose is None:
             here = Reference(motion.position_ned, heading=self._heading())
             return lambda _: here
-        if programme is None or begun_at is None:
+        if maneuvers is None or begun_at is None:
             held = Reference(pose.position_ned, heading=pose.heading)
             return lambda _: held
-        return lambda time: programme.at(time - begun_at, pose)
+        return lambda time: maneuvers.at(time - begun_at, pose)
 
     def _following(self, now: float) -> Following | None:
         """The trajectory that is followed, if that is what is flown just now."""
-        if self._programme is None or self.begun_at is None or self.pose is None:
+        if self._maneuvers is None or self.begun_at is None or self.pose is None:
             return None
-        part, within = self._programme.part_at(now - self.begun_at)
+        part, within = self._maneuvers.part_at(now - self.begun_at)
         if not isinstance(part, Follow):
             return None
         return Following(part, within, self.pose, self._loop.resets.turn)
 
     def _give_up_if_tilted(self) -> None:
         """Hold where we are if open-loop rates have tilted the vehicle too far."""
-        if self.pose is None or self._programme is None or self.begun_at is None:
+        if self.pose is None or self._maneuvers is None or self.begun_at is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
         within = self._clock() - self.begun_at
         most = min(self._max_tilt, self.learning.largest_tilt())
-        if self._programme.at(within, self.pose).body_rates is None or tilt <= most:
+        if self._maneuvers.at(within, self.pose).body_rates is None or tilt <= most:
             return
         whose = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
-        name, lean = self._programme.name, f"{degrees(tilt):.0f}° of tilt"
+        name, lean = self._maneuvers.name, f"{degrees(tilt):.0f}° of tilt"
         self.given_up = f"{name} was given up at {lean}, more than {whose}"
         self.hold_here()
 

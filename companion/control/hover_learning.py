@@ -51,26 +51,28 @@ class HoverLearning:
         """Nothing can be learned just now."""
         self._hover_thrust.pause()
 
-    def step(self, now: float, q: Quaternion, *, obeyed: bool, steady: bool) -> None:
+    def step(self, now: float, q: Quaternion, *, offboard_active: bool, steady: bool) -> None:
         """Learn from the newest telemetry.
 
         Args:
             now: s on our clock.
             q: newest attitude.
-            obeyed: whether the autopilot obeys our setpoints, which the control loop then notes.
+            offboard_active: whether the autopilot obeys our setpoints.
             steady: whether our thrust is steady; the rotors run after one that is not.
         """
         battery, position = self._state.battery, self._state.position
         if battery is not None:
             self._hover_thrust.note_voltage(battery.received, battery.voltage_v)
-        self._had_control = self._had_control or obeyed
-        learns = steady if obeyed else not self._had_control and self._note_autopilots(now, q)
+        self._had_control = self._had_control or offboard_active
+        learns = (
+            steady if offboard_active else not self._had_control and self._note_autopilots(now, q)
+        )
         if learns and position is not None:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
         else:
             self._hover_thrust.pause()
 
-    def surprise(self) -> str | None:
+    def mismatch_warning(self) -> str | None:
         """In words, where the vehicle hovered at another thrust than the configuration says."""
         configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
         if not self._had_control or abs(learned - configured) <= _WORTH_TELLING * configured:
@@ -82,7 +84,7 @@ class HoverLearning:
 
     def _note_autopilots(self, now: float, q: Quaternion) -> bool:
         """Note the thrust that the autopilot flies by; False if it is not known or not flown by."""
-        told, height = self._state.told_thrust, self._state.height
+        told, height = self._state.attitude_target_thrust, self._state.height
         if told is None or now - told.received > _THRUST_STALE:
             return False
         if not self._state.armed or height is None or height < _CLEAR:

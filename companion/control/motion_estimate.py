@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
-from companion.guidance import GRAVITY, DragEstimate, MotionObserver, Situation, VehicleMotion
+from companion.guidance import GRAVITY, DragEstimate, GuidanceInput, MotionObserver, VehicleMotion
 from companion.guidance.horizontal import Horizontal
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.slope_history import SlopeHistory
@@ -68,7 +68,7 @@ class MotionEstimate:
             self._correction.reset()
             self._turn = turn
 
-    def note_position(self, position: LocalPosition, *, obeyed: bool) -> None:
+    def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; the same one twice counts once.
 
         Drag is learned only while the autopilot obeys, since only then our thrust is known.
@@ -83,10 +83,12 @@ class MotionEstimate:
         )
         known = self._known(slope, measured)
         self._observer.observe(position.vehicle_time, measured, known)
-        if obeyed and before is not None:
+        if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 
-    def situation(self, now: float, ahead: float, thrust_limits: tuple[float, float]) -> Situation:
+    def situation(
+        self, now: float, ahead: float, thrust_limits: tuple[float, float]
+    ) -> GuidanceInput:
         """The vehicle now (s on our clock), and `ahead` seconds later.
 
         Args:
@@ -108,9 +110,9 @@ class MotionEstimate:
         north, east = self._slopes.newest
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
-        return Situation(motion, later, thrust, disturbance, drag, thrust_limits)
+        return GuidanceInput(motion, later, thrust, disturbance, drag, thrust_limits)
 
-    def vehicle(self, now: float, situation: Situation) -> Vehicle:
+    def vehicle(self, now: float, situation: GuidanceInput) -> Vehicle:
         """The same, as predictive control takes it; its time is `now`, s on our clock."""
         return Vehicle(
             now,
@@ -127,7 +129,7 @@ class MotionEstimate:
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)
 
-    def surprise(self) -> str | None:
+    def mismatch_warning(self) -> str | None:
         """In words, where the drag is another than the configuration says."""
         told, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
         off = learned.per_velocity(speed) - told.per_velocity(speed)

@@ -126,7 +126,7 @@ def hold_delay(config: Config) -> float:
 
 def _feedback_delay(config: Config) -> float:
     """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
-    return tilt_response(config).slowness + 0.5 / config.guidance.rate_hz
+    return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
@@ -235,4 +235,4 @@ def predictive_settings(config: Config) -> Settings:
 
 
 def _identifies(config: Config) -> bool:
-    return "identify" in config.flight.programme
+    return "identify" in config.flight.maneuvers

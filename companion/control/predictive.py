@@ -23,7 +23,7 @@ class Following(NamedTuple):
     """What is followed just now.
 
     Attributes:
-        part: the trajectory as a programme.
+        part: the trajectory as a maneuver.
         time: since it began, s.
         pose: where it began.
         turn: jumps of the estimate's heading, which its headings move along with, rad.

@@ -13,20 +13,20 @@ from companion.config.known_drag import drag_prior
 from companion.config.sections import AxisKeys
 from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.asking_again import AskingAgain
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.judgement import Preflight
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
 from companion.flight.same_vehicle import SameVehicle
-from companion.flight.snapshot_builder import Lookout
+from companion.flight.snapshot_builder import SnapshotBuilder
 from companion.flight.vehicle_memory import VehicleMemory
 from companion.flight.watch import Watch
-from companion.guidance import HoverThrust, Sequence, ThrustSettings
+from companion.guidance import HoverThrust, ManeuverSequence, ThrustSettings
 from companion.guidance.follow import Follow
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
@@ -181,19 +181,19 @@ class Assembled:
     """A flight ready to run over an open link, and what is read from it afterwards."""
 
     flight: Flight
-    rig: Rig
+    context: FlightContext
     trace: FlightTrace
     dead_time_watch: DeadTimeWatch
     memory: VehicleMemory
 
     def close(self) -> None:
         """End what runs beside the flight."""
-        if self.rig.guide.predictive is not None:
-            self.rig.guide.predictive.close()
+        if self.context.guidance_loop.predictive is not None:
+            self.context.guidance_loop.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
         """What came of predictive control; None where it did not fly."""
-        predictive = self.rig.guide.predictive
+        predictive = self.context.guidance_loop.predictive
         if predictive is None:
             return None
         record = predictive.record
@@ -202,7 +202,7 @@ class Assembled:
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
-        loop = self.rig.loop
+        loop = self.context.loop
         return LoopCounts(
             samples=loop.samples,
             setpoints=loop.setpoints,
@@ -210,7 +210,7 @@ class Assembled:
             stale=loop.stale,
             refused=loop.refused,
             unanswered={reason.value: count for reason, count in loop.unanswered.items()},
-            rate_hz=self.rig.rate_hz,
+            rate_hz=self.context.rate_hz,
         )
 
 
@@ -220,7 +220,7 @@ def assemble(
     observer: Observer,
     ask_landing: AskLanding,
     folder: Path,
-    maneuvers: Sequence,
+    maneuvers: ManeuverSequence,
 ) -> Assembled:
     """Wire the rooms together over an open link, to fly `maneuvers`.
 
@@ -244,7 +244,7 @@ def assemble(
         clock,
     )
     ground = GroundContact(link.state, clock)
-    guide = Guide(
+    guidance_loop = GuidanceLoop(
         loop,
         linear_guidance(config),
         motion_estimate(config, lambda: link.clock.offset),
@@ -258,27 +258,39 @@ def assemble(
         clock=clock,
         vehicle_clock=link.clock,
     )
-    lookout = Lookout(link, loop, guide, real_time=not config.link.lockstep)
+    snapshot_builder = SnapshotBuilder(
+        link, loop, guidance_loop, real_time=not config.link.lockstep
+    )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
     loop.attitude_target = lambda: link.state.attitude_target
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
-    rig = Rig(config, link, loop, guide, lookout, maneuvers, ground, preflight, same_vehicle)
+    context = FlightContext(
+        config,
+        link,
+        loop,
+        guidance_loop,
+        snapshot_builder,
+        maneuvers,
+        ground,
+        preflight,
+        same_vehicle,
+    )
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     asking_again = AskingAgain(link, config.link)
-    watch = Watch(rig, ladder, asking_again, clock)
+    watch = Watch(context, ladder, asking_again, clock)
     loop.ask_mode = watch.ask_mode
-    flight = Flight(rig, watch, observer, ask_landing)
-    ladder.note = rig.note = preflight.note = flight.note
+    flight = Flight(context, watch, observer, ask_landing)
+    ladder.note = context.note = preflight.note = flight.note
     link.clock.on_event = asking_again.note = flight.note
     drag_is_told = config.guidance.drag is not None
-    memory = VehicleMemory(folder.parent, guide.estimate.drag, drag_is_told, flight.note)
+    memory = VehicleMemory(folder.parent, guidance_loop.estimate.drag, drag_is_told, flight.note)
     preflight.meet = memory.meet
-    for part in rig.programme.parts:
+    for part in context.maneuvers.parts:
         if isinstance(part, Follow):
             if part.slowed > 1.0:
                 flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
             if config.guidance.kind == "nmpc":
-                guide.predictive = predictive(config, part, flight.note)
+                guidance_loop.predictive = predictive(config, part, flight.note)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
-    return Assembled(flight, rig, trace, dead_time_watch, memory)
+    return Assembled(flight, context, trace, dead_time_watch, memory)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from companion.config import Config
 from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.flight.judgement import Preflight
 from companion.flight.same_vehicle import SameVehicle
-from companion.flight.snapshot_builder import Lookout
-from companion.guidance import Sequence
+from companion.flight.snapshot_builder import SnapshotBuilder
+from companion.guidance import ManeuverSequence
 from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
 from companion.vehicle.link import Link
@@ -32,12 +32,12 @@ _HEARTBEAT = 0.0
 
 
 @dataclass(slots=True)
-class Rig:
+class FlightContext:
     """The parts of one flight, and the little that its phases tell each other.
 
     Attributes:
         detail: what the running phase waits for just now, for the user.
-        rate_hz: setpoints a second while the programme was flown.
+        rate_hz: setpoints a second while the maneuver was flown.
         heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
             from the rate at which heartbeats really come.
         mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
@@ -48,9 +48,9 @@ class Rig:
     config: Config
     link: Link
     loop: ControlLoop
-    guide: Guide
-    lookout: Lookout
-    programme: Sequence
+    guidance_loop: GuidanceLoop
+    snapshot_builder: SnapshotBuilder
+    maneuvers: ManeuverSequence
     ground: GroundContact
     preflight: Preflight
     same_vehicle: SameVehicle
@@ -64,8 +64,8 @@ class Rig:
     def release(self) -> None:
         """Stop answering samples: from here on nothing is sent that steers."""
         self.loop.on = False
-        self.loop.guarded = self.loop.taking_over = False
-        self.guide.stand_by()
+        self.loop.offboard_active = self.loop.taking_over = False
+        self.guidance_loop.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
         """Wait for a condition of the telemetry."""
@@ -107,7 +107,7 @@ class Rig:
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, unless guidance finds it stale."""
-        return self.guide.fresh_position()
+        return self.guidance_loop.fresh_position()
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

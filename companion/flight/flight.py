@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from typing import Any
 
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.flight.observer import Observer
 from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
 from companion.flight.same_vehicle import ChecksVoid
@@ -29,18 +29,20 @@ class Flight:
         events: what happened, as (time in s since the flight began, text).
 
     Args:
-        rig: the parts of the flight.
+        context: the parts of the flight.
         watch: judges while the phases run.
         observer: is told what happens.
         ask_landing: asked after the user interrupted and the vehicle holds: land it?
     """
 
-    def __init__(self, rig: Rig, watch: Watch, observer: Observer, ask_landing: AskLanding) -> None:
-        self._ground = ground_phases(rig.config.flight)
+    def __init__(
+        self, context: FlightContext, watch: Watch, observer: Observer, ask_landing: AskLanding
+    ) -> None:
+        self._ground = ground_phases(context.config.flight)
         self.phase = self._ground[0]
         self.failed_in: Phase | None = None
         self.events: list[tuple[float, str]] = []
-        self._rig = rig
+        self._context = context
         self._watch = watch
         self._observer = observer
         self._ask_landing = ask_landing
@@ -54,8 +56,8 @@ class Flight:
     async def run(self) -> str:
         """Fly; returns "ok" or the reason for which the flight ended."""
         helpers = [
-            asyncio.create_task(self._guarded(work))
-            for work in (self._rig.guide.run, self._judge, self._tell)
+            asyncio.create_task(self._offboard_active(work))
+            for work in (self._context.guidance_loop.run, self._judge, self._tell)
         ]
         try:
             await self._fly_all()
@@ -65,15 +67,15 @@ class Flight:
             await self._leave(ended.exit or self._usual_exit())
             return ended.reason
         finally:
-            self._rig.release()
+            self._context.release()
             for task in helpers:
                 await _cancelled(task)
         return "ok"
 
     def end(self, ended: FlightEnded) -> None:
         """End the running phase from outside it; only the first reason counts."""
-        if ended.exit is Exit.LET_GO:
-            self._rig.release()
+        if ended.exit is Exit.RELEASE:
+            self._context.release()
         if not self._end.done():
             self._end.set_result(ended)
 
@@ -86,7 +88,7 @@ class Flight:
         if self.failed_in is None:
             self.end(FlightEnded(reason))
             return
-        self._rig.release()
+        self._context.release()
         if all(text != reason for _, text in self.events):
             self.note(reason)
 
@@ -135,9 +137,9 @@ class Flight:
                     await self._fly(phase)
             except ChecksVoid as void:
                 self.note(f"{void.reason}; the checks are made anew")
-                self._rig.release()
-                self._rig.link.state.forget()
-                self._rig.same_vehicle.begin()
+                self._context.release()
+                self._context.link.state.forget()
+                self._context.same_vehicle.begin()
                 self._end = self._new_end()
             else:
                 return
@@ -146,8 +148,10 @@ class Flight:
     def _phases(self) -> Iterator[Phase]:
         """All phases, in order; what follows the ground's depends on the autopilot met there."""
         yield from self._ground
-        rig = self._rig
-        yield from flight_phases(rig.config.flight, rig.programme.duration, rig.link.family)
+        context = self._context
+        yield from flight_phases(
+            context.config.flight, context.maneuvers.duration, context.link.family
+        )
 
     async def _fly(self, phase: Phase) -> None:
         """Run one phase to its end; whatever goes wrong becomes a `FlightEnded`."""
@@ -156,7 +160,7 @@ class Flight:
         if not self._end.done():
             self._judge_once(phase)  # before the phase commands anything
         if not self._end.done():
-            await self._race(phase.work(self._rig), phase.timeout)
+            await self._race(phase.work(self._context), phase.timeout)
         if self._end.done():
             raise self._end.result()
 
@@ -170,7 +174,7 @@ class Flight:
                 return None
             if not task.done():
                 raise FlightEnded(
-                    f"waited {seconds:g} s for {self.phase.waits_for}: {self._rig.detail}"
+                    f"waited {seconds:g} s for {self.phase.waits_for}: {self._context.detail}"
                 )
             return task.result()
         except (FlightEnded, asyncio.CancelledError):
@@ -184,7 +188,7 @@ class Flight:
 
     def _usual_exit(self) -> Exit:
         phase = self.phase
-        if phase.on_failure_landed is not None and self._rig.ground.standing:
+        if phase.on_failure_landed is not None and self._context.ground.standing:
             return phase.on_failure_landed
         return phase.on_failure
 
@@ -202,11 +206,11 @@ class Flight:
         self.note(exit_.value)
         self._end = self._new_end()
         try:
-            for phase in exit_phases(self._rig.config.flight, exit_):
+            for phase in exit_phases(self._context.config.flight, exit_):
                 await self._fly(phase)
         except FlightEnded as ended:
             then = ended.exit or self._usual_exit()
-            if then in (exit_, Exit.LEAVE, Exit.LET_GO):
+            if then in (exit_, Exit.LEAVE, Exit.RELEASE):
                 raise
             self.note(ended.reason)
             await self._exit(then)
@@ -219,7 +223,7 @@ class Flight:
         finally:
             self._asking = False
 
-    async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
+    async def _offboard_active(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run what runs beside the phases; a fault of ours there must not go unseen."""
         try:
             await work()
@@ -243,7 +247,9 @@ class Flight:
         while True:
             await asyncio.sleep(_TELL_PERIOD)
             elapsed = self._clock() - self._entered
-            self._observer.waiting(self.phase.name, self._rig.detail, elapsed, self.phase.timeout)
+            self._observer.waiting(
+                self.phase.name, self._context.detail, elapsed, self.phase.timeout
+            )
 
     @staticmethod
     def _new_end() -> asyncio.Future[FlightEnded]:

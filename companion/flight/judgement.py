@@ -7,7 +7,7 @@ from math import inf
 
 from companion.config import Config
 from companion.flight.same_vehicle import SameVehicle
-from companion.guidance import Sequence
+from companion.guidance import ManeuverSequence
 from companion.preflight.evidence import Evidence, Identity, Stage
 from companion.preflight.examination import examine, forbidding, unsafe
 from companion.preflight.finding import Finding
@@ -39,16 +39,16 @@ class Preflight:
         config: what the vehicle is to be flown with.
         link: to it.
         same_vehicle: whether it still is the vehicle that was checked.
-        programme: what is to be flown; nobody else asks it for references.
+        maneuvers: what is to be flown; nobody else asks it for references.
     """
 
     def __init__(
-        self, config: Config, link: Link, same_vehicle: SameVehicle, programme: Sequence
+        self, config: Config, link: Link, same_vehicle: SameVehicle, maneuvers: ManeuverSequence
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self.meet: Callable[[Identity], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
-        self._programme = programme
+        self._maneuvers = maneuvers
         self._clock = asyncio.get_running_loop().time
         self._granted: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
@@ -90,7 +90,7 @@ class Preflight:
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
         self.meet(evidence.identity)
-        evidence = replace(evidence, stage=stage, programme=self._programme)
+        evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
         self._heed(examine(self._config, evidence, again=before is not None))
         return evidence
 

@@ -7,9 +7,9 @@ OFFBOARD, by our command or by its failsafe, that is OFFBOARD, and without setpo
 checks fail there for ever (measured).
 """
 
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.flight.mode_roles import in_role, require_role, roles_of
-from companion.flight.orders import enter
+from companion.flight.orders import change_mode
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.safety.ending import Exit, FlightEnded
 from companion.vehicle.roles import Role
@@ -17,31 +17,35 @@ from companion.vehicle.roles import Role
 _OFFBOARD = frozenset({Role.OFFBOARD})
 
 
-async def leave_offboard(rig: Rig, unready_in: frozenset[Role] = _OFFBOARD) -> None:
+async def leave_offboard(context: FlightContext, unready_in: frozenset[Role] = _OFFBOARD) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, and wait until it does.
 
     Nothing is asked of a vehicle that is armed or in any other mode.
 
     Args:
-        rig: of the flight.
+        context: of the flight.
         unready_in: what the modes are to a flight that are to be left.
 
     Raises:
         FlightEnded: Somebody else changed its mode meanwhile, or it does not want to hold.
     """
-    if rig.armed() or not roles_of(rig.link) & unready_in:
+    if context.armed() or not roles_of(context.link) & unready_in:
         return
-    mode = rig.link.state.mode
-    rig.note(f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold")
-    rig.detail = f"the autopilot to leave {mode}"
+    mode = context.link.state.mode
+    context.note(
+        f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold"
+    )
+    context.detail = f"the autopilot to leave {mode}"
 
     def ours() -> None:
-        if rig.armed():
-            raise FlightEnded("somebody else armed the vehicle", Exit.LET_GO)
-        require_role(rig.link, unready_in)
+        if context.armed():
+            raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
+        require_role(context.link, unready_in)
 
     try:
-        await enter(rig, rig.link.family.hold(), ours, lambda: in_role(rig.link, Role.HOLD))
+        await change_mode(
+            context, context.link.family.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+        )
     except (CommandRefused, CommandTimeout) as error:
         raise FlightEnded(
             f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "

@@ -1,4 +1,4 @@
-"""The programmes that the configuration asks for, checked before anything flies."""
+"""The maneuvers that the configuration asks for, checked before anything flies."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -13,7 +13,16 @@ from companion.control.outer_loop import thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
-from companion.guidance import GRAVITY, Circle, Corners, Doublets, Hover, Programme, Sequence, Steps
+from companion.guidance import (
+    GRAVITY,
+    Circle,
+    Corners,
+    Doublets,
+    Hover,
+    Maneuver,
+    ManeuverSequence,
+    Steps,
+)
 from companion.guidance.fence import Place
 from companion.guidance.follow import Follow
 from companion.guidance.predicted import predicted
@@ -31,19 +40,19 @@ from companion.safety.table import fence_of
 _SLOWER = "make it slower or smaller, or change the limit"
 
 
-def programme(config: Config) -> Sequence:
-    """The programmes of `flight.programme`, one after the other.
+def configured_maneuvers(config: Config) -> ManeuverSequence:
+    """The maneuvers of `flight.maneuvers`, one after the other.
 
     Raises:
-        ConfigError: a trajectory cannot be read, or a programme cannot be flown within the limits
+        ConfigError: a trajectory cannot be read, or a maneuver cannot be flown within the limits
             and the fence.
     """
-    return Sequence([_part(config, name) for name in config.flight.programme])
+    return ManeuverSequence([_part(config, name) for name in config.flight.maneuvers])
 
 
-def unbegun(sequence: Sequence) -> Sequence:
+def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
     """The same, as if nobody had asked it for a reference yet: `Follow` keeps where it began."""
-    return Sequence(
+    return ManeuverSequence(
         [
             replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
             for part in sequence.parts
@@ -51,12 +60,12 @@ def unbegun(sequence: Sequence) -> Sequence:
     )
 
 
-def require_inside(config: Config, parts: Iterable[Programme], origin: Place | None) -> None:
-    """See that all programmes stay inside the fence, with a polygon on the map if there is one.
+def require_inside(config: Config, parts: Iterable[Maneuver], origin: Place | None) -> None:
+    """See that all maneuvers stay inside the fence, with a polygon on the map if there is one.
 
     Args:
         config: as it is flown.
-        parts: the programmes.
+        parts: the maneuvers.
         origin: where control begins, or None where that is not known.
 
     Raises:
@@ -68,7 +77,7 @@ def require_inside(config: Config, parts: Iterable[Programme], origin: Place | N
             _refuse(part.name, check(motion))
 
 
-def _part(config: Config, name: str) -> Programme:
+def _part(config: Config, name: str) -> Maneuver:
     if name == "trajectory":
         return _follow(config)
     part = _simple(config, name)
@@ -80,7 +89,7 @@ def _part(config: Config, name: str) -> Programme:
     return part
 
 
-def _simple(config: Config, name: str) -> Programme:
+def _simple(config: Config, name: str) -> Maneuver:
     corners, steps, circle = config.corners, config.steps, config.circle
     match name:
         case "hover":
@@ -100,7 +109,7 @@ def _simple(config: Config, name: str) -> Programme:
             return _doublets(config.identify)
 
 
-def _motions(part: Programme, drag: Drag) -> Iterator[Motion]:
+def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
     """How the vehicle moves in it; with rates of the body, whatever its heading is."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
@@ -152,7 +161,7 @@ def _follow(config: Config) -> Follow:
 
 
 def _envelope(config: Config) -> Envelope:
-    """What the vehicle may be asked for, from where the programme begins."""
+    """What the vehicle may be asked for, from where the maneuver begins."""
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     return Envelope(
         max_tilt=radians(limits.max_tilt_deg),

@@ -31,7 +31,7 @@ def require_role(link: Link, allowed: Set[Role]) -> None:
         if link.state.mode_by_failsafe
         else "the pilot or another station took over"
     )
-    raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.LET_GO)
+    raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
 
 
 def in_roles(link: Link, allowed: Set[Role]) -> Callable[[], None]:

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.mavlink.command import Command
 from companion.mavlink.commands import command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout
@@ -21,14 +21,14 @@ Ours = Callable[[], None]
 """Raises `FlightEnded` where the vehicle is not ours to command, such as `roles.in_roles`."""
 
 
-async def order(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
+async def command_if_ours(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
     """Command until it is answered, and ask each time before whose the vehicle is.
 
     A command is never repeated blindly: the first one may have been obeyed, only its answer lost,
     and a pilot may have decided otherwise since.
 
     Args:
-        rig: The parts of the flight.
+        context: The parts of the flight.
         command: It.
         ours: Asked each time; where it raises, nothing is sent.
         done: See `Done`; looked at before a repetition.
@@ -39,53 +39,53 @@ async def order(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
         CommandTimeout: It never answered.
     """
     for given in range(_TRIES):
-        await rig.fresh_heartbeat()
-        rig.same_vehicle.require()
+        await context.fresh_heartbeat()
+        context.same_vehicle.require()
         if given > 0 and done():
             return
         ours()
         try:
-            await rig.link.command(*command, retries=0)
+            await context.link.command(*command, retries=0)
             return
         except CommandTimeout:
             continue
         except CommandRefused:
             # What does it already refuses to be told again.
-            if given == 0 or not await _comes(rig, done):
+            if given == 0 or not await _comes(context, done):
                 raise
             return
-    await rig.fresh_heartbeat()
+    await context.fresh_heartbeat()
     if not done():
         name = command_name(command.command)
         raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
 
 
-async def enter(rig: Rig, command: Command, ours: Ours, done: Done) -> None:
+async def change_mode(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
     """`order`, and wait until it shows; as there.
 
     Raises:
         FlightEnded: Also if it was accepted and somebody decided otherwise at once.
     """
-    await order(rig, command, ours, done)
+    await command_if_ours(context, command, ours, done)
     accepted = asyncio.get_running_loop().time()
 
     def entered() -> bool:
-        state = rig.link.state
+        state = context.link.state
         if done():
             return True
         if state.mode_received > accepted + _ENTERED:
             raise FlightEnded(
-                f"the mode was accepted and left again, not by us: {state.mode}", Exit.LET_GO
+                f"the mode was accepted and left again, not by us: {state.mode}", Exit.RELEASE
             )
         return False
 
-    await rig.until(entered)
+    await context.until(entered)
 
 
-async def _comes(rig: Rig, done: Done) -> bool:
+async def _comes(context: FlightContext, done: Done) -> bool:
     try:
         async with asyncio.timeout(_SHOWS):
-            await rig.until(done)
+            await context.until(done)
     except TimeoutError:
         return False
     return True

@@ -6,7 +6,7 @@ from typing import Any
 
 from companion.config.sections import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.safety.ending import Exit
 from companion.vehicle.autopilot import AutopilotFamily
 from companion.vehicle.roles import Role
@@ -38,7 +38,7 @@ class Phase:
 
     name: str
     waits_for: str
-    work: Callable[[Rig], Coroutine[Any, Any, None]]
+    work: Callable[[FlightContext], Coroutine[Any, Any, None]]
     timeout: float
     on_failure: Exit = Exit.LEAVE
     on_failure_landed: Exit | None = None
@@ -56,9 +56,9 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def flight_phases(
-    config: FlightConfig, programme_duration: float, family: AutopilotFamily
+    config: FlightConfig, maneuver_duration: float, family: AutopilotFamily
 ) -> tuple[Phase, ...]:
-    """The phases from there on, in the family's order; `programme_duration` in s."""
+    """The phases from there on, in the family's order; `maneuver_duration` in s."""
     stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _SHORT)
     return (
         *(() if family.take_over() is None else (stream,)),
@@ -84,10 +84,10 @@ def flight_phases(
             monitored=True,
         ),
         Phase(
-            "programme",
-            "the programme to end",
-            control_phases.programme,
-            programme_duration + 10.0,
+            "maneuvers",
+            "the maneuver to end",
+            control_phases.maneuvers,
+            maneuver_duration + 10.0,
             Exit.LAND,
             modes=frozenset({Role.OFFBOARD}),
             monitored=True,
@@ -102,7 +102,7 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
     """What is flown to leave the vehicle as `exit_` says."""
     return {
         Exit.LEAVE: (),
-        Exit.LET_GO: (),
+        Exit.RELEASE: (),
         Exit.DISARM: (_undo_arming(),),
         Exit.HOLD: (_hand_back(),),
         Exit.LAND: (_land(config), _disarm()),

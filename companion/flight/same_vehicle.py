@@ -92,7 +92,7 @@ class SameVehicle:
         if self.same or (reason := self._reason()) is None:
             return
         if self._committed:
-            raise FlightEnded(reason, Exit.LET_GO)
+            raise FlightEnded(reason, Exit.RELEASE)
         raise ChecksVoid(reason)
 
     def _reason(self) -> str | None:

@@ -10,9 +10,9 @@ from companion.config import Config
 from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.flight import AskLanding
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Observer
-from companion.flight.state_logger import Chronicle
+from companion.flight.state_logger import StateLogger
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
@@ -77,7 +77,7 @@ class Session:
         flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # Judged before the link is opened: it takes up to a second, and the link must be read.
-        maneuvers = programme(self._config)
+        maneuvers = configured_maneuvers(self._config)
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 
@@ -108,25 +108,29 @@ class Session:
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
-        flight, loop, guide = assembled.flight, assembled.rig.loop, assembled.rig.guide
+        flight, loop, guidance_loop = (
+            assembled.flight,
+            assembled.context.loop,
+            assembled.context.guidance_loop,
+        )
         dead_time_watch = assembled.dead_time_watch
 
         def on_attitude(sample: AttitudeSample) -> None:
             loop.on_sample(sample)
-            guide.note_attitude(sample)
-            if loop.guarded:
+            guidance_loop.note_attitude(sample)
+            if loop.offboard_active:
                 dead_time_watch.after_answer(sample.received)
 
         link.on_attitude = on_attitude
         link.on_error = flight.fail
-        chronicle = Chronicle(link.state, flight.note)
+        state_logger = StateLogger(link.state, flight.note)
 
         def on_heartbeat(_: object) -> None:
-            chronicle.look()
+            state_logger.look()
             flight.on_heartbeat()
 
         def on_current_mode(_: object) -> None:
-            chronicle.look()
+            state_logger.look()
             flight.on_current_mode()
 
         link.subscribe("HEARTBEAT", on_heartbeat)
@@ -140,7 +144,7 @@ class Session:
             return "left at once by the user"
         finally:
             link.on_attitude = None
-            chronicle.look()
+            state_logger.look()
 
     def _finish(
         self,
@@ -155,15 +159,15 @@ class Session:
         }
         flight = assembled.flight
         dead_times = assembled.dead_time_watch.over_the_flight()
-        guide = assembled.rig.guide
+        guidance_loop = assembled.context.guidance_loop
         trace = assembled.trace
-        for surprise in (
-            guide.learning.surprise(),
-            guide.estimate.surprise(),
-            trace.surprise(),
+        for mismatch_warning in (
+            guidance_loop.learning.mismatch_warning(),
+            guidance_loop.estimate.mismatch_warning(),
+            trace.mismatch_warning(),
         ):
-            if surprise is not None:
-                flight.note(surprise)
+            if mismatch_warning is not None:
+                flight.note(mismatch_warning)
         assembled.memory.keep()
         summary = Summary(
             result=result,

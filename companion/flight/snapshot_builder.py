@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.mavlink.stats import share_lost
@@ -41,18 +41,20 @@ class _Counted(NamedTuple):
     positions: int
 
 
-class Lookout:
+class SnapshotBuilder:
     """Looks at everything that the monitors judge.
 
     Args:
         link: to the vehicle.
         loop: answers the samples.
-        guide: makes the commands.
+        guidance_loop: makes the commands.
         real_time: whether deadlines mean anything: in lockstep the vehicle waits for us.
     """
 
-    def __init__(self, link: Link, loop: ControlLoop, guide: Guide, *, real_time: bool) -> None:
-        self._link, self._loop, self._guide = link, loop, guide
+    def __init__(
+        self, link: Link, loop: ControlLoop, guidance_loop: GuidanceLoop, *, real_time: bool
+    ) -> None:
+        self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self._real_time = real_time
         self._counted: deque[_Counted] = deque()
         self._frames = 0
@@ -68,7 +70,7 @@ class Lookout:
     def begin(self, now: float) -> None:
         """Control begins: fences are about this place, and resets before this do not count."""
         state, resets = self._link.state, self._loop.resets
-        motion = self._guide.motion
+        motion = self._guidance_loop.motion
         self._start = None if motion is None else motion.position_ned
         self._origin = self._place(now)
         self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
@@ -122,7 +124,7 @@ class Lookout:
                 -inf if command is None else command.made_at,
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
-                self._guide.fresh_position() is not None,
+                self._guidance_loop.fresh_position() is not None,
                 None if clock.timeline == self._timeline else clock.last_change,
                 self.stood_still(since=loop.last_answer),
             ),
@@ -137,10 +139,10 @@ class Lookout:
         return sum(look.late for look in self._counted if look.now > since)
 
     def _motion(self) -> Motion:
-        guide, loop, start = self._guide, self._loop, self._start
+        guidance_loop, loop, start = self._guidance_loop, self._loop, self._start
         offset, velocity = None, (0.0, 0.0, 0.0)
-        if guide.motion is not None:
-            (north, east, down), velocity = guide.motion
+        if guidance_loop.motion is not None:
+            (north, east, down), velocity = guidance_loop.motion
             if start is not None:
                 offset = north - start[0], east - start[1], down - start[2]
         sample, idle = loop.resets.newest, loop.command is None or loop.command.idle
@@ -150,7 +152,7 @@ class Lookout:
             offset,
             velocity,
             self._link.state.height,
-            guide.off_course,
+            guidance_loop.off_course,
             None if idle else loop.thrust,
             self._origin,
         )

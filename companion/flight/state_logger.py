@@ -6,7 +6,7 @@ from companion.mavlink.texts import StatusText
 from companion.vehicle.state import VehicleState
 
 
-class Chronicle:
+class StateLogger:
     """Notes what changed since it last looked; looks at each heartbeat.
 
     Args:

@@ -2,15 +2,15 @@
 
 import asyncio
 
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import enter, order
+from companion.flight.orders import change_mode, command_if_ours
 from companion.preflight.evidence import Stage
 from companion.safety.ending import Exit, FlightEnded
 from companion.vehicle.roles import Role
 
 _SETTLING = 1.0
-"""Hold in offboard before the programme begins, s: the take-over is not part of it."""
+"""Hold in offboard before the maneuver begins, s: the take-over is not part of it."""
 
 _REACHED = 0.5
 """Height below the wanted one at which a climb that has ended counts as done, m."""
@@ -22,55 +22,57 @@ _ARRIVES = 2.0
 """So long a climb that has become a hold may still take to arrive, s; else somebody stopped it."""
 
 
-async def takeoff(rig: Rig) -> None:
+async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
-    state = rig.link.state
-    rig.same_vehicle.commit()
-    await rig.until(lambda: rig.fresh_position() is not None, "a fresh position")
-    await rig.preflight.require(Stage.ARMED)
-    await rig.fresh_heartbeat()
-    _require_ground(rig)
-    rig.detail = "the autopilot to accept the take-off"
-    height = rig.config.flight.takeoff_height_m
-    command = rig.link.family.take_off(height, _home_altitude(rig))
-    rig.ground.command_takeoff()
-    rig.loop.command = None  # an idle one, which nothing may send from here on
-    rig.guide.step()
+    state = context.link.state
+    context.same_vehicle.commit()
+    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
+    await context.preflight.require(Stage.ARMED)
+    await context.fresh_heartbeat()
+    _require_ground(context)
+    context.detail = "the autopilot to accept the take-off"
+    height = context.config.flight.takeoff_height_m
+    command = context.link.family.take_off(height, _home_altitude(context))
+    context.ground.command_takeoff()
+    context.loop.command = None  # an idle one, which nothing may send from here on
+    context.guidance_loop.step()
     # Asked again right before it is sent: PX4 that is told so disarmed takes off once a pilot arms.
-    await order(rig, command, lambda: _require_ground(rig), lambda: not state.landed)
-    climb = _Climb(rig, height)
-    await rig.until(climb.over)
+    await command_if_ours(
+        context, command, lambda: _require_ground(context), lambda: not state.landed
+    )
+    climb = _Climb(context, height)
+    await context.until(climb.over)
 
 
-async def offboard(rig: Rig) -> None:
+async def offboard(context: FlightContext) -> None:
     """Hand control over to our stream, and settle."""
-    rig.detail = "the vehicle to be as it was at the checks"
-    await rig.preflight.require(Stage.AIRBORNE)
-    rig.guide.hold_here()
-    rig.lookout.begin(asyncio.get_running_loop().time())
-    await _take_over(rig)
-    rig.guide.hold_here()
-    rig.loop.guarded, rig.loop.taking_over = True, False
+    context.detail = "the vehicle to be as it was at the checks"
+    await context.preflight.require(Stage.AIRBORNE)
+    context.guidance_loop.hold_here()
+    context.snapshot_builder.begin(asyncio.get_running_loop().time())
+    await _take_over(context)
+    context.guidance_loop.hold_here()
+    context.loop.offboard_active, context.loop.taking_over = True, False
     await asyncio.sleep(_SETTLING)
 
 
 class _Climb:
     """Watches the autopilot's own take-off."""
 
-    def __init__(self, rig: Rig, height: float) -> None:
-        self._rig, self._height = rig, height
+    def __init__(self, context: FlightContext, height: float) -> None:
+        self._context, self._height = context, height
         self._begun = False
         self._held_at: float | None = None
 
     def over(self) -> bool:
         """Whether it has arrived; raises `FlightEnded` if somebody ended it."""
-        rig, state = self._rig, self._rig.link.state
-        if not rig.armed():
-            raise FlightEnded("the vehicle disarmed in the take-off, not by us", Exit.LET_GO)
-        height, position = state.height, rig.fresh_position()
+        context, state = self._context, self._context.link.state
+        if not context.armed():
+            raise FlightEnded("the vehicle disarmed in the take-off, not by us", Exit.RELEASE)
+        height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
-        rig.detail = f"{self._height:g} m, now {height:.1f} m"
+        context.detail = f"{self._height:g} m, now {height:.1f} m"
         if height > self._height + _PAST:
             raise FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, and flight.takeoff_height_m is "
@@ -78,53 +80,53 @@ class _Climb:
             )
         near = height > self._height - _REACHED
         if not near and self._stopped():
-            raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.LET_GO)
+            raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
         return near and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
 
     def _stopped(self) -> bool:
         """Whether what was a climb has been a hold for a while."""
         now = asyncio.get_running_loop().time()
-        if in_role(self._rig.link, Role.TAKEOFF):
+        if in_role(self._context.link, Role.TAKEOFF):
             self._begun, self._held_at = True, None
         elif self._begun and self._held_at is None:
             self._held_at = now
         return self._held_at is not None and now - self._held_at > _ARRIVES
 
 
-def _require_ground(rig: Rig) -> None:
+def _require_ground(context: FlightContext) -> None:
     """See that it stands ready for the take-off."""
-    state = rig.link.state
-    require_role(rig.link, {Role.READY})
-    if not rig.armed() or state.flying:
-        raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.LET_GO)
+    state = context.link.state
+    require_role(context.link, {Role.READY})
+    if not context.armed() or state.flying:
+        raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.RELEASE)
     if not state.landed:
         raise FlightEnded("the autopilot does not say any more that it stands on the ground")
 
 
-async def _take_over(rig: Rig) -> None:
+async def _take_over(context: FlightContext) -> None:
     """Have our setpoints obeyed: by a command, or by the first of them."""
     # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
-    await rig.until(lambda: _commands_flight(rig), "a target from guidance")
-    rig.detail = "the autopilot to obey our rates"
-    rig.loop.taking_over = True
-    command = rig.link.family.take_over()
+    await context.until(lambda: _commands_flight(context), "a target from guidance")
+    context.detail = "the autopilot to obey our rates"
+    context.loop.taking_over = True
+    command = context.link.family.take_over()
     if command is None:
         # The mode we know may be a second old; never take the vehicle from a pilot who took it.
-        await rig.fresh_heartbeat()
-        require_role(rig.link, {Role.READY})
-        rig.loop.on = True
-        await rig.until(lambda: in_role(rig.link, Role.OFFBOARD))
+        await context.fresh_heartbeat()
+        require_role(context.link, {Role.READY})
+        context.loop.on = True
+        await context.until(lambda: in_role(context.link, Role.OFFBOARD))
         return
-    ours = in_roles(rig.link, {Role.READY})
-    await enter(rig, command, ours, lambda: in_role(rig.link, Role.OFFBOARD))
+    ours = in_roles(context.link, {Role.READY})
+    await change_mode(context, command, ours, lambda: in_role(context.link, Role.OFFBOARD))
 
 
-def _commands_flight(rig: Rig) -> bool:
-    return rig.loop.command is not None and not rig.loop.command.idle
+def _commands_flight(context: FlightContext) -> bool:
+    return context.loop.command is not None and not context.loop.command.idle
 
 
-def _home_altitude(rig: Rig) -> float:
-    home = rig.link.state.home
+def _home_altitude(context: FlightContext) -> float:
+    home = context.link.state.home
     if home is None:
         raise FlightEnded("the autopilot never sent its home position")
     return home.altitude_m

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from math import inf
 
 from companion.flight.asking_again import AskingAgain
-from companion.flight.context import Rig
+from companion.flight.context import FlightContext
 from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import Phase
 from companion.safety import Action, SafetyLadder
@@ -24,7 +24,7 @@ class Watch:
     """Notices what the control loop cannot: that nothing comes, or that others fly the vehicle.
 
     Args:
-        rig: the parts of the flight.
+        context: the parts of the flight.
         ladder: judges what it sees while the autopilot obeys us.
         asking_again: asks for telemetry that has become too rare.
         clock: our clock, s.
@@ -32,12 +32,12 @@ class Watch:
 
     def __init__(
         self,
-        rig: Rig,
+        context: FlightContext,
         ladder: SafetyLadder,
         asking_again: AskingAgain,
         clock: Callable[[], float],
     ) -> None:
-        self._rig = rig
+        self._context = context
         self._ladder = ladder
         self._clock = clock
         self._asking_again = asking_again
@@ -52,13 +52,13 @@ class Watch:
             FlightEnded: the phase must end, with the reason and what is to be done.
         """
         now = self._clock()
-        self._rig.lookout.listen(now)
-        self._rig.ground.look()
-        self._rig.same_vehicle.look()
-        self._rig.same_vehicle.require()
+        self._context.snapshot_builder.listen(now)
+        self._context.ground.look()
+        self._context.same_vehicle.look()
+        self._context.same_vehicle.require()
         if phase.modes:
-            require_role(self._rig.link, phase.modes)
-        if phase.monitored and self._rig.loop.guarded:
+            require_role(self._context.link, phase.modes)
+        if phase.monitored and self._context.loop.offboard_active:
             self._climb(now)
         if phase.modes:
             self._judge_heartbeat()
@@ -85,7 +85,7 @@ class Watch:
         asking = self._status_question is not None and not self._status_question.done()
         if early and not asking and now - self._status_asked_at >= _QUESTION_PERIOD:
             self._status_asked_at = now
-            self._status_question = asyncio.create_task(self._rig.fresh_heartbeat())
+            self._status_question = asyncio.create_task(self._context.fresh_heartbeat())
         self.judge(phase)
 
     def ask_mode(self) -> None:
@@ -95,37 +95,37 @@ class Watch:
 
     async def _confirm(self) -> None:
         """Wait for a heartbeat that is fresh: one that waited to be read may say what was."""
-        await self._rig.fresh_heartbeat()
-        loop, state = self._rig.loop, self._rig.link.state
-        roles = roles_of(self._rig.link)
+        await self._context.fresh_heartbeat()
+        loop, state = self._context.loop, self._context.link.state
+        roles = roles_of(self._context.link)
         # While we take over, the stream is needed before offboard is entered; in a failsafe that
         # came in between it would end the failsafe.
         entering = loop.taking_over and Role.READY in roles and not state.failsafe
-        if loop.held_back and (Role.OFFBOARD in roles or entering):
+        if loop.awaiting_mode and (Role.OFFBOARD in roles or entering):
             loop.resume()
 
     def _climb(self, now: float) -> None:
         """Let the ladder look, and do what it says."""
-        snapshot = self._rig.lookout.snapshot(now)
+        snapshot = self._context.snapshot_builder.snapshot(now)
         self._asking_again.look(snapshot.health)
         verdict = self._ladder.step(snapshot)
         if verdict is None:
             return
         if verdict.action is Action.HOLD:
-            self._rig.guide.give_up()
+            self._context.guidance_loop.give_up()
             return
         if verdict.mutes:
-            self._rig.release()
+            self._context.release()
         raise FlightEnded(verdict.reason, EXITS[verdict.action])
 
     def _judge_heartbeat(self) -> None:
-        state, now = self._rig.link.state, self._clock()
-        if now - state.mode_received > self._rig.heartbeat_limit:
+        state, now = self._context.link.state, self._clock()
+        if now - state.mode_received > self._context.heartbeat_limit:
             raise FlightEnded(
-                "no heartbeat from the vehicle, so its mode is not known any more", Exit.LET_GO
+                "no heartbeat from the vehicle, so its mode is not known any more", Exit.RELEASE
             )
         if state.heartbeat is None or outdated(state.heartbeat.received, now):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so whether it is armed is not known any more",
-                Exit.LET_GO,
+                Exit.RELEASE,
             )

@@ -5,9 +5,9 @@ from companion.guidance.drag_estimate import DragEstimate
 from companion.guidance.height import HeightGains
 from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
-from companion.guidance.linear import LinearCommand, LinearGuidance, LinearSettings, Situation
+from companion.guidance.linear import GuidanceInput, LinearCommand, LinearGuidance, LinearSettings
 from companion.guidance.lqr import Weights, chain_gains
-from companion.guidance.maneuvers import Circle, Corners, Hover, Programme, Sequence, Steps
+from companion.guidance.maneuvers import Circle, Corners, Hover, Maneuver, ManeuverSequence, Steps
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
 from companion.guidance.thrust import height_first, specific_thrust
@@ -19,6 +19,7 @@ __all__ = [
     "Corners",
     "Doublets",
     "DragEstimate",
+    "GuidanceInput",
     "HeightGains",
     "Hover",
     "HoverThrust",
@@ -26,13 +27,12 @@ __all__ = [
     "LinearCommand",
     "LinearGuidance",
     "LinearSettings",
+    "Maneuver",
+    "ManeuverSequence",
     "MotionObserver",
     "ObserverSettings",
     "Pose",
-    "Programme",
     "Reference",
-    "Sequence",
-    "Situation",
     "Steps",
     "ThrustSettings",
     "VehicleMotion",

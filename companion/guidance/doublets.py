@@ -1,4 +1,4 @@
-"""Programme `identify`: doublets that tell how the vehicle answers body rates and thrust."""
+"""Maneuver `identify`: doublets that tell how the vehicle answers body rates and thrust."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""A trajectory as a programme: from the pose where control holds, with the vehicle's own limits."""
+"""A trajectory as a maneuvers: from the pose where control holds, with the vehicle's own limits."""
 
 from dataclasses import dataclass
 from math import tau

@@ -127,8 +127,8 @@ class HoverThrust:
             acceleration = (velocity_down - before) / span
             measured = GRAVITY - acceleration - self._settings.drag * velocity
             if _PLAUSIBLE[0] <= measured <= _PLAUSIBLE[1]:
-                doubt = (_UNKNOWN_DRAG * velocity) ** 2
-                self._filter.learn(span, self._sum / self._count, measured, doubt)
+                extra_variance = (_UNKNOWN_DRAG * velocity) ** 2
+                self._filter.learn(span, self._sum / self._count, measured, extra_variance)
         self._begin(time, velocity_down)
 
     def pause(self) -> None:

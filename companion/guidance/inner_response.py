@@ -34,7 +34,7 @@ class InnerResponse:
     follows_model: bool
 
     @property
-    def slowness(self) -> float:
+    def effective_delay(self) -> float:
         """The response as a single lag, s: the delay it has on a steadily moving path."""
         return 1.0 / self.gain + self.lag + self.dead_time
 

@@ -41,7 +41,7 @@ class LinearSettings:
     period: float = 0.0
 
 
-class Situation(NamedTuple):
+class GuidanceInput(NamedTuple):
     """What guidance knows when it makes a command.
 
     Attributes:
@@ -91,7 +91,7 @@ class LinearGuidance:
         return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(
-        self, reference_at: ReferenceAt, time: float, situation: Situation
+        self, reference_at: ReferenceAt, time: float, situation: GuidanceInput
     ) -> LinearCommand:
         """One step.
 
@@ -122,7 +122,7 @@ class LinearGuidance:
         )
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, acts: Reference, situation: Situation) -> Horizontal:
+    def _feedback(self, now: Reference, acts: Reference, situation: GuidanceInput) -> Horizontal:
         """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
         settings, gains, wind = self._settings, self._settings.gains, situation.disturbance
         if now.drifting:
@@ -143,7 +143,7 @@ class LinearGuidance:
         return limited(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
-        self, reference: Reference, more: Horizontal, down: float, situation: Situation
+        self, reference: Reference, more: Horizontal, down: float, situation: GuidanceInput
     ) -> Coefficients:
         """Of the thrust that gives the reference's acceleration and `more` against drag."""
         slowed = situation.drag.deceleration(reference.velocity_ned)

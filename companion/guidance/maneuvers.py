@@ -1,7 +1,7 @@
-"""What can be flown: programmes give the reference as a function of the time since they began."""
+"""What can be flown: maneuvers give the reference as a function of the time since they began."""
 
 import math
-from collections.abc import Sequence as Programmes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,7 +15,7 @@ _REST = 1.0
 rest, and a hold that still corrects is not."""
 
 
-class Programme(Protocol):
+class Maneuver(Protocol):
     """A reference over time; anchored to the pose at which it was told to begin."""
 
     @property
@@ -239,10 +239,10 @@ class Circle:
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
-    """Programmes one after the other, all from the same starting pose."""
+class ManeuverSequence:
+    """Maneuvers one after the other, all from the same starting pose."""
 
-    parts: Programmes[Programme]
+    parts: Sequence[Maneuver]
 
     @property
     def name(self) -> str:
@@ -254,7 +254,7 @@ class Sequence:
         """Sum of the parts, s."""
         return sum(part.duration for part in self.parts)
 
-    def part_at(self, time: float) -> tuple[Programme, float]:
+    def part_at(self, time: float) -> tuple[Maneuver, float]:
         """The part that is flown at `time`, and the time since that part began."""
         for part in self.parts[:-1]:
             if time < part.duration:

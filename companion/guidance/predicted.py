@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.horizontal import Horizontal, rotated
-from companion.guidance.maneuvers import Programme
+from companion.guidance.maneuvers import Maneuver
 from companion.guidance.reference import GRAVITY, Pose, Reference, Vector
 
 _LARGEST_TILT = 1.4
@@ -26,7 +26,7 @@ class Moment(NamedTuple):
     acceleration: Vector
 
 
-def predicted(part: Programme, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
+def predicted(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
     """The maneuver at its `check_times`, begun at rest.
 
     Args:

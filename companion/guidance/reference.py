@@ -12,7 +12,7 @@ GRAVITY = 9.80665
 
 
 class Pose(NamedTuple):
-    """Where a programme begins."""
+    """Where a maneuver begins."""
 
     position_ned: Vector
     heading: float

@@ -61,18 +61,20 @@ class ThrustFilter:
         self._noise = _FIRST_NOISE
         self._refusals = 0.0
 
-    def learn(self, span: float, share: float, specific_thrust: float, doubt: float) -> None:
+    def learn(
+        self, span: float, share: float, specific_thrust: float, extra_variance: float
+    ) -> None:
         """Take one measurement.
 
         Args:
             span: since the last one or over which it was taken, s.
             share: of thrust, 0..1, mean over the span.
             specific_thrust: along the same axis, m/s², mean over the span.
-            doubt: variance that this one has beyond the usual, (m/s²)².
+            extra_variance: variance that this one has beyond the usual, (m/s²)².
         """
         self._variance = min(self._variance + self._drift * span, self._first_variance)
         innovation = specific_thrust - self.gain * share
-        expected = share * share * self._variance + self._noise + doubt
+        expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE * _GATE * expected)
         passed = min(1.0, span / _REFUSAL_TIME)
         self._refusals += passed * (copysign(min(ratio, 1.0), innovation) - self._refusals)

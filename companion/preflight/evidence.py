@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from companion.guidance import Sequence
+from companion.guidance import ManeuverSequence
 from companion.mavlink.stats import share_lost
 from companion.preflight.parameter_survey import Survey
 from companion.vehicle.autopilot import AutopilotFamily
@@ -98,7 +98,7 @@ class SampleTimes(NamedTuple):
     rate: float | None = None
 
 
-class Company(NamedTuple):
+class OtherNodes(NamedTuple):
     """Others on the link.
 
     Attributes:
@@ -132,7 +132,7 @@ class Evidence:
         identity: What the autopilot is.
         stage: What the vehicle is judged for.
         words: What the autopilot said meanwhile that is a warning or worse.
-        programme: What is to be flown; `None` where nothing is.
+        maneuvers: What is to be flown; `None` where nothing is.
     """
 
     family: AutopilotFamily
@@ -143,12 +143,12 @@ class Evidence:
     window: float
     link: LinkQuality
     samples: SampleTimes
-    company: Company
+    company: OtherNodes
     resets: int
     identity: Identity
     stage: Stage = Stage.GROUND
     words: tuple[str, ...] = ()
-    programme: Sequence | None = None
+    maneuvers: ManeuverSequence | None = None
 
     @property
     def awaits_position(self) -> bool:

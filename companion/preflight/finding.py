@@ -45,7 +45,7 @@ class Key(StrEnum):
     OTHER_SETPOINTS = "link.other_setpoints"
     OFFBOARD_LOSS = "safety.offboard_loss"
     FENCE = "safety.fence_polygon_deg"
-    PROGRAMME = "flight.programme"
+    MANEUVERS = "flight.maneuvers"
     PLANNER = "planner.name"
     DEAD_TIME = "vehicle.dead_time_ms"
     ACCEPT = "flight.accept"

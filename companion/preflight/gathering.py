@@ -12,7 +12,7 @@ from companion.mavlink.codec import message_id
 from companion.mavlink.errors import CommandRefused, LinkTimeout
 from companion.mavlink.stats import LinkStats
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, Stage
-from companion.preflight.link_listener import Ear
+from companion.preflight.link_listener import LinkListener
 from companion.preflight.parameter_survey import Survey, survey
 from companion.vehicle.link import Link
 from companion.vehicle.streams import StreamRate
@@ -59,7 +59,7 @@ async def gather(
     """
     loop = asyncio.get_running_loop()
     before, began = replace(link.stats), loop.time()
-    with Ear(link, loop.time) as ear:
+    with LinkListener(link, loop.time) as ear:
         read, achieved, identity = await asyncio.gather(
             survey(link, link.family.parameters, before=known),
             link.measure_rates(granted, seconds),

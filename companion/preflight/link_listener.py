@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.attitude.representation import is_unit
 from companion.mavlink.codec import Message
 from companion.mavlink.framing import Frame
-from companion.preflight.evidence import Company, SampleTimes
+from companion.preflight.evidence import OtherNodes, SampleTimes
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
@@ -31,7 +31,7 @@ _ENOUGH = 10
 """Samples from which the rate of a clock can be told."""
 
 
-class Ear:
+class LinkListener:
     """Listens while its block runs.
 
     Args:
@@ -52,7 +52,7 @@ class Ear:
         self._resets_before: int | None = None
         self.resets = 0
 
-    def __enter__(self) -> "Ear":
+    def __enter__(self) -> "LinkListener":
         self._before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
@@ -94,9 +94,9 @@ class Ear:
         )
 
     @property
-    def company(self) -> Company:
+    def company(self) -> OtherNodes:
         """Who else was heard so far."""
-        return Company(
+        return OtherNodes(
             frozenset(self._sources),
             frozenset(self._companions),
             frozenset(self._steering),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from companion.config import Config
 from companion.config.known_drag import least_drag
 from companion.drag import Drag
-from companion.guidance import Pose, Reference, Sequence
+from companion.guidance import ManeuverSequence, Pose, Reference
 from companion.guidance.fence import Fence
 from companion.guidance.offboard_loss import Flown, Loss, Reach, path_thrust, reach, tilted_thrust
 from companion.guidance.reference import Vector
@@ -43,14 +43,14 @@ class Worst(NamedTuple):
 
 def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints end at the worst moment of the flight."""
-    dead_man, programme = evidence.family.dead_man, evidence.programme
-    held = evidence.survey.values.get(dead_man.parameter)
-    if programme is None or held is None or not 0.0 <= held <= LONGEST_HELD:
+    offboard_loss_failsafe, maneuvers = evidence.family.offboard_loss_failsafe, evidence.maneuvers
+    held = evidence.survey.values.get(offboard_loss_failsafe.parameter)
+    if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
         return  # an unknown or longer time is unsafe, whatever is flown
-    worst = worst_reach(config, programme, held, brakes=dead_man.brakes)
+    worst = worst_reach(config, maneuvers, held, brakes=offboard_loss_failsafe.brakes)
     carried = (
         f"should our setpoints end, the last rates are held for {held:g} s "
-        f"({dead_man.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
+        f"({offboard_loss_failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
         f"{worst.up:.0f} m up and {worst.down:.0f} m down"
     )
     source = "worst case of docs/exits.md"
@@ -58,7 +58,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(Key.OFFBOARD_LOSS, Verdict.SAFE, carried, source=source)
         return
     shortest = shortest_hold(1e-3 * config.deadman.silence_limit_ms)
-    shorter = f"set {dead_man.parameter} to {shortest:g}, " if held > shortest else ""
+    shorter = f"set {offboard_loss_failsafe.parameter} to {shortest:g}, " if held > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,
         Verdict.INEFFECTIVE,
@@ -70,7 +70,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def worst_reach(config: Config, programme: Sequence, held: float, *, brakes: bool) -> Worst:
+def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, brakes: bool) -> Worst:
     """The largest reach over the maneuvers; `held` and `brakes` as of `Loss`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
@@ -85,7 +85,7 @@ def worst_reach(config: Config, programme: Sequence, held: float, *, brakes: boo
     drag = least_drag(config)
     max_tilt_rate = radians(limits.max_tilt_rate_deg_s)
     loss, worst = Loss(held, brakes, drag, max_tilt_rate, fence), Worst()
-    for time, flown in _flown(config, programme, drag):
+    for time, flown in _flown(config, maneuvers, drag):
         there = reach(flown, loss)
         breach, at = worst.breach, worst.time
         if breach is None:
@@ -120,20 +120,22 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
     return None
 
 
-def _flown(config: Config, programme: Sequence, drag: Drag) -> Iterator[tuple[float, Flown]]:
+def _flown(
+    config: Config, maneuvers: ManeuverSequence, drag: Drag
+) -> Iterator[tuple[float, Flown]]:
     """What is flown over the maneuvers; open-loop steps are answered as the attitude law does."""
     gain = config.planner.gain_per_s
-    period = max(_PERIOD, programme.duration / _MOST)
+    period = max(_PERIOD, maneuvers.duration / _MOST)
     velocity: Vector = (0.0, 0.0, 0.0)
     place: Vector = (0.0, 0.0, 0.0)
     tilt = (0.0, 0.0)
-    for index in range(int(programme.duration / period) + 1):
+    for index in range(int(maneuvers.duration / period) + 1):
         time = index * period
-        told = programme.at(time, _START)
+        told = maneuvers.at(time, _START)
         if told.closed_loop:
             place, velocity = told.position_ned, told.velocity_ned
             thrust = _thrust(told, drag)
-            later = _thrust(programme.at(time + _AHEAD, _START), drag)
+            later = _thrust(maneuvers.at(time + _AHEAD, _START), drag)
             turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
             size = hypot(*thrust)
             tilt = (thrust[0] / size, thrust[1] / size)

@@ -128,7 +128,7 @@ def _loop_words(summary: Summary) -> Text:
     counts, link = summary.counts, summary.link
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
-        f"in the programme\n{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
+        f"in the maneuver\n{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite"
     )

@@ -25,7 +25,7 @@ class LoopCounts:
         stale: samples not answered because they or the target were too old, or out of order.
         refused: samples not answered because they could not be used or the answer could not leave.
         unanswered: all samples that were not answered, by reason.
-        rate_hz: setpoints a second of vehicle time, over the programme.
+        rate_hz: setpoints a second of vehicle time, over the maneuver.
     """
 
     samples: int = 0

@@ -94,7 +94,7 @@ class FlightTrace:
                 header = ",".join(series.columns)
                 np.savetxt(folder / name, series.rows(), "%.9g", ",", header=header, comments="")
 
-    def surprise(self) -> str | None:
+    def mismatch_warning(self) -> str | None:
         """What the user is told if rows were lost."""
         lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
         if lost == 0:

@@ -1,4 +1,4 @@
-"""How a flight can end before its programme does, and what is then done with the vehicle."""
+"""How a flight can end before its maneuver does, and what is then done with the vehicle."""
 
 from enum import Enum
 
@@ -10,7 +10,7 @@ class Exit(Enum):
     DISARM = "disarming"
     HOLD = "handing back: asking the autopilot to hold"
     LAND = "handing back: asking the autopilot to land"
-    LET_GO = "letting go: the vehicle is left to its pilot and its autopilot"
+    RELEASE = "letting go: the vehicle is left to its pilot and its autopilot"
 
 
 class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops early ends

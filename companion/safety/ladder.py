@@ -24,7 +24,7 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Climbs as far as the gravest breach asks, and never down again.
 
-    A hold that mends what it was called for ends the flight by landing, since the programme is
+    A hold that mends what it was called for ends the flight by landing, since the maneuver is
     given up; one that does not within `hold_time` goes on to the monitor's next rung.
 
     Attributes:
@@ -46,7 +46,7 @@ class SafetyLadder:
         """Look once; what is to be done now, if anything."""
         raised = [alarm for alarm in self._alarms if alarm.step(snapshot) and self._tell(alarm)]
         gravest = max(raised, key=_rung, default=None)
-        if gravest is not None and gravest.monitor.action.rung > Action.HOLD.rung:
+        if gravest is not None and gravest.monitor.action.severity > Action.HOLD.severity:
             return _verdict(gravest, gravest.monitor.action)
         if self._held_at is not None:
             return self._after_hold(snapshot.now, self._held_at)
@@ -62,7 +62,7 @@ class SafetyLadder:
             return Verdict(Action.LAND, self._held_for)
         if now - held_at < self._hold_time:
             return None
-        gravest = max(wrong, key=lambda alarm: alarm.monitor.then.rung)
+        gravest = max(wrong, key=lambda alarm: alarm.monitor.then.severity)
         return _verdict(gravest, gravest.monitor.then)
 
     def _tell(self, alarm: Alarm) -> bool:
@@ -76,7 +76,7 @@ class SafetyLadder:
 
 
 def _rung(alarm: Alarm) -> int:
-    return alarm.monitor.action.rung
+    return alarm.monitor.action.severity
 
 
 def _verdict(alarm: Alarm, action: Action) -> Verdict:

@@ -26,16 +26,16 @@ class Action(Enum):
     WARN = "warn"
     """Say so, once, and fly on."""
     HOLD = "hold"
-    """Give the programme up and hold where the vehicle is, still in offboard."""
+    """Give the maneuver up and hold where the vehicle is, still in offboard."""
     HAND_BACK = "hand_back"
     """Ask the autopilot to hold; it is left holding."""
     LAND = "land"
     """Hand back, and ask the autopilot to land."""
-    LET_GO = "let_go"
+    RELEASE = "release"
     """Send nothing any more: the vehicle is its pilot's or its failsafe's."""
 
     @property
-    def rung(self) -> int:
+    def severity(self) -> int:
         """How far up it is."""
         return list(Action).index(self)
 
@@ -43,7 +43,7 @@ class Action(Enum):
 EXITS = {
     Action.HAND_BACK: Exit.HOLD,
     Action.LAND: Exit.LAND,
-    Action.LET_GO: Exit.LET_GO,
+    Action.RELEASE: Exit.RELEASE,
 }
 """How a flight ends that an action ends."""
 

@@ -14,7 +14,7 @@ _READ = 0.2
 """After a pause of ours what came meanwhile is read within so long, s; until then it looks old."""
 _GAPS = 2
 """In the answers, within 5 s: a link may stumble, but not all the time."""
-_LET_GO, _HAND_BACK, _HOLD, _LAND = Action.LET_GO, Action.HAND_BACK, Action.HOLD, Action.LAND
+_RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
 def monitors(config: Config) -> tuple[Monitor, ...]:
@@ -31,10 +31,10 @@ def _authority(config: Config) -> tuple[Monitor, ...]:
     limit = config.deadman.silence_limit_ms * _MS
     unheard, still = silence(limit, heard=False), silence(limit, heard=True)
     return (
-        Monitor("unheard", unheard, _LET_GO, mutes=True),
+        Monitor("unheard", unheard, _RELEASE, mutes=True),
         Monitor("silence", still, _HAND_BACK, mutes=True),
         Monitor("clock", clock_changed, _HAND_BACK, mutes=True),
-        Monitor("disarmed", authority.disarmed, _LET_GO),
+        Monitor("disarmed", authority.disarmed, _RELEASE),
         Monitor("landed", authority.landed, _LAND),
         # Where it acts, the mode is not ours any more, and that is seen first. ArduPilot tells of
         # one without an action, too, in which nobody would fly.

@@ -13,7 +13,7 @@ from companion.vehicle.readiness import Readiness
 from companion.vehicle.roles import Role
 
 
-class DeadMan(NamedTuple):
+class OffboardLossFailsafe(NamedTuple):
     """What the autopilot does when our setpoints stop.
 
     Attributes:
@@ -59,7 +59,7 @@ class AutopilotFamily(Protocol):
         interval_step_us: SET_MESSAGE_INTERVAL counts in whole multiples of this.
         rates_along_target: Whether it takes body rates along the axes of ATTITUDE_TARGET, an
             attitude that they turn before the body follows. Else along the body's own.
-        dead_man: What it does when setpoints stop.
+        offboard_loss_failsafe: What it does when setpoints stop.
         unready_in: What the modes are to a flight in which it stands disarmed and never is ready.
         parameters: Those that matter to a flight by body rates.
     """
@@ -72,7 +72,7 @@ class AutopilotFamily(Protocol):
     wanted_rates: Mapping[str, float]
     interval_step_us: int
     rates_along_target: bool
-    dead_man: DeadMan
+    offboard_loss_failsafe: OffboardLossFailsafe
     unready_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]
 

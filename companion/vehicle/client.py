@@ -20,7 +20,7 @@ from companion.vehicle.state import VehicleState
 from companion.vehicle.streams import StreamRate, measure, set_rates
 
 
-class Conversation:
+class VehicleClient:
     """The side of a link that asks and listens.
 
     Attributes:

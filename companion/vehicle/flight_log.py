@@ -64,14 +64,16 @@ def read_flight_log(path: Path) -> FlightLog:
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
         raise LogError(f"{path}: holds no heartbeat of {FAMILY_NAMES}")
-    if not reader.obeyed:
+    if not reader.offboard_active:
         raise LogError(
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
             "armed, in the mode that obeys it"
         )
     # Both kinds tell the same rates; together they would count twice.
     return FlightLog(
-        reader.obeyed, max(reader.quaternion, reader.euler, key=len), reader.specific_thrust
+        reader.offboard_active,
+        max(reader.quaternion, reader.euler, key=len),
+        reader.specific_thrust,
     )
 
 
@@ -81,14 +83,14 @@ class _Reader:
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
-        obeyed: rows of setpoints.
+        offboard_active: rows of setpoints.
         quaternion: rows of rates told by ATTITUDE_QUATERNION.
         euler: those told by ATTITUDE.
         specific_thrust: rows of the accelerometer.
     """
 
     vehicle: tuple[int, int] | None = None
-    obeyed: list[Row] = field(default_factory=list)
+    offboard_active: list[Row] = field(default_factory=list)
     quaternion: list[Row] = field(default_factory=list)
     euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
@@ -116,7 +118,7 @@ class _Reader:
         armed = bool(heartbeat.base_mode & _ARMED)
         obeying = armed and Role.OFFBOARD in self._family.roles(mode)
         if obeying and self._obeying:
-            self.obeyed.extend(self._unconfirmed)
+            self.offboard_active.extend(self._unconfirmed)
         self._unconfirmed.clear()
         self._obeying = obeying
 

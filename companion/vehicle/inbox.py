@@ -119,7 +119,7 @@ class Inbox:
             if self._quick and data[_SOURCE_AND_ID] == self._attitude_source:
                 return self._take_attitude(data, received_ns) or self._take(data, received_ns)
             return self._take(data, received_ns)
-        except Exception as error:  # of the tap; subscribers are guarded one by one
+        except Exception as error:  # of the tap; subscribers are offboard_active one by one
             self._router.report(error)
             return False
 

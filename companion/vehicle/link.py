@@ -19,7 +19,7 @@ from companion.mavlink.silence import no_beacon, no_heartbeat
 from companion.mavlink.stamp_keeper import StampKeeper
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport import Tap
-from companion.vehicle.client import Conversation
+from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.connection import Connection
 from companion.vehicle.inbox import Inbox, Notice
@@ -31,7 +31,7 @@ from companion.vehicle.timesync import TimeSync
 _LOG = logging.getLogger(__name__)
 
 
-class Link(Conversation):
+class Link(VehicleClient):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
     It sends a heartbeat, keeps the clocks compared and opens a dropped connection again. It never

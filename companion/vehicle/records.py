@@ -111,7 +111,7 @@ class Battery(NamedTuple):
     remaining: float | None
 
 
-class ToldThrust(NamedTuple):
+class AttitudeTargetThrust(NamedTuple):
     """ATTITUDE_TARGET: what the autopilot's attitude and rate control are told, by whomever.
 
     Attributes:

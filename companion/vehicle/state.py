@@ -16,6 +16,7 @@ from companion.vehicle.readiness import Readiness
 from companion.vehicle.records import (
     GPS_FIX_3D,
     AttitudeTarget,
+    AttitudeTargetThrust,
     Battery,
     CurrentMode,
     Estimator,
@@ -26,7 +27,6 @@ from companion.vehicle.records import (
     Landed,
     LocalPosition,
     Prearm,
-    ToldThrust,
     Vector,
     gps_fault,
     outdated,
@@ -50,7 +50,7 @@ class _Values:
     landed_state: Landed | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
-    told_thrust: ToldThrust | None = None
+    attitude_target_thrust: AttitudeTargetThrust | None = None
     attitude_target: AttitudeTarget | None = None
     global_position: GlobalPosition | None = None
     gps: Gps | None = None
@@ -72,7 +72,7 @@ class VehicleState(_Values):
         landed_state: See `Landed`; `landed` and `taking_off` heed its age.
         position: See `LocalPosition`; the newest by its own time stamp.
         battery: See `Battery`.
-        told_thrust: See `ToldThrust`.
+        attitude_target_thrust: See `AttitudeTargetThrust`.
         attitude_target: See `AttitudeTarget`; only of a family with `rates_along_target`. One that
             is no unit quaternion is passed over.
         global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
@@ -304,7 +304,7 @@ class VehicleState(_Values):
 
     def _on_attitude_target(self, message: Message) -> None:
         if 0.0 <= message.thrust <= 1.0:
-            self.told_thrust = ToldThrust(self._clock(), message.thrust)
+            self.attitude_target_thrust = AttitudeTargetThrust(self._clock(), message.thrust)
         elif not isfinite(message.thrust):
             self._stats.non_finite += 1
         family = self.family

@@ -102,14 +102,14 @@ def test_both_limits_at_once(rate):
     assert tilt_rate(sample.rates)[short] == pytest.approx(W_M, rel=1e-9)
     assert sample.part[~short] == pytest.approx(sample.whole, rel=1e-9)
     asked = (1.0 - np.exp(-YAW_GAIN * sample.dt)) * sample.error
-    held_back = np.abs(sample.turn - asked) > 1e-9
-    assert 0.2 < held_back.mean() < 0.98
-    assert yaw[held_back] == pytest.approx(YAW_RATE, rel=1e-9)
+    awaiting_mode = np.abs(sample.turn - asked) > 1e-9
+    assert 0.2 < awaiting_mode.mean() < 0.98
+    assert yaw[awaiting_mode] == pytest.approx(YAW_RATE, rel=1e-9)
     # And it is held back no more than that: a little more of the turn asked would be too fast.
     further = sample.turn + 1e-6 * (asked - sample.turn)
     beyond = np.abs(sample.needed(sample.part, further)[:, 2]) > YAW_RATE
     clear = np.abs(asked - sample.turn) > 1e-6
-    assert beyond[held_back & clear].all()
+    assert beyond[awaiting_mode & clear].all()
 
 
 @pytest.mark.parametrize("rate", [1000, 250, 100, 50])

@@ -35,9 +35,9 @@ def config(tmp_path, text):
         ("planner: {name: so4}", "unknown planner 'so4'"),
         ("planner: {gain_per_s: .nan}", "finite"),
         ("planner: {name: model-following}", "needs vehicle.lag_ms and vehicle.dead_time_ms"),
-        ("flight: {programme: [corners]}\nlimits: {max_tilt_deg: 25}", "of corners' coefficients"),
-        ("flight: {programme: [loop]}", "`flight.programme.0`"),
-        ("flight: {programme: []}", "`flight.programme`"),
+        ("flight: {maneuvers: [corners]}\nlimits: {max_tilt_deg: 25}", "of corners' coefficients"),
+        ("flight: {maneuvers: [loop]}", "`flight.maneuvers.0`"),
+        ("flight: {maneuvers: []}", "`flight.maneuvers`"),
         ("steps: {settle_s: .inf}", "`steps.settle_s`"),
         ("deadman: {silence_limit_ms: 10000}", "`deadman.silence_limit_ms`"),
         ("deadman: {silence_limit_ms: 90}", "at least as long as the stale limits"),
@@ -57,15 +57,15 @@ def config(tmp_path, text):
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
         ("circle: {radius_m: 26}", "circle: from 33.75 s on it leaves the fence, by up to 2.0 m"),
         (
-            "flight: {programme: [identify]}\nlimits: {max_tilt_deg: 15}",
+            "flight: {maneuvers: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",
         ),
         (
-            "flight: {programme: [identify]}\nlimits: {max_tilt_rate_deg_s: 50}",
+            "flight: {maneuvers: [identify]}\nlimits: {max_tilt_rate_deg_s: 50}",
             "identify.tilt_rate_deg_s must not exceed limits.max_tilt_rate_deg_s",
         ),
         (
-            "flight: {programme: [identify]}\nlimits: {max_yaw_rate_deg_s: 40}",
+            "flight: {maneuvers: [identify]}\nlimits: {max_yaw_rate_deg_s: 40}",
             "identify.yaw_rate_deg_s must not exceed limits.max_yaw_rate_deg_s",
         ),
         ("a: [", "not valid YAML"),
@@ -127,8 +127,8 @@ def test_a_recording_folder_that_cannot_be_made_is_named(capsys, tmp_path):
     assert "recording.directory: cannot make" in err
 
 
-def test_an_unknown_programme_names_the_known(capsys, tmp_path):
-    code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--programme", "loop")
+def test_an_unknown_maneuver_names_the_known(capsys, tmp_path):
+    code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--maneuvers", "loop")
     assert code == 2
     assert "known: hover, steps, circle" in err
 
@@ -139,10 +139,10 @@ def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):
     for text, words in (
         ("link: {endpoint: nonsense}", "nonsense"),
         ("link: {signing_key_file: /not/there}", "/not/there"),
-        ("flight: {programme: [trajectory]}", "flight.trajectory: name a file"),
-        ("flight: {programme: [trajectory], trajectory: /not/there.yaml}", "/not/there.yaml"),
+        ("flight: {maneuvers: [trajectory]}", "flight.trajectory: name a file"),
+        ("flight: {maneuvers: [trajectory], trajectory: /not/there.yaml}", "/not/there.yaml"),
         (
-            f"flight: {{programme: [trajectory], trajectory: {far}}}",
+            f"flight: {{maneuvers: [trajectory], trajectory: {far}}}",
             "shrink it or widen the fence",
         ),
     ):
@@ -150,9 +150,9 @@ def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):
         assert (code, words in err) == (2, True)
 
 
-def test_a_programme_from_the_command_line_must_fit_the_limits(capsys, tmp_path):
-    path = config(tmp_path, "limits: {max_tilt_deg: 10}\nflight: {programme: [hover]}")
-    code, _, err = run(capsys, "fly", "--config", path, "--programme", "steps")
+def test_a_maneuver_from_the_command_line_must_fit_the_limits(capsys, tmp_path):
+    path = config(tmp_path, "limits: {max_tilt_deg: 10}\nflight: {maneuvers: [hover]}")
+    code, _, err = run(capsys, "fly", "--config", path, "--maneuvers", "steps")
     assert code == 2
     assert "the command line: steps.coefficient must not exceed" in err
 

@@ -1,4 +1,4 @@
-"""`companion demo` and `companion plot`, as a user calls them, with the shortest programme."""
+"""`companion demo` and `companion plot`, as a user calls them, with the shortest maneuver."""
 
 import json
 import subprocess
@@ -45,7 +45,7 @@ def quick_demo(folder: Path) -> str:
 
 
 def test_the_demo_flies_shows_and_can_be_drawn(folder):
-    options = ("--config", quick_demo(folder), "--lockstep", "--programme", "steps", "--json")
+    options = ("--config", quick_demo(folder), "--lockstep", "--maneuvers", "steps", "--json")
     done = companion(folder, "demo", *options)
     assert done.returncode == 0, done.stderr
     assert "flight ok" in done.stderr

@@ -62,7 +62,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             at, east, fast = told[0]
             east, fast = east + noise[0] * rng.normal(), fast + noise[1] * rng.normal()
             position = LocalPosition(time, at, (0.0, east, -5.0), (0.0, fast, 0.0))
-            estimate.note_position(position, obeyed=True)
+            estimate.note_position(position, offboard_active=True)
         if n % _GUIDANCE == 0:
             situation = estimate.situation(time, guidance.acts_after, (2.0, 18.0))
             held = Reference((0.0, 0.0, -5.0))

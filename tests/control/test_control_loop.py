@@ -191,7 +191,7 @@ def test_idle_sends_neither_rates_nor_thrust():
     assert [answer[1:] for answer in bench.sent] == 2 * [(BodyRates(0.0, 0.0, 0.0), 0.0)]
 
 
-@pytest.mark.parametrize("what", ["guarded", "taking_over"])
+@pytest.mark.parametrize("what", ["offboard_active", "taking_over"])
 def test_after_a_gap_it_waits_for_the_mode(what):
     """The autopilot may obey us from the moment it is asked to, before it says that it does."""
     bench = Bench()
@@ -199,7 +199,7 @@ def test_after_a_gap_it_waits_for_the_mode(what):
     bench.run(10)
     bench.time += 0.2
     bench.run(10)
-    assert (len(bench.sent), bench.asked, bench.loop.held_back) == (10, 1, True)
+    assert (len(bench.sent), bench.asked, bench.loop.awaiting_mode) == (10, 1, True)
     bench.loop.resume()
     bench.run(10)
     assert (len(bench.sent), bench.asked) == (20, 1)
@@ -226,7 +226,7 @@ def test_a_late_answer_counts_as_a_missed_deadline():
 
 def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
     bench = Bench()
-    bench.loop.guarded = True
+    bench.loop.offboard_active = True
     bench.run(10)
     bench.sample()
     bench.time += 0.004
@@ -285,7 +285,7 @@ def test_the_rate_of_answers_counts_bursts_as_what_they_are(intervals, rate):
 
 def test_gaps_are_counted_and_are_no_part_of_the_rate():
     bench = Bench()
-    bench.loop.guarded = True
+    bench.loop.offboard_active = True
     bench.run(50)
     before = bench.loop.held.copy()
     for _ in range(3):

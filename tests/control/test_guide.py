@@ -1,4 +1,4 @@
-"""What guidance leaves with the control loop while a programme steers by rates."""
+"""What guidance leaves with the control loop while a maneuver steers by rates."""
 
 from math import cos, radians, sin
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import pytest
 from companion.attitude import BodyRates
 from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
 from companion.recording.trace import FlightTrace
@@ -48,10 +48,10 @@ class Bench:
     def __init__(self):
         self.now, self.clock = 10.0, VehicleClock()
         self.hover = HoverSpy()
-        self.loop = SimpleNamespace(command=None, guarded=True, resets=EstimatorResets())
+        self.loop = SimpleNamespace(command=None, offboard_active=True, resets=EstimatorResets())
         self.state = SimpleNamespace(position=None, battery=None)
         self.ground = SimpleNamespace(standing=False, may_idle=True)
-        self.guide = Guide(
+        self.guidance_loop = GuidanceLoop(
             self.loop,
             linear_guidance(Config()),
             motion_estimate(Config()),
@@ -66,19 +66,19 @@ class Bench:
             vehicle_clock=self.clock,
         )
         self.fly(0.0, HERE)
-        self.guide.hold_here()
-        self.guide.follow(DOUBLETS)
+        self.guidance_loop.hold_here()
+        self.guidance_loop.follow(DOUBLETS)
 
     def fly(self, after, position=HERE, tilt=0.0):
-        """One step of guidance `after` s of the programme, there and so far rolled over."""
+        """One step of guidance `after` s of the maneuver, there and so far rolled over."""
         self.now = 10.0 + after
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
         q, still = (cos(half), sin(half), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
         reading = self.clock.take(round(1000 * self.now), self.now)
         sample = AttitudeSample(0, self.now, self.now, 0, q, still, *reading[1:])
-        self.guide.note_attitude(sample)
-        self.guide.step()
+        self.guidance_loop.note_attitude(sample)
+        self.guidance_loop.step()
         return self.loop.command
 
 
@@ -93,26 +93,26 @@ def test_a_doublets_rates_go_to_the_loop_and_hold_gives_it_a_target():
 def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, tilt=29.0)
-    assert bench.guide.given_up is None
+    assert bench.guidance_loop.given_up is None
     command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
     assert command.body_rates is None
     assert (
-        bench.guide.given_up
+        bench.guidance_loop.given_up
         == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
     )
-    assert bench.guide.pose.position_ned == pytest.approx(HERE, abs=0.01)
+    assert bench.guidance_loop.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None
-    assert not bench.guide.finished
+    assert not bench.guidance_loop.finished
 
 
 def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, position=(9.0, 4.0, -5.0))
-    assert bench.guide.off_course is None
+    assert bench.guidance_loop.off_course is None
     bench.fly(IN_HOLD - 0.3, position=(9.0, 4.0, -5.0))
-    assert bench.guide.off_course is None
+    assert bench.guidance_loop.off_course is None
     bench.fly(IN_HOLD + 0.3)  # so much later that it is no jump of the estimate
-    assert bench.guide.off_course < 1.0
+    assert bench.guidance_loop.off_course < 1.0
 
 
 def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
@@ -122,7 +122,7 @@ def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
     bench.ground.standing = True
     bench.fly(IN_HOLD)
     assert bench.loop.resets.turn == 0.5  # in control "landed" is not believed
-    bench.loop.guarded = False
+    bench.loop.offboard_active = False
     bench.fly(IN_HOLD)
     assert (bench.loop.resets.turn, bench.loop.resets.shift) == (0.0, (0.0, 0.0, 0.0))
 
@@ -133,11 +133,11 @@ def test_a_position_that_lags_the_attitude_is_as_old_as_it_says():
     late = LocalPosition(bench.now, bench.now - 0.31, HERE, (0.0, 0.0, 0.0))
     bench.state.position, made_at = late, bench.loop.command.made_at
     bench.now += 0.01
-    bench.guide.step()
-    assert bench.guide.fresh_position() is None
+    bench.guidance_loop.step()
+    assert bench.guidance_loop.fresh_position() is None
     assert bench.loop.command.made_at == made_at
     bench.state.position = late._replace(vehicle_time=bench.now - 0.29)
-    bench.guide.step()
+    bench.guidance_loop.step()
     assert bench.loop.command.made_at == bench.now
 
 
@@ -147,15 +147,15 @@ def test_an_old_attitude_does_not_replace_a_newer_one():
     tilted, still = (cos(0.5), sin(0.5), 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
     reading = bench.clock.take(round(1000 * bench.now) - 100, bench.now)
     old = AttitudeSample(0, reading.vehicle_time, bench.now, 0, tilted, still, *reading[1:])
-    bench.guide.note_attitude(old)
-    bench.guide.step()
-    assert bench.guide.given_up is None
+    bench.guidance_loop.note_attitude(old)
+    bench.guidance_loop.step()
+    assert bench.guidance_loop.given_up is None
 
 
 def test_position_hold_may_tilt_as_it_must():
     bench = Bench()
     bench.fly(IN_HOLD, tilt=31.0)
-    assert bench.guide.given_up is None
+    assert bench.guidance_loop.given_up is None
 
 
 @pytest.mark.parametrize(

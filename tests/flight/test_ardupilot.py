@@ -9,9 +9,9 @@ from tests.flight.fly import CONFIGS, fly, mock_vehicle
 from tests.flight.others import When, station
 
 VEHICLE = yaml.safe_load((CONFIGS / "vehicle-ardupilot.yaml").read_text())
-PROGRAMME = {
+MANEUVERS = {
     **VEHICLE,
-    "flight": {"programme": ["hover", "steps", "circle"]},
+    "flight": {"maneuvers": ["hover", "steps", "circle"]},
     "hover": {"duration_s": 3.0},
     "steps": {"settle_s": 3.0},
     "circle": {"radius_m": 2.0},
@@ -37,12 +37,12 @@ def commands(summary):
 def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ardupilot")
     with mock_vehicle(folder, autopilot="ardupilot", seed=7) as mock:
-        summary = fly(mock, folder / "log", **PROGRAMME)
+        summary = fly(mock, folder / "log", **MANEUVERS)
         assert not mock.state()["crashed"]
     return summary
 
 
-def test_the_programme_is_flown_and_the_vehicle_lands(flown):
+def test_the_maneuver_is_flown_and_the_vehicle_lands(flown):
     assert flown.result == "ok", flown.events
     assert flown.phase == "disarm"
     modes = [text for _, text in flown.events if text.startswith("mode ")]
@@ -149,7 +149,7 @@ def test_without_telemetry_nothing_is_sent_and_the_autopilot_levels_by_itself(tm
     """GUID_TIMEOUT ends what the last rates asked for; it stays in GUIDED, and obeys nobody."""
     silence = {"kind": "drop", "direction": "to_companion", "after_offboard_s": 1.6}
     with mock_vehicle(tmp_path, autopilot="ardupilot", faults=[silence]) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"programme": ["steps"]})
+        summary = fly(mock, tmp_path / "log", flight={"maneuvers": ["steps"]})
         left = mock.state()
         state = mock.until(lambda state: state["time"] > left["last_setpoint"] + 5.0)
     assert "no attitude" in summary.result
@@ -166,7 +166,7 @@ def test_the_step_past_level_is_straight_by_what_attitude_target_tells(tmp_path)
             mock,
             tmp_path / "log",
             vehicle=VEHICLE["vehicle"] | {"yaw_frame_lead_ms": 0.0},
-            flight={"programme": ["corners"], "takeoff_height_m": 3.0},
+            flight={"maneuvers": ["corners"], "takeoff_height_m": 3.0},
             corners={
                 "north_coefficient": 0.4,
                 "east_coefficient": 0.5,

@@ -6,7 +6,7 @@ from math import inf
 import pytest
 from pymavlink import mavutil
 
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
@@ -53,20 +53,20 @@ def interrupted(mock, folder, phase, ask_landing=None, after=0.0):
 
 def test_interrupted_in_flight_and_told_to_land_it_lands(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", "programme", accept, after=2.0)
+        summary, observer = interrupted(mock, tmp_path / "log", "maneuvers", accept, after=2.0)
         state = mock.state()
     assert summary.result == "interrupted by the user"
-    assert observer.phases[-4:] == ["programme", "hand back", "land", "disarm"]
+    assert observer.phases[-4:] == ["maneuvers", "hand back", "land", "disarm"]
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)
 
 
 def test_interrupted_and_not_told_to_land_it_holds(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        summary, observer = interrupted(mock, tmp_path / "log", "programme", after=2.0)
+        summary, observer = interrupted(mock, tmp_path / "log", "maneuvers", after=2.0)
         state = mock.state()
     assert observer.phases[-1] == "hand back"
     assert (state["armed"], state["mode"]) == (True, "LOITER")
-    assert summary.phase == "programme"
+    assert summary.phase == "maneuvers"
 
 
 @pytest.mark.parametrize("phase", ["connect", "checks", "stream"])
@@ -117,10 +117,10 @@ def test_interrupted_in_an_emergency_landing_it_goes_on_landing(tmp_path):
 
 
 def test_an_error_of_ours_in_flight_hands_back_and_lands(tmp_path, monkeypatch):
-    def broken(guide, programme):
+    def broken(guidance_loop, maneuvers):
         raise ZeroDivisionError("a fault of ours")
 
-    monkeypatch.setattr(Guide, "follow", broken)
+    monkeypatch.setattr(GuidanceLoop, "follow", broken)
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         state = mock.state()
@@ -132,10 +132,10 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
     """An autopilot that calls a flying vehicle landed must not get thrust 0 for it."""
 
     def claim():
-        session._assembled.rig.link.state.landed_state = Landed(inf, 1)
+        session._assembled.context.link.state.landed_state = Landed(inf, 1)
 
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", claim, after=2.0)
+        observer = When("maneuvers", claim, after=2.0)
         session = session_for(mock, tmp_path / "log", observer)
         summary = lockstep.run(session.fly())
         assert not mock.state()["crashed"]
@@ -164,7 +164,7 @@ def test_without_heartbeats_the_vehicle_is_let_go_though_its_mode_is_told(tmp_pa
     with mock_vehicle(tmp_path, faults=[fault]) as mock:
         summary = fly(mock, tmp_path / "log", hover={"duration_s": 9.0})
     assert "whether it is armed is not known" in summary.result
-    assert summary.events[-1][1] == Exit.LET_GO.value
+    assert summary.events[-1][1] == Exit.RELEASE.value
 
 
 def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
@@ -282,7 +282,7 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
     over, held = takeoff._Climb.over, []
 
     def holding(climb):
-        if climb._rig.link.state.height > 3.3 and not held:
+        if climb._context.link.state.height > 3.3 and not held:
             held.append(station(mock, SET_MODE, 1, 4, 3))
         return over(climb)
 
@@ -298,10 +298,10 @@ def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path
     """The newest heartbeat is a tenth of a second old, and we know better only if we ask."""
     hand_back = control_phases.hand_back
 
-    async def taking(rig):
+    async def taking(context):
         mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
         await asyncio.sleep(0.01)  # faults begin with the vehicle's next step
-        await hand_back(rig)
+        await hand_back(context)
 
     monkeypatch.setattr(control_phases, "hand_back", taking)
     with mock_vehicle(tmp_path) as mock:
@@ -361,7 +361,7 @@ def test_if_the_pilot_does_not_arm_nothing_happens(tmp_path):
 
 def test_a_vehicle_that_is_armed_already_is_not_touched(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        interrupted(mock, tmp_path / "first", "programme")
+        interrupted(mock, tmp_path / "first", "maneuvers")
         before = mock.state()
         summary = fly(mock, tmp_path / "second")
         after = mock.state()
@@ -391,7 +391,7 @@ def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold(tmp_path):
         summary = fly(
             mock,
             tmp_path / "log",
-            flight={"programme": ["steps"]},
+            flight={"maneuvers": ["steps"]},
             limits={"fence_radius_m": 5.0},
         )
         state = mock.state()
@@ -421,7 +421,7 @@ def test_a_hold_that_is_refused_becomes_a_landing(tmp_path, monkeypatch):
     monkeypatch.setattr(Px4, "hold", lambda _: Command(MAV_CMD_DO_SET_MODE, 1.0, 99.0))
     monkeypatch.setattr(Px4, "arm", lambda _: (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", lambda: session.interrupt("Ctrl-C"), after=1.0)
+        observer = When("maneuvers", lambda: session.interrupt("Ctrl-C"), after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
         summary = lockstep.run(session.fly())
         state = mock.state()
@@ -437,11 +437,11 @@ def test_an_error_at_every_sample_does_not_stop_the_landing(tmp_path, monkeypatc
         raise ZeroDivisionError("a fault of ours")
 
     def breaks():
-        monkeypatch.setattr(Guide, "hold_here", broken)
-        monkeypatch.setattr(Guide, "note_attitude", broken)
+        monkeypatch.setattr(GuidanceLoop, "hold_here", broken)
+        monkeypatch.setattr(GuidanceLoop, "note_attitude", broken)
 
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", breaks, after=1.0)
+        observer = When("maneuvers", breaks, after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
         summary = lockstep.run(session.fly())
         state = mock.state()

@@ -18,7 +18,7 @@ AFTER_A_HEARTBEAT = [0.1, pytest.param(0.35, marks=pytest.mark.slow), 0.7]
 
 
 def takeover(tmp_path, after, **settings):
-    """A pilot takes over in the programme; returns the summary and how late we were silent, s."""
+    """A pilot takes over in the maneuver; returns the summary and how late we were silent, s."""
     at = None
 
     def begin():
@@ -27,7 +27,7 @@ def takeover(tmp_path, after, **settings):
         mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at}})
 
     with mock_vehicle(tmp_path, **settings) as mock:
-        summary = fly(mock, tmp_path / "log", When("programme", begin))
+        summary = fly(mock, tmp_path / "log", When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result
     assert state["mode"] == "POSCTL"
@@ -51,7 +51,7 @@ def test_a_vehicle_that_disarms_in_flight_is_heard_at_once(tmp_path):
         station(mock, 400, 0, 21196)
 
     with mock_vehicle(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log", When("programme", kill, after=1.0))
+        summary = fly(mock, tmp_path / "log", When("maneuvers", kill, after=1.0))
         state = mock.state()
     assert summary.result == "the vehicle disarmed in flight"
     assert floor(at) + 1.0 - at > 0.3
@@ -73,15 +73,15 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         asked.append(now)
         await answer.wait()
 
-    rig = SimpleNamespace(
-        lookout=SimpleNamespace(listen=lambda _: None),
+    context = SimpleNamespace(
+        snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(look=lambda: None),
         same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
         fresh_heartbeat=fresh_heartbeat,
     )
 
     async def run():
-        watch = Watch(rig, None, None, lambda: now)
+        watch = Watch(context, None, None, lambda: now)
 
         async def comes(at):
             nonlocal now
@@ -118,12 +118,15 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     """After a stall one that waited to be read says what was, and looks new."""
     resumed, answer = [], asyncio.Event()
     loop = SimpleNamespace(
-        held_back=True, guarded=False, taking_over=taking_over, resume=lambda: resumed.append(1)
+        awaiting_mode=True,
+        offboard_active=False,
+        taking_over=taking_over,
+        resume=lambda: resumed.append(1),
     )
     state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False)
     family = SimpleNamespace(roles=lambda mode: frozenset({mode}))
-    rig = SimpleNamespace(
-        lookout=SimpleNamespace(listen=lambda _: None),
+    context = SimpleNamespace(
+        snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(look=lambda: None),
         same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
         loop=loop,
@@ -132,7 +135,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     )
 
     async def run():
-        watch = Watch(rig, None, None, lambda: 0.0)
+        watch = Watch(context, None, None, lambda: 0.0)
         watch.ask_mode()
         await asyncio.sleep(0)
         watch.on_heartbeat(PHASE)  # the one that waited to be read

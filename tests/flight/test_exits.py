@@ -19,7 +19,7 @@ import yaml
 from pymavlink import mavutil
 
 from companion.cli.signals import HOW_TO_LEAVE, LEAVE_AFTER
-from companion.control.guidance_loop import Guide
+from companion.control.guidance_loop import GuidanceLoop
 from companion.mavlink import lockstep
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, fly, merged, mock_vehicle, session_for
 from tests.flight.others import When
@@ -258,13 +258,16 @@ def test_frozen_in_flight_ardupilot_levels_and_thawed_it_is_asked_to_hold(tmp_pa
 
 @BOTH
 def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkeypatch, ways):
-    flown = Guide.step
+    flown = GuidanceLoop.step
 
-    def freezing(guide):
-        if not (guide.begun_at is not None and guide._clock() > guide.begun_at + 1.0):
-            flown(guide)
+    def freezing(guidance_loop):
+        if not (
+            guidance_loop.begun_at is not None
+            and guidance_loop._clock() > guidance_loop.begun_at + 1.0
+        ):
+            flown(guidance_loop)
 
-    monkeypatch.setattr(Guide, "step", freezing)
+    monkeypatch.setattr(GuidanceLoop, "step", freezing)
     with ways.mock(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         state = mock.state()
@@ -278,7 +281,7 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
 @BOTH
 def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
     with ways.mock(tmp_path) as mock:
-        observer = When("programme", lambda: mock.ask({"fault": {"kind": "drop"}}), after=1.0)
+        observer = When("maneuvers", lambda: mock.ask({"fault": {"kind": "drop"}}), after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
         state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
@@ -289,8 +292,8 @@ def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
 
 def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", lambda: session.interrupt("enough"), after=1.0)
-        steps = {"flight": {"programme": ["steps"]}}
+        observer = When("maneuvers", lambda: session.interrupt("enough"), after=1.0)
+        steps = {"flight": {"maneuvers": ["steps"]}}
         session = session_for(mock, tmp_path / "log", observer, **steps)
         summary = lockstep.run(session.fly())
         assert mock.state()["mode"] == "LOITER"

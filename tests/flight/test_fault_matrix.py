@@ -18,7 +18,7 @@ from tests.flight.fly import fly, mock_vehicle
 AUTOPILOTS = ("px4", "ardupilot")
 PILOTED = {"px4": "POSCTL", "ardupilot": "LOITER"}
 """What the pilot's mode is called."""
-PHASES = ("stream", "takeoff", "offboard", "programme", "hand back", "land")
+PHASES = ("stream", "takeoff", "offboard", "maneuvers", "hand back", "land")
 AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.02, 0.3), strict=True))
 """How long after the phase began the fault does, s; offboard begins with a judgement of 1 s."""
 

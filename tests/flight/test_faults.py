@@ -113,7 +113,7 @@ def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes,
     with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
         summary = fly(mock, tmp_path / "log")
         assert words in summary.result, summary.events
-        assert summary.phase == "programme"
+        assert summary.phase == "maneuvers"
         # Where nothing is heard nothing is commanded: the autopilot's own failsafe comes by itself.
         state = mock.until(lambda state: state["mode"] in modes)
         assert not state["crashed"]

@@ -8,7 +8,7 @@ from companion.config import Config
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.fence_check import MARGIN, FenceCheck
-from companion.flight.maneuvers import programme, require_inside
+from companion.flight.maneuvers import configured_maneuvers, require_inside
 from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predicted
@@ -21,7 +21,7 @@ from tests.flight.fly import fly, merged, mock_vehicle
 
 START = Pose((0.0, 0.0, 0.0), 0.0)
 LINE = "line: {to_m: [7.5, 0, 0], speed_m_s: 3}"
-ROUND = {"flight": {"programme": ["circle"]}, "circle": {"radius_m": 3.5, "speed_m_s": 3.0}}
+ROUND = {"flight": {"maneuvers": ["circle"]}, "circle": {"radius_m": 3.5, "speed_m_s": 3.0}}
 
 
 def config_of(*parts, **more):
@@ -34,12 +34,12 @@ def config_of(*parts, **more):
 def following(tmp_path, text):
     path = tmp_path / "way.yaml"
     path.write_text(text)
-    return {"flight": {"programme": ["trajectory"], "trajectory": str(path)}}
+    return {"flight": {"maneuvers": ["trajectory"], "trajectory": str(path)}}
 
 
 def refusal(*parts, **more):
     with pytest.raises(ConfigError) as refused:
-        programme(config_of(*parts, **more))
+        configured_maneuvers(config_of(*parts, **more))
     return str(refused.value)
 
 
@@ -49,7 +49,7 @@ def smallest_fence(*parts):
     while enough - too_small > 0.01:
         radius = 0.5 * (too_small + enough)
         try:
-            programme(config_of(*parts, limits={"fence_radius_m": radius}))
+            configured_maneuvers(config_of(*parts, limits={"fence_radius_m": radius}))
         except ConfigError:
             too_small = radius
         else:
@@ -64,7 +64,7 @@ def test_a_line_that_ends_inside_but_could_not_stop_there_is_refused(tmp_path):
     assert "limits.fence_radius_m" in told
     assert "fly it more slowly (--slow-down" in told
     slow = merged(following(tmp_path, LINE), {"flight": {"slow_down": True}})
-    (part,) = programme(config_of(slow, limits={"fence_radius_m": 8.01})).parts
+    (part,) = configured_maneuvers(config_of(slow, limits={"fence_radius_m": 8.01})).parts
     assert part.slowed > 1.1
 
 
@@ -103,7 +103,7 @@ def test_a_polygon_is_judged_all_along_the_way(tmp_path, to, corners, words):
     way = following(tmp_path, f"line: {{to_m: {to}, speed_m_s: 3}}")
     polygon = {"safety": {"fence_polygon_m": corners}}
     if words is None:
-        programme(config_of(way, polygon))
+        configured_maneuvers(config_of(way, polygon))
     else:
         told = refusal(way, polygon)
         assert words in told
@@ -116,37 +116,37 @@ def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
     corners = [[47.0 - side, 7.9999], [47.0 + side, 7.9999], [47.0 + side, 8.0001]]
     corners.append([47.0 - side, 8.0001])
     round_ = config_of(
-        {"flight": {"programme": ["circle"]}, "circle": {"radius_m": 8.0}},
+        {"flight": {"maneuvers": ["circle"]}, "circle": {"radius_m": 8.0}},
         safety={"fence_polygon_deg": corners},
     )
-    parts = programme(round_).parts
+    parts = configured_maneuvers(round_).parts
     with pytest.raises(ConfigError, match=r"leaves the fence, by .* safety\.fence_polygon_deg"):
         require_inside(round_, parts, here)
     small = config_of(
         ROUND, circle={"radius_m": 3.0, "speed_m_s": 1.0}, safety={"fence_polygon_deg": corners}
     )
-    require_inside(small, programme(small).parts, here)
+    require_inside(small, configured_maneuvers(small).parts, here)
 
 
 @pytest.mark.parametrize(
     ("flight", "limits", "words"),
     [
-        ({"programme": ["hover"]}, {"fence_ceiling_m": 0.4}, "hover: from 0.00 s on"),
-        ({"programme": ["steps"]}, {"fence_radius_m": 2.5}, "steps: from"),
-        ({"programme": ["corners"]}, {"fence_radius_m": 4.0}, "corners: from"),
-        ({"programme": ["identify"]}, {"fence_radius_m": 0.6}, "identify: from"),
-        ({"programme": ["identify"]}, {"fence_ceiling_m": 0.6}, "identify: from"),
-        ({"programme": ["hover", "circle"]}, {"fence_radius_m": 6.0}, "circle: from"),
-        ({"programme": ["hover"], "takeoff_height_m": 1.5}, {"fence_floor_m": 1.1}, "hover: from"),
+        ({"maneuvers": ["hover"]}, {"fence_ceiling_m": 0.4}, "hover: from 0.00 s on"),
+        ({"maneuvers": ["steps"]}, {"fence_radius_m": 2.5}, "steps: from"),
+        ({"maneuvers": ["corners"]}, {"fence_radius_m": 4.0}, "corners: from"),
+        ({"maneuvers": ["identify"]}, {"fence_radius_m": 0.6}, "identify: from"),
+        ({"maneuvers": ["identify"]}, {"fence_ceiling_m": 0.6}, "identify: from"),
+        ({"maneuvers": ["hover", "circle"]}, {"fence_radius_m": 6.0}, "circle: from"),
+        ({"maneuvers": ["hover"], "takeoff_height_m": 1.5}, {"fence_floor_m": 1.1}, "hover: from"),
     ],
 )
-def test_every_programme_is_judged(flight, limits, words):
+def test_every_maneuver_is_judged(flight, limits, words):
     assert words in refusal(flight=flight, limits=limits)
 
 
 def test_the_ideal_doublet_ends_where_it_began():
     for name in ("steps", "corners"):
-        (part,) = programme(config_of(flight={"programme": [name]})).parts
+        (part,) = configured_maneuvers(config_of(flight={"maneuvers": [name]})).parts
         moments = list(predicted(part))
         assert np.linalg.norm(moments[-1].offset) < 0.05
         far = max(np.hypot(*moment.offset[:2]) for moment in moments)
@@ -159,11 +159,11 @@ def test_the_ideal_doublet_ends_where_it_began():
 def test_what_is_accepted_never_makes_the_monitor_speak(seed):
     """The monitor itself, at every moment of the reference and everywhere off it by the margin."""
     rng = np.random.default_rng(seed)
-    flight = ROUND if seed % 2 else {"flight": {"programme": ["steps"]}}
+    flight = ROUND if seed % 2 else {"flight": {"maneuvers": ["steps"]}}
     fence = {"limits": {"fence_radius_m": smallest_fence(flight)}}
     config = config_of(flight, fence)
     judge = braking(fence_of(config))
-    (part,) = programme(config).parts
+    (part,) = configured_maneuvers(config).parts
     for moment in predicted(part):
         off = rng.normal(size=3)
         off *= 0.999 * (MARGIN - 0.13) / np.linalg.norm(off)

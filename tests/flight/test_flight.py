@@ -18,7 +18,7 @@ class Bench:
     def __init__(self, monkeypatch, judge):
         self.done, self.begun = [], 0
         ground = (self.phase("checks"),)
-        flying = (self.phase("programme", Exit.LAND),)
+        flying = (self.phase("maneuvers", Exit.LAND),)
         monkeypatch.setattr("companion.flight.flight.ground_phases", lambda _: ground)
         monkeypatch.setattr("companion.flight.flight.flight_phases", lambda *_: flying)
         landing = (self.phase("land"),)
@@ -26,11 +26,11 @@ class Bench:
             "companion.flight.flight.exit_phases",
             lambda _, exit_: landing if exit_ is Exit.LAND else (),
         )
-        self.rig = SimpleNamespace(
+        self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),
-            programme=SimpleNamespace(duration=1.0),
+            maneuvers=SimpleNamespace(duration=1.0),
             link=SimpleNamespace(family=None, state=SimpleNamespace(forget=lambda: None)),
-            guide=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
+            guidance_loop=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
             ground=SimpleNamespace(standing=False),
             same_vehicle=SimpleNamespace(begin=self.begin),
             release=lambda: None,
@@ -49,7 +49,7 @@ class Bench:
 
     def fly(self):
         async def run():
-            flight = Flight(self.rig, self.watch, Silent(), None)
+            flight = Flight(self.context, self.watch, Silent(), None)
             return await flight.run(), [text for _, text in flight.events]
 
         return asyncio.run(run())
@@ -57,18 +57,18 @@ class Bench:
 
 def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch):
     def judge(bench, phase):
-        if phase.name == "programme" and bench.begun == 0:
+        if phase.name == "maneuvers" and bench.begun == 0:
             raise ChecksVoid("another vehicle answers")
 
     bench = Bench(monkeypatch, judge)
     result, events = bench.fly()
-    assert (result, bench.done) == ("ok", ["checks", "checks", "programme"])
+    assert (result, bench.done) == ("ok", ["checks", "checks", "maneuvers"])
     assert events == ["another vehicle answers; the checks are made anew"]
 
 
 def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
     def judge(_, phase):
-        if phase.name == "programme":
+        if phase.name == "maneuvers":
             raise ChecksVoid("another vehicle answers")
 
     result, _ = Bench(monkeypatch, judge).fly()
@@ -78,7 +78,7 @@ def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
 @pytest.mark.parametrize("also_landing", [False, True])
 def test_a_fault_of_ours_as_a_phase_begins_leaves_no_ending_out(monkeypatch, also_landing):
     def judge(_, phase):
-        if phase.name == "programme" or (also_landing and phase.name == "land"):
+        if phase.name == "maneuvers" or (also_landing and phase.name == "land"):
             raise ZeroDivisionError("a fault of ours")
 
     bench = Bench(monkeypatch, judge)

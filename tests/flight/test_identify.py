@@ -1,4 +1,4 @@
-"""Programme `identify` flown against the mock, over a socket: what was configured is found again.
+"""Maneuver `identify` flown against the mock, over a socket: what was configured is found again.
 
 The judge is the mock's own physics, excited apart from any flight and fitted by SciPy.
 """
@@ -57,11 +57,11 @@ CHANGED = {
 }
 
 
-IDENTIFY = {"flight": {"programme": ["identify"]}, "identify": {"settle_s": 1.0}}
+IDENTIFY = {"flight": {"maneuvers": ["identify"]}, "identify": {"settle_s": 1.0}}
 
 
 def identified(folder, **mock_settings):
-    """The summary of a flight of the programme, and the vehicle found in its log."""
+    """The summary of a flight of the maneuver, and the vehicle found in its log."""
     with mock_vehicle(folder, seed=5, **mock_settings) as mock:
         summary = fly(mock, folder / "log", **IDENTIFY)
         assert not mock.state()["crashed"]
@@ -72,7 +72,7 @@ def identified(folder, **mock_settings):
 def judged(axis, mock_settings):
     """Lag and dead time (s) of the mock's physics, nearest to the gain of 1 that a planner assumes.
 
-    Doublets of the programme's sizes in still air without noise, and SciPy's filter and optimiser.
+    Doublets of the maneuver's sizes in still air without noise, and SciPy's filter and optimiser.
     """
     vehicle = Multirotor(
         AirframeConfig(**mock_settings.get("airframe", {})),
@@ -206,10 +206,10 @@ def test_ardupilots_acceleration_limits_are_told_from_its_lags(tmp_path):
 def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands(tmp_path):
     wind = {"speed_m_s": 5.0}  # it leans by 27° against this wind, and a doublet adds 15°
     with mock_vehicle(tmp_path, wind=wind) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"programme": ["identify"]})
+        summary = fly(mock, tmp_path / "log", flight={"maneuvers": ["identify"]})
         assert "identify was given up at 3" in summary.result, summary.events
         assert "° of tilt, more than limits.max_tilt_deg" in summary.result
-        assert summary.phase == "programme"
+        assert summary.phase == "maneuvers"
         state = mock.until(lambda state: not state["armed"])
         assert not state["crashed"]
         assert state["touchdown_speed"] < 1.5
@@ -218,7 +218,7 @@ def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands(tmp_path
 def test_silence_in_a_doublet_ends_setpoints_at_once(tmp_path):
     fault = {"kind": "stop_telemetry", "after_offboard_s": 2.7}  # 0.1 s into the first doublet
     with mock_vehicle(tmp_path, faults=[fault]) as mock:
-        summary = fly(mock, tmp_path / "log", flight={"programme": ["identify"]})
+        summary = fly(mock, tmp_path / "log", flight={"maneuvers": ["identify"]})
         assert "no attitude from the vehicle" in summary.result
         assert not mock.state()["crashed"]
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))

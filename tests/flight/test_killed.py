@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.mavlink import lockstep
 from companion.preflight.offboard_loss import worst_reach
 from tests.flight.fly import mock_vehicle, session_for
@@ -36,7 +36,7 @@ def flight(autopilot, speed):
     """A circle, with limits that allow it, and no fence in its way."""
     return {
         "flight": {
-            "programme": ["circle"],
+            "maneuvers": ["circle"],
             "takeoff_height_m": 20.0,
             "takeoff_timeout_s": 60.0,
             "accept": [HELD[autopilot]],
@@ -75,7 +75,7 @@ def carried(folder, autopilot, speed, held, after):
         def leave():
             asyncio.get_running_loop().call_later(after, session.leave)
 
-        observer = When("programme", leave)
+        observer = When("maneuvers", leave)
         changes = flight(autopilot, speed)
         session = session_for(mock, folder / "flight", observer, **changes)
         assert lockstep.run(session.fly()).result == "left at once by the user"
@@ -108,7 +108,7 @@ def bound(folder, autopilot, speed, held):
     """What the doctor's model says of the same flight."""
     anybody = SimpleNamespace(port=0, in_lockstep=True, autopilot=autopilot)
     config = session_for(anybody, folder / "bound", **flight(autopilot, speed))._config
-    return worst_reach(config, programme(config), held, brakes=autopilot == "px4")
+    return worst_reach(config, configured_maneuvers(config), held, brakes=autopilot == "px4")
 
 
 def compare(measured, model):

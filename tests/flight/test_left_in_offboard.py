@@ -22,7 +22,7 @@ HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking th
 def test_after_a_failsafe_landing_the_next_flight_begins(tmp_path):
     with mock_vehicle(tmp_path, parameters={"COM_OBL_RC_ACT": 4}) as mock:
         cut = {"fault": {"kind": "drop", "duration_s": 3.0}}
-        observer = When("programme", lambda: mock.ask(cut), after=1.0)
+        observer = When("maneuvers", lambda: mock.ask(cut), after=1.0)
         first = fly(mock, tmp_path / "first", observer)
         assert "letting go" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])
@@ -96,7 +96,7 @@ def test_who_changed_its_mode_or_armed_it_meanwhile_is_not_overruled(change):
     vehicle = Vehicle(Role.OFFBOARD, meanwhile=lambda self: vars(self).update(change))
     with pytest.raises(FlightEnded) as ended:
         asyncio.run(leave_offboard(vehicle))
-    assert (ended.value.exit, vehicle.sent) == (Exit.LET_GO, 0)
+    assert (ended.value.exit, vehicle.sent) == (Exit.RELEASE, 0)
 
 
 def test_a_refusal_says_what_to_do():

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.flight.mode_roles import in_roles
-from companion.flight.orders import enter, order
+from companion.flight.orders import change_mode, command_if_ours
 from companion.mavlink.command import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.safety.ending import Exit, FlightEnded
@@ -67,7 +67,7 @@ class Vehicle:
             raise answer
 
 
-def run(vehicle, work=order):
+def run(vehicle, work=command_if_ours):
     landing = asyncio.run(
         work(
             vehicle,
@@ -96,7 +96,7 @@ def test_it_is_not_repeated_over_a_mode_that_is_not_ours():
     vehicle = Vehicle((LOST, Role.HOLD))
     with pytest.raises(FlightEnded, match="took over") as ended:
         run(vehicle)
-    assert (ended.value.exit, vehicle.sent) == (Exit.LET_GO, 1)
+    assert (ended.value.exit, vehicle.sent) == (Exit.RELEASE, 1)
 
 
 def test_a_refusal_is_one():
@@ -114,4 +114,4 @@ def test_it_is_given_four_times_at_most():
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
     monkeypatch.setattr("companion.flight.orders._ENTERED", 0.01)
     with pytest.raises(FlightEnded, match=r"left again, not by us: Role\.HOLD"):
-        run(Vehicle((None, Role.HOLD)), enter)
+        run(Vehicle((None, Role.HOLD)), change_mode)

@@ -11,7 +11,7 @@ from companion.vehicle.roles import Role
 
 QUADROTOR = 2
 PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, QUADROTOR)
-FROM_ARMING = ["arm", "takeoff", "offboard", "programme", "hand back", "land", "disarm"]
+FROM_ARMING = ["arm", "takeoff", "offboard", "maneuvers", "hand back", "land", "disarm"]
 
 
 class Vehicle:
@@ -37,21 +37,21 @@ def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
 @pytest.mark.parametrize(
     ("family", "phase", "base_mode", "custom_mode", "ours"),
     [
-        (PX4, "programme", 129, 0x00060000, True),
-        (PX4, "programme", 157, 0x00030000, False),
+        (PX4, "maneuvers", 129, 0x00060000, True),
+        (PX4, "maneuvers", 157, 0x00030000, False),
         (PX4, "takeoff", 157, 0x02040000, True),
         (PX4, "land", 157, 0x14040000, True),  # DESCEND: our landing goes on without a position
-        (PX4, "programme", 157, 0x14040000, False),
+        (PX4, "maneuvers", 157, 0x14040000, False),
         (ARDUPILOT, "takeoff", 217, 4, True),
         (ARDUPILOT, "takeoff", 209, 4, False),  # somebody else's rates are obeyed
         (ARDUPILOT, "takeoff", 217, 17, False),  # BRAKE is no end of a climb
         (ARDUPILOT, "offboard", 217, 17, False),
         (ARDUPILOT, "offboard", 217, 4, True),
         (ARDUPILOT, "offboard", 209, 4, True),
-        (ARDUPILOT, "programme", 209, 4, True),
-        (ARDUPILOT, "programme", 217, 4, False),  # it holds: our rates are not obeyed any more
-        (ARDUPILOT, "programme", 209, 0, False),
-        (ARDUPILOT, "programme", 217, 5, False),
+        (ARDUPILOT, "maneuvers", 209, 4, True),
+        (ARDUPILOT, "maneuvers", 217, 4, False),  # it holds: our rates are not obeyed any more
+        (ARDUPILOT, "maneuvers", 209, 0, False),
+        (ARDUPILOT, "maneuvers", 217, 5, False),
         (ARDUPILOT, "hand back", 217, 17, True),
         (ARDUPILOT, "land", 217, 9, True),
         (ARDUPILOT, "land", 217, 6, False),
@@ -67,7 +67,7 @@ def test_a_mode_that_is_not_the_phases_own_lets_the_vehicle_go(
         return
     with pytest.raises(FlightEnded, match="took over") as ended:
         require_role(vehicle, allowed)
-    assert ended.value.exit is Exit.LET_GO
+    assert ended.value.exit is Exit.RELEASE
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)

@@ -50,7 +50,7 @@ def flown(request, tmp_path_factory):
     with mock_vehicle(folder, sensors=NO_NOISE) as mock:
         changes = {
             "planner": {"name": request.param},
-            "flight": {"programme": ["steps"]},
+            "flight": {"maneuvers": ["steps"]},
             "steps": {"duration_s": 0.8, "settle_s": 1.0},
         }
         summary = fly(mock, folder / "log", **changes)
@@ -96,7 +96,7 @@ FIGURE_2 = {
         "settle_s": 0.5,
     },
     "limits": {"max_tilt_deg": 45, "max_tilt_rate_deg_s": 400},
-    "flight": {"programme": ["corners"], "takeoff_height_m": 3.0},
+    "flight": {"maneuvers": ["corners"], "takeoff_height_m": 3.0},
 }
 """The step of the paper's figure 2, at several heights of its rectangle, without its rate limit."""
 

@@ -10,7 +10,7 @@ from tests.flight.position_relay import PositionRelay
 
 
 def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
-    """Summary and truth of a flight in whose programme positions begin to come so."""
+    """Summary and truth of a flight in whose maneuver positions begin to come so."""
     folder.mkdir(exist_ok=True)
     with mock_vehicle(folder) as mock, PositionRelay(mock.port) as relay:
 
@@ -21,7 +21,7 @@ def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
             begin()
         link = {"endpoint": relay.endpoint}
         summary = fly(
-            mock, folder / "log", When("programme", begin, after=1.0), link=link, **changes
+            mock, folder / "log", When("maneuvers", begin, after=1.0), link=link, **changes
         )
         return summary, mock.state()
 
@@ -44,7 +44,7 @@ def test_a_standing_position_is_silence(tmp_path):
     [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))],
 )
 def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
-    way = {"from_the_start": True, "flight": {"programme": ["circle"]}}
+    way = {"from_the_start": True, "flight": {"maneuvers": ["circle"]}}
     plain, _ = flown(tmp_path / "plain", "at once", **way)
     copied, _ = flown(tmp_path / "copied", "twice", delay_ms, **way)
     assert copied.result == "ok", copied.events
@@ -55,7 +55,7 @@ def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
 
 
 def test_positions_a_little_late_are_carried_on_to_now(tmp_path):
-    summary, _ = flown(tmp_path, "late", 200, flight={"programme": ["circle"]})
+    summary, _ = flown(tmp_path, "late", 200, flight={"maneuvers": ["circle"]})
     assert summary.result == "ok", summary.events
     time, north, east = np.loadtxt(summary.log / "tracking.csv", delimiter=",", skiprows=1)[:, :3].T
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))

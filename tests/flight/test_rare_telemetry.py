@@ -12,7 +12,7 @@ from tests.flight.others import station
 ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 31, 32
 SET_MESSAGE_INTERVAL = 511
 CIRCLE = {
-    "flight": {"programme": ["hover", "circle"]},
+    "flight": {"maneuvers": ["hover", "circle"]},
     "hover": {"duration_s": 1.0},
     "circle": {"radius_m": 6.0, "speed_m_s": 4.0, "laps": 1},
     "limits": {"fence_radius_m": 30.0},
@@ -27,7 +27,7 @@ class Lowers(Silent):
         self.mock, self.message, self.hz, self.left, self.tilt = mock, message, hz, times, 0.0
 
     def waiting(self, name, detail, elapsed, timeout):
-        if name == "programme" and elapsed > 2.5 and self.left:
+        if name == "maneuvers" and elapsed > 2.5 and self.left:
             self.left -= 1
             station(self.mock, SET_MESSAGE_INTERVAL, self.message, 1e6 / self.hz)
 

@@ -81,7 +81,7 @@ def test_once_armed_it_ends_the_flight(change):
     change(link)
     with pytest.raises(FlightEnded, match=CHANGES[change]) as ended:
         vehicle.require()
-    assert ended.value.exit is Exit.LET_GO
+    assert ended.value.exit is Exit.RELEASE
     assert not isinstance(ended.value, ChecksVoid)
 
 

@@ -77,8 +77,8 @@ def test_before_there_is_a_flight_the_session_is_given_up_once():
 
 
 def flown(mock, folder, action, ask_landing=None):
-    """A flight as the commands fly it; `action` happens in its programme."""
-    observer = When("programme", action, after=1.0)
+    """A flight as the commands fly it; `action` happens in its maneuver."""
+    observer = When("maneuvers", action, after=1.0)
     session = session_for(mock, folder, observer, ask_landing)
     return lockstep.run(fly_interruptibly(session))
 
@@ -108,7 +108,7 @@ def test_signals_while_the_link_is_closed_do_not_cost_the_record(tmp_path, monke
 
     monkeypatch.setattr(Link, "__aexit__", interrupted)
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", lambda: judge.take(TERM), after=1.0)
+        observer = When("maneuvers", lambda: judge.take(TERM), after=1.0)
         session, now = session_for(mock, tmp_path / "log", observer), [0.0]
         judge = Signals(session, pytest.fail, lambda: now[0])
         summary = lockstep.run(session.fly())
@@ -120,10 +120,10 @@ def test_signals_while_the_link_is_closed_do_not_cost_the_record(tmp_path, monke
 
 def test_leaving_keeps_the_record_and_is_done_once(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("programme", lambda: (session.leave(), session.leave()), after=1.0)
+        observer = When("maneuvers", lambda: (session.leave(), session.leave()), after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
         summary = lockstep.run(session.fly())
-    assert (summary.result, summary.phase) == ("left at once by the user", "programme")
+    assert (summary.result, summary.phase) == ("left at once by the user", "maneuvers")
     assert (tmp_path / "log" / "rates.csv").exists()
 
 

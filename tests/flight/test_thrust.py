@@ -8,7 +8,7 @@ import pytest
 
 from companion.control.hover_learning import HoverLearning
 from companion.guidance import HoverThrust, ThrustSettings
-from companion.vehicle.records import Battery, LocalPosition, ToldThrust
+from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
 from tests.flight.fly import fly, mock_vehicle
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -25,12 +25,14 @@ class Learning:
         self.learning = HoverLearning(self.hover_thrust, self.state)
         self.now = 100.0
 
-    def hover(self, seconds=1.0, q=LEVEL, told=0.4, age=0.0, obeyed=False, steady=True):
+    def hover(self, seconds=1.0, q=LEVEL, told=0.4, age=0.0, offboard_active=False, steady=True):
         for _ in range(round(seconds / 0.02)):
             self.now += 0.02
-            self.state.told_thrust = None if told is None else ToldThrust(self.now - age, told)
+            self.state.attitude_target_thrust = (
+                None if told is None else AttitudeTargetThrust(self.now - age, told)
+            )
             self.state.position = LocalPosition(self.now, self.now, (0, 0, -5.0), (0, 0, 0))
-            self.learning.step(self.now, q, obeyed=obeyed, steady=steady)
+            self.learning.step(self.now, q, offboard_active=offboard_active, steady=steady)
         return self.hover_thrust.learned
 
 
@@ -62,7 +64,7 @@ def test_it_is_not_learned_from_a_thrust_that_does_not_carry_the_vehicle(state, 
 
 def test_in_control_and_after_it_the_autopilots_words_do_not_count():
     bench = Learning()
-    assert bench.hover(obeyed=True) == 0.5  # the control loop sent nothing
+    assert bench.hover(offboard_active=True) == 0.5  # the control loop sent nothing
     assert bench.hover() == 0.5
 
 
@@ -71,7 +73,7 @@ def test_in_control_it_is_learned_from_what_was_sent_while_that_is_steady():
         bench = Learning()
         for _ in range(50):
             bench.hover_thrust.sent(0.4, LEVEL)
-            bench.hover(0.02, told=None, obeyed=True, steady=steady)
+            bench.hover(0.02, told=None, offboard_active=True, steady=steady)
         assert bench.hover_thrust.learned == pytest.approx(learned, rel=0.02)
 
 
@@ -83,7 +85,7 @@ def test_the_batterys_voltage_reaches_the_thrust():
     for volts in (16.0, 14.4):
         for _ in range(20):
             bench.state.battery = Battery(bench.now, volts, 0.5)
-            bench.hover(0.2, told=None, obeyed=True, steady=False)
+            bench.hover(0.2, told=None, offboard_active=True, steady=False)
     assert bench.hover_thrust.largest == pytest.approx(0.81 * full, rel=1e-3)
     bench.learning.stand()
     assert bench.hover_thrust.largest == full
@@ -93,12 +95,12 @@ def test_the_batterys_voltage_reaches_the_thrust():
 def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
     bench = Learning()
     bench.hover(told=learned)
-    assert bench.learning.surprise() is None  # the vehicle never hung on it
-    bench.hover(0.02, obeyed=True)
+    assert bench.learning.mismatch_warning() is None  # the vehicle never hung on it
+    bench.hover(0.02, offboard_active=True)
     expected = (
         "the vehicle hovers at a thrust of 0.40, and thrust.hover_thrust says 0.50; set it to 0.40"
     )
-    assert bench.learning.surprise() == (expected if learned == 0.4 else None)
+    assert bench.learning.mismatch_warning() == (expected if learned == 0.4 else None)
 
 
 def height_errors(summary):

@@ -15,7 +15,7 @@ HEAVY = {"thrust_slope_m_s2": 12.95, "thrust_offset_m_s2": 0.22}
 """The mock's specific thrust over its signal for a load that makes it hover at 0.74."""
 
 STEPS = {
-    "flight": {"programme": ["steps"], "takeoff_height_m": 4.0},
+    "flight": {"maneuvers": ["steps"], "takeoff_height_m": 4.0},
     "steps": {"coefficient": 0.69, "duration_s": 1.0, "settle_s": 2.0},
     "limits": {"max_tilt_deg": 45},
 }

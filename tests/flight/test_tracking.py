@@ -9,7 +9,7 @@ import yaml
 from companion.attitude.representation import wrap_angle
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, parse
-from companion.flight import maneuvers as programmes
+from companion.flight import maneuvers
 from companion.guidance import Pose
 from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, gerono_eight
@@ -31,7 +31,7 @@ FAST = {
 
 def following(name, **changes):
     path = CONFIGS / "trajectories" / name
-    flight = {"programme": ["trajectory"], "trajectory": str(path)}
+    flight = {"maneuvers": ["trajectory"], "trajectory": str(path)}
     return merged(merged(FAST, {"flight": flight}), changes)
 
 
@@ -81,7 +81,7 @@ def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
 def test_what_the_limits_do_not_allow_is_refused_or_slowed_down(tmp_path):
     slow = following("figure8.yaml", limits={"max_tilt_deg": 30})
     with pytest.raises(ConfigError) as refused:
-        programmes.programme(parse(yaml.safe_dump(slow), "test", Config))
+        maneuvers.configured_maneuvers(parse(yaml.safe_dump(slow), "test", Config))
     assert "° of tilt, limits.max_tilt_deg allows 30" in str(refused.value)
     assert "--slow-down" in str(refused.value)
     with mock_vehicle(tmp_path, seed=3) as mock:

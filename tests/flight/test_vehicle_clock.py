@@ -14,9 +14,9 @@ WRAP_MS = 2**32
 
 
 def flown(folder, autopilot, begin):
-    """A flight in whose programme the vehicle's stamps change; its summary and the true state."""
+    """A flight in whose maneuver the vehicle's stamps change; its summary and the true state."""
     with mock_vehicle(folder, autopilot=autopilot) as mock, ClockRelay(mock.port) as relay:
-        observer = When("programme", lambda: begin(relay), after=1.0)
+        observer = When("maneuvers", lambda: begin(relay), after=1.0)
         summary = fly(mock, folder / "log", observer, link={"endpoint": relay.endpoint})
         return summary, mock.state()
 

@@ -6,7 +6,7 @@ from companion.config import Config
 from companion.drag import Drag
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError, parse
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.vehicle_memory import VehicleMemory
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
@@ -16,7 +16,7 @@ from tests.flight.fly import fly, mock_vehicle
 BUNDLED = f"{5283920058631409231:016x}"
 """Hardware id of the bundled vehicles."""
 CIRCLE = {
-    "flight": {"programme": ["circle"]},
+    "flight": {"maneuvers": ["circle"]},
     "circle": {"radius_m": 4.0, "speed_m_s": 3.0, "laps": 0.6},
     "limits": {"max_tilt_deg": 40.0},
 }
@@ -42,22 +42,22 @@ def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_pa
 
 def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
     steep = {
-        "flight": {"programme": ["circle"]},
+        "flight": {"maneuvers": ["circle"]},
         "circle": {"radius_m": 5.0, "speed_m_s": 5.0},
         "limits": {"max_tilt_deg": 34.0},
         "recording": {"directory": str(tmp_path)},
     }
     config = parse(bounded_yaml.dump(steep), "test", Config)
-    programme(config)  # 32° with 0.7 1/s
+    configured_maneuvers(config)  # 32° with 0.7 1/s
     LearnedFile(tmp_path, "aa").save(Drag(1.0), 5.0)
     with pytest.raises(ConfigError, match=r"needs 3[56].*tilt.*earlier flight learned: .*aa"):
-        programme(config)
+        configured_maneuvers(config)
     told = config.model_copy(
         update={"guidance": config.guidance.model_copy(update={"drag_per_s": 0.2})}
     )
-    programme(told)
+    configured_maneuvers(told)
     with pytest.raises(ConfigError, match=r"not known: up to 0.7 1/s is reckoned with"):
-        programme(
+        configured_maneuvers(
             parse(
                 bounded_yaml.dump(
                     {

@@ -1,4 +1,4 @@
-"""The whole programme against the mock over a real socket, in lockstep."""
+"""The whole maneuver against the mock over a real socket, in lockstep."""
 
 import pytest
 from pymavlink import mavutil
@@ -6,8 +6,8 @@ from pymavlink import mavutil
 from tests.flight.fly import fly, mock_vehicle
 
 HOVER = {"hover": {"duration_s": 1.0}}
-PROGRAMME = {
-    "flight": {"programme": ["hover", "steps", "circle"]},
+MANEUVERS = {
+    "flight": {"maneuvers": ["hover", "steps", "circle"]},
     "steps": {"settle_s": 1.0},
     "circle": {"radius_m": 1.5},
     **HOVER,
@@ -16,12 +16,12 @@ PROGRAMME = {
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory):
-    """The same programme flown twice by two fresh pairs of processes."""
+    """The same maneuver flown twice by two fresh pairs of processes."""
     summaries = []
     for number in range(2):
         folder = tmp_path_factory.mktemp(f"flight{number}")
         with mock_vehicle(folder, seed=7) as mock:
-            summaries.append(fly(mock, folder / "log", **PROGRAMME))
+            summaries.append(fly(mock, folder / "log", **MANEUVERS))
             assert not mock.state()["crashed"]
     return summaries
 
@@ -57,7 +57,7 @@ def test_one_seed_gives_one_log_to_the_bit(twice):
 
 @pytest.mark.slow
 def test_another_seed_gives_another_log(twice, tmp_path):
-    """Compared as far as the first programme leads."""
+    """Compared as far as the first maneuver leads."""
     logs = [twice[0].log / "flight.tlog"]
     for seed in (7, 8):
         folder = tmp_path / str(seed)
@@ -91,7 +91,7 @@ def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
         "battery": {"initial_remaining": 0.5},
     }
     with mock_vehicle(tmp_path, **settings) as mock:
-        summary = fly(mock, tmp_path / "log", **PROGRAMME)
+        summary = fly(mock, tmp_path / "log", **MANEUVERS)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events
     assert summary.response().cross_axis_max < 0.05  # the hold in gusts is moving as a step begins

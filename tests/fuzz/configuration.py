@@ -18,7 +18,7 @@ from companion.config.files import load
 from companion.control.outer_loop import predictive_settings
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import assemble, link_settings, planner, rate_limits
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Silent
 from companion.vehicle.link import Link
 from tests.fuzz import trajectories
@@ -81,8 +81,8 @@ async def _assembled(config: Config, folder: Path) -> None:
         return False
 
     link = Link(link_settings(config), None)
-    assembled = assemble(config, link, Silent(), ask, folder, programme(config))
-    assert 0.0 < assembled.rig.programme.duration < inf
+    assembled = assemble(config, link, Silent(), ask, folder, configured_maneuvers(config))
+    assert 0.0 < assembled.context.maneuvers.duration < inf
     assembled.close()
 
 

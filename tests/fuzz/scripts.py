@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from tests.fuzz.family import ARDUPILOT, PX4
 from tests.fuzz.messages import EVERY, KINDS
 
-_PHASES = ("connect", "checks", "stream", "arm", "takeoff", "offboard", "programme", "hand back")
+_PHASES = ("connect", "checks", "stream", "arm", "takeoff", "offboard", "maneuvers", "hand back")
 _PHASES += ("land", "disarm")
-_phases = st.sampled_from((*_PHASES, "takeoff", "offboard", "offboard", "programme", "programme"))
+_phases = st.sampled_from((*_PHASES, "takeoff", "offboard", "offboard", "maneuvers", "maneuvers"))
 _values = st.one_of(
     st.sampled_from((0, 1, -1, 2, 3, 4, 5, 255, 65535, 2**31, 2**32 - 1, -(2**31), 2**63 - 1)),
     st.sampled_from((float("nan"), float("inf"), -float("inf"), 1e-40, 3.4e38, -3.4e38, 0.0)),
@@ -94,7 +94,7 @@ cases = st.fixed_dictionaries(
         "family": st.sampled_from(("px4", "ardupilot")),
         "arm": st.sampled_from((True, True, False)),
         "planner": st.sampled_from(("auto", "first-order", "exact", "quaternion", "so3", "euler")),
-        "programme": st.sampled_from((["hover"], ["hover"], ["steps"], ["circle"], ["corners"])),
+        "maneuvers": st.sampled_from((["hover"], ["hover"], ["steps"], ["circle"], ["corners"])),
         "events": st.lists(_events(), max_size=5),
     }
 )

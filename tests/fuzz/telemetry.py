@@ -148,7 +148,7 @@ def _configuration(case: Case) -> dict[str, Any]:
         "vehicle": {"lag_ms": 30.0, "dead_time_ms": 20.0},
         "flight": {
             "takeoff_height_m": 2.0,
-            "programme": case["programme"],
+            "maneuvers": case["maneuvers"],
             "arm": case["arm"],
             **{f"{name}_timeout_s": float(seconds) for name, seconds in times.items()},
         },

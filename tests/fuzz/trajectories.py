@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from companion.config import Config, trajectory_file
 from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
-from companion.flight.maneuvers import programme
+from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
 from tests.fuzz.target import Case, Target
 from tests.fuzz.texts import PATHS, SHIPPED, as_text, folder_of, mutated, numbers, scalars
@@ -41,9 +41,9 @@ def _check(case: Case) -> None:
 
 def _preflight(path: Path, slow_down: bool) -> None:
     """As a flight would, see whether it can be flown within the limits."""
-    flight = {"programme": ("trajectory",), "trajectory": path, "slow_down": slow_down}
+    flight = {"maneuvers": ("trajectory",), "trajectory": path, "slow_down": slow_down}
     try:
-        flown = programme(changed(Config(), {"flight": flight}, "fuzzing"))
+        flown = configured_maneuvers(changed(Config(), {"flight": flight}, "fuzzing"))
     except ConfigError as error:
         _one_sentence(error)
         return

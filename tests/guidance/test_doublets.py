@@ -1,4 +1,4 @@
-"""Programme `identify`: what it asks for comes back to where it began, and stays small."""
+"""Maneuver `identify`: what it asks for comes back to where it began, and stays small."""
 
 from itertools import pairwise
 

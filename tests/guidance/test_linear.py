@@ -13,12 +13,12 @@ from companion.drag import Drag
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
+    GuidanceInput,
     HeightGains,
     InnerResponse,
     LinearGuidance,
     LinearSettings,
     Reference,
-    Situation,
     VehicleMotion,
     Weights,
     chain_gains,
@@ -31,7 +31,7 @@ THRUST = 2.0, 18.0  # m/s²
 DRAG = Drag(0.5)
 TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
 SETTINGS = LinearSettings(
-    gains=chain_gains(Weights(40.0, 8.0), TILT.slowness, DRAG.linear),
+    gains=chain_gains(Weights(40.0, 8.0), TILT.effective_delay, DRAG.linear),
     height=HeightGains(1.5, 3.5, 2.0, 1.0),
     tilt=TILT,
     heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
@@ -73,7 +73,7 @@ def flown(settings, reference_at, seconds, wind=REST, start=None):
         acts = VehicleMotion(
             tuple(p + ahead * v + 0.5 * ahead**2 * known), tuple(v + ahead * known)
         )
-        situation = Situation(
+        situation = GuidanceInput(
             motion, acts, tuple(thrust), tuple(DRAG.linear * wind[:2]), DRAG, THRUST
         )
         target, _, down = guidance.command(reference_at, t, situation)
@@ -107,7 +107,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
     guidance = LinearGuidance(SETTINGS)
     motion = VehicleMotion((4.0, -3.0, -5.0), REST)
     for _ in range(3000):
-        situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
+        situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
         target, _, down = guidance.command(lambda _: goal, 0.0, situation)
         speed = motion.velocity_ned[2] + 0.01 * down
         motion = VehicleMotion(
@@ -126,7 +126,7 @@ def test_it_comes_from_elsewhere_within_the_speed_limits_of_height():
 )
 def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
     motion = VehicleMotion(position, velocity)
-    situation = Situation(motion, motion, thrust, disturbance, DRAG, THRUST)
+    situation = GuidanceInput(motion, motion, thrust, disturbance, DRAG, THRUST)
     target, _, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
     a = acceleration(target, down)
     assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
@@ -138,7 +138,7 @@ def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
 def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
     reference = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
     motion = VehicleMotion((7.0, 7.0, -4.0), (3.0, 3.0, 0.0))
-    situation = Situation(motion, motion, (0.0, 0.0), (1.0, 1.0), DRAG, THRUST)
+    situation = GuidanceInput(motion, motion, (0.0, 0.0), (1.0, 1.0), DRAG, THRUST)
     target, _, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
     assert (target.north, target.east) == (0.2, -0.1)
     assert down < 0.0
@@ -146,7 +146,7 @@ def test_open_loop_coefficients_pass_unchanged_while_height_is_held():
 
 def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
     motion = VehicleMotion((7.0, 7.0, -5.0), (3.0, 3.0, 0.0))
-    situation = Situation(motion, motion, (0.5, 0.5), (1.0, -0.5), DRAG, THRUST)
+    situation = GuidanceInput(motion, motion, (0.5, 0.5), (1.0, -0.5), DRAG, THRUST)
     reference = Reference((0.0, 0.0, -5.0), drifting=True)
     target, later, down = LinearGuidance(SETTINGS).command(lambda _: reference, 0.0, situation)
     assert acceleration(target, down)[:2] == pytest.approx([-1.0, 0.5])
@@ -155,7 +155,7 @@ def test_drifting_it_asks_for_what_holds_against_the_wind_wherever_it_is():
 
 def test_the_heading_is_asked_for_ahead_of_its_response():
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
-    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
+    situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     target, _, _ = LinearGuidance(SETTINGS).command(circling, 2.0, situation)
     assert (target.heading, target.heading_rate) == pytest.approx((2.1, 1.0))
 
@@ -163,7 +163,7 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
 def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
     settings = replace(SETTINGS, period=0.02, gains=ChainGains(0.0, 0.0, 0.0))
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
-    situation = Situation(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
+    situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     guidance = LinearGuidance(settings)
     before, later, _ = guidance.command(circling, 2.0, situation)
     then = guidance.command(circling, 2.02, situation).target
@@ -173,7 +173,7 @@ def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
 
 def test_an_open_loop_step_does_not_move():
     step = Reference((0.0, 0.0, -5.0), coefficients=Coefficients(0.2, -0.1))
-    situation = Situation(
+    situation = GuidanceInput(
         VehicleMotion(REST, REST), VehicleMotion(REST, REST), (0.0, 0.0), (0.0, 0.0), DRAG, THRUST
     )
     target, later, _ = LinearGuidance(replace(SETTINGS, period=0.02)).command(

@@ -1,11 +1,11 @@
-"""Programmes: their derivatives against finite differences, their beginnings and ends."""
+"""Maneuvers: their derivatives against finite differences, their beginnings and ends."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance import Circle, Corners, Hover, Pose, Sequence, Steps
+from companion.guidance import Circle, Corners, Hover, ManeuverSequence, Pose, Steps
 
 START = Pose((3.0, -2.0, -5.0), 0.7)
 CIRCLES = [Circle(3.0, 2.0, 1.0), Circle(1.0, 3.0, 0.2), Circle(8.0, 0.5, 2.5)]
@@ -59,24 +59,24 @@ def test_steps_leave_an_ideal_vehicle_where_it_was():
     assert steps.at(steps.duration + 1.0, START).coefficients is None
 
 
-@pytest.mark.parametrize("programme", [Steps(0.25, 1.0, 3.0), Corners(0.3, 0.4, 1.0, 2.0)])
-def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(programme):
+@pytest.mark.parametrize("maneuvers", [Steps(0.25, 1.0, 3.0), Corners(0.3, 0.4, 1.0, 2.0)])
+def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(maneuvers):
     drifted, before = 0.0, Hover(1.0).at(0.0, START)
-    for k in range(round(programme.duration / 0.01)):
-        reference = programme.at(0.01 * k + 0.005, START)
+    for k in range(round(maneuvers.duration / 0.01)):
+        reference = maneuvers.at(0.01 * k + 0.005, START)
         assert not (reference.drifting and reference.coefficients)
         drifted += 0.01 * reference.drifting
         if reference.coefficients and not before.coefficients:
             assert before.drifting
         before = reference
-    runs = 3 if isinstance(programme, Steps) else 1
+    runs = 3 if isinstance(maneuvers, Steps) else 1
     assert drifted == pytest.approx(runs * 1.0)
 
 
 @given(st.floats(0.0, 40.0))
 def test_sequence_plays_its_parts_in_order(time):
     parts = [Hover(3.0), Steps(0.2, 1.0, 2.0), Circle(3.0, 2.0, 1.0)]
-    sequence = Sequence(parts)
+    sequence = ManeuverSequence(parts)
     assert sequence.duration == pytest.approx(sum(p.duration for p in parts))
     edges = np.cumsum([p.duration for p in parts])
     expected = min(int(np.searchsorted(edges, time, side="right")), 2)

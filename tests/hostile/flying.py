@@ -29,7 +29,7 @@ CONFIG = {
     "flight": {
         "arm": True,
         "takeoff_height_m": 2.0,
-        "programme": ["hover"],
+        "maneuvers": ["hover"],
         "ready_timeout_s": 8.0,
         "arming_timeout_s": 6.0,
         "takeoff_timeout_s": 8.0,

@@ -22,7 +22,7 @@ from companion.mavlink.outbox import Outbox
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
-from companion.vehicle.client import Conversation
+from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.inbox import Inbox
 from companion.vehicle.state import VehicleState
@@ -149,7 +149,7 @@ class _Player:
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
-        self._conversation = Conversation(settings, outbox, router, stats, self._loop.time, clock)
+        self._conversation = VehicleClient(settings, outbox, router, stats, self._loop.time, clock)
         self.out.stats, self.out.state = stats, self._conversation.state
 
     async def _until(self, time):

@@ -79,7 +79,7 @@ def test_a_family_is_complete(family):
     )
     # What tells of a takeover sooner than a heartbeat at 1 Hz does.
     assert ("HEARTBEAT" in family.wanted_rates) != ("CURRENT_MODE" in family.wanted_rates)
-    assert family.dead_man.parameter in {rule.name for rule in family.parameters}
+    assert family.offboard_loss_failsafe.parameter in {rule.name for rule in family.parameters}
 
 
 @EVERY_FAMILY

@@ -143,7 +143,7 @@ def test_each_setpoint_leaves_once_as_the_tap_saw_it_and_with_the_samples_stamp(
     assert stats.sent == len(ours)
 
 
-def test_it_flies_the_same_programme(tmp_path):
+def test_it_flies_the_same_maneuver(tmp_path):
     with mock_vehicle(tmp_path, in_lockstep=False, speed=2.0) as mock:
         changes = {
             "link": {

@@ -10,7 +10,7 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed
 from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
-from companion.preflight.evidence import Company, Evidence, Identity, LinkQuality, SampleTimes
+from companion.preflight.evidence import Evidence, Identity, LinkQuality, OtherNodes, SampleTimes
 from companion.preflight.examination import examine, forbidding, result
 from companion.preflight.finding import Key
 from companion.preflight.parameter_findings import parameters
@@ -61,7 +61,7 @@ GOOD = Evidence(
     window=1.0,
     link=QUALITY,
     samples=SampleTimes(200, 0.006, 0, 1.0001),
-    company=Company(),
+    company=OtherNodes(),
     resets=0,
     identity=Identity("1.18.0", ATTITUDE_TARGET_CAPABILITY, "00ab"),
 )
@@ -157,14 +157,14 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
 @pytest.mark.parametrize(
     ("company", "expected"),
     [
-        (Company(sources=frozenset({(255, 190), (1, 154)})), {}),
-        (Company(sources=frozenset({(1, 191)})), {Key.OUR_IDS: UNSAFE}),
+        (OtherNodes(sources=frozenset({(255, 190), (1, 154)})), {}),
+        (OtherNodes(sources=frozenset({(1, 191)})), {Key.OUR_IDS: UNSAFE}),
         (
-            Company(sources=frozenset({(1, 192)}), companions=frozenset({(1, 192)})),
+            OtherNodes(sources=frozenset({(1, 192)}), companions=frozenset({(1, 192)})),
             {Key.SECOND_COMPANION: INEFFECTIVE},
         ),
-        (Company(steering=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
-        (Company(echo=True), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(steering=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(echo=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )
 def test_others_on_the_link(company, expected):

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.preflight.link_listener import Ear
+from companion.preflight.link_listener import LinkListener
 from companion.vehicle.clock import VehicleClock
 from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
 
@@ -40,7 +40,7 @@ def odometry(resets):
 def test_who_else_is_there_and_who_steers():
     async def scene():
         async with linked() as (link, vehicle):
-            with Ear(link, asyncio.get_running_loop().time) as ear:
+            with LinkListener(link, asyncio.get_running_loop().time) as ear:
                 for source, message in (
                     ((255, 190), of_type(GROUND_STATION)),
                     ((1, 192), of_type(COMPANION)),
@@ -61,7 +61,7 @@ def test_who_else_is_there_and_who_steers():
 def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
     async def scene():
         async with linked() as (link, vehicle):
-            with Ear(link, asyncio.get_running_loop().time) as ear:
+            with LinkListener(link, asyncio.get_running_loop().time) as ear:
                 vehicle.send(target(0.0), odometry(7))
                 await until(lambda: link.state.reset_counter == 7)
                 assert not ear.company.echo
@@ -92,7 +92,7 @@ def test_samples_that_cannot_be_answered(values):
         return lambda: None
 
     link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
-    with Ear(link, lambda: 0.0) as ear:
+    with LinkListener(link, lambda: 0.0) as ear:
         callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
         callbacks["ATTITUDE_QUATERNION"](attitude(4))
     assert (ear.samples.heard, ear.samples.unusable) == (2, 1)
@@ -107,7 +107,7 @@ def test_pauses_and_stamps_of_the_samples():
         return lambda: None
 
     link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
-    with Ear(link, lambda: next(times)) as ear:
+    with LinkListener(link, lambda: next(times)) as ear:
         assert ear.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))

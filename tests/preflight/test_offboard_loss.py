@@ -6,7 +6,7 @@ import pytest
 
 from companion.config import Config
 from companion.config.files import changed, load
-from companion.flight.maneuvers import programme, unbegun
+from companion.flight.maneuvers import configured_maneuvers, unbegun
 from companion.preflight.finding import Key
 from companion.preflight.offboard_loss import offboard_loss
 from companion.preflight.parameter_survey import Survey
@@ -21,7 +21,7 @@ WIDE = {
 }
 NARROW = {"limits": {"fence_radius_m": 30.0}}
 CIRCLE = {
-    "flight": {"programme": ("circle",), "takeoff_height_m": 10.0},
+    "flight": {"maneuvers": ("circle",), "takeoff_height_m": 10.0},
     "circle": {"radius_m": 5.0, "speed_m_s": 5.0, "laps": 2.0},
     "limits": {"fence_radius_m": 40.0, "max_tilt_deg": 50.0},
     "guidance": {"drag_per_s": 1.0},
@@ -29,10 +29,12 @@ CIRCLE = {
 
 
 def judged(config, held=1.0, family=GOOD.family):
-    name = family.dead_man.parameter
-    flown = programme(changed(config, WIDE, "test"))  # which refuses what comes near by itself
+    name = family.offboard_loss_failsafe.parameter
+    flown = configured_maneuvers(
+        changed(config, WIDE, "test")
+    )  # which refuses what comes near by itself
     evidence = replace(
-        GOOD, family=family, survey=Survey({name: held}, {name: name}), programme=flown
+        GOOD, family=family, survey=Survey({name: held}, {name: name}), maneuvers=flown
     )
     (finding,) = offboard_loss(config, evidence)
     assert finding.key == Key.OFFBOARD_LOSS
@@ -80,14 +82,14 @@ def test_what_is_advised_mends_it():
 
 def test_a_step_is_the_worst_moment_and_a_lower_rate_limit_mends_it():
     """Its rates are the planner's gain times the step, held from there."""
-    steps = flying({"flight": {"programme": ("steps",), "takeoff_height_m": 5.0}})
+    steps = flying({"flight": {"maneuvers": ("steps",), "takeoff_height_m": 5.0}})
     assert "below limits.fence_floor_m" in judged(steps).because
     slower = changed(steps, {"limits": {"max_tilt_rate_deg_s": 30.0}}, "test")
     assert judged(slower).verdict is SAFE
 
 
 def test_doublets_of_body_rates_are_weighed_too():
-    identify = flying({"flight": {"programme": ("identify",), "takeoff_height_m": 5.0}})
+    identify = flying({"flight": {"maneuvers": ("identify",), "takeoff_height_m": 5.0}})
     assert judged(identify).verdict is INEFFECTIVE
     assert judged(identify, held=0.75).verdict is SAFE
 
@@ -102,11 +104,11 @@ def test_an_autopilot_that_does_not_hold_drifts_farther():
 def test_a_trajectory_is_weighed_without_being_begun():
     path = CONFIGS / "trajectories" / "figure8.yaml"
     config = flying(
-        {"flight": {"programme": ("trajectory",), "trajectory": path, "slow_down": True}}
+        {"flight": {"maneuvers": ("trajectory",), "trajectory": path, "slow_down": True}}
     )
-    flown = programme(config)
+    flown = configured_maneuvers(config)
     duration = flown.duration
-    evidence = replace(GOOD, programme=unbegun(flown))
+    evidence = replace(GOOD, maneuvers=unbegun(flown))
     (finding,) = offboard_loss(config, evidence)
     assert "carry the vehicle" in finding.found
     assert flown.duration == duration
@@ -115,7 +117,7 @@ def test_a_trajectory_is_weighed_without_being_begun():
 def test_nothing_is_said_of_what_is_not_known():
     config = flying()
     assert list(offboard_loss(config, GOOD)) == []  # nothing is to be flown
-    unread = replace(GOOD, survey=Survey({}, {}), programme=programme(config))
+    unread = replace(GOOD, survey=Survey({}, {}), maneuvers=configured_maneuvers(config))
     assert list(offboard_loss(config, unread)) == []
 
 

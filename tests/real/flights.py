@@ -47,13 +47,13 @@ class Part(NamedTuple):
     """One maneuver of a flight.
 
     Attributes:
-        programme: its name in `flight.programme`.
+        maneuvers: its name in `flight.maneuvers`.
         settings: what it needs.
         trajectory: what `flight.trajectory` is to hold, or None.
         predictive: the same maneuver as a trajectory, which is all that predictive control flies.
     """
 
-    programme: str
+    maneuvers: str
     settings: dict
     trajectory: dict | None = None
     predictive: dict | None = None
@@ -126,21 +126,21 @@ def named(flight: str) -> Named:
 def configuration(flight: str, base: list[Path], folder: Path, changes: dict) -> dict:
     """What is flown, on top of the files `base`; a trajectory is written to `folder`."""
     config = merged({"include": [str(path) for path in base]}, SIMULATION)
-    asked, programme = named(flight), []
+    asked, maneuvers = named(flight), []
     for name in asked.parts:
         part = PARTS[name]
         if asked.variant == "nmpc" and part.predictive is not None:
-            part = part._replace(programme="trajectory", trajectory=part.predictive)
+            part = part._replace(maneuvers="trajectory", trajectory=part.predictive)
         config = _within(config, part.settings)
         if part.trajectory is not None:
             path = folder / f"{name}.yaml"
             path.write_text(yaml.safe_dump(part.trajectory))
             config["flight"]["trajectory"] = str(path)
         # Each begins, and is left, in a calm hold.
-        programme += [part.programme] if part.programme == "hover" else ["hover", part.programme]
-    if programme[-1] != "hover":
-        programme.append("hover")
-    config = merged(config, {"flight": {"programme": programme}, "hover": {"duration_s": _PAUSE_S}})
+        maneuvers += [part.maneuvers] if part.maneuvers == "hover" else ["hover", part.maneuvers]
+    if maneuvers[-1] != "hover":
+        maneuvers.append("hover")
+    config = merged(config, {"flight": {"maneuvers": maneuvers}, "hover": {"duration_s": _PAUSE_S}})
     if asked.parts == ["hover"]:
         config["hover"]["duration_s"] = 30.0
     config = merged(config, VARIANTS.get(asked.variant, {}))

@@ -113,14 +113,14 @@ class Flying:
                 out["cross_axis"] = {"reported": told["cross_axis_max"], **found}
                 out["time_constant_s"] = told["time_constant_s"]
         errors = tracking_errors(tracking, positions(log / "flight.tlog"), truth)
-        moving = [part for part in named(name).parts if PARTS[part].programme in MOVING]
+        moving = [part for part in named(name).parts if PARTS[part].maneuvers in MOVING]
         out["tracking"] = dict(zip(moving, errors["moving"], strict=False))
         if named(name).parts == ["hover"] and errors["hover"]:
             out["tracking"]["hover"] = max(errors["hover"], key=lambda part: part["seconds"])
         return out
 
 
-_ALONE = {"flight": {"programme": ["identify"]}}
+_ALONE = {"flight": {"maneuvers": ["identify"]}}
 
 
 def positions(log: Path) -> Floats:

@@ -13,12 +13,12 @@ from pymavlink.dialects.v20 import common
 from tests.real.vehicle import Vehicle
 
 FROZEN_GUIDANCE = """
-from companion.control.guidance_loop import Guide
-flown = Guide.step
+from companion.control.guidance_loop import GuidanceLoop
+flown = GuidanceLoop.step
 def freezing(guide):
     if guide.begun_at is None or guide._clock() < guide.begun_at + 5.0:
         flown(guide)
-Guide.step = freezing
+GuidanceLoop.step = freezing
 """
 NEW_MODES = {"px4": ("LOITER", "LAND", "RTL"), "ardupilot": ("LOITER", "LAND", "ALT_HOLD")}
 WATCHED = 12.0
@@ -165,7 +165,7 @@ def attitude_lowered(vehicle, rate_hz=5.0, times=1):
     """Another program on our link asks for less attitude than we fly by, on a circle."""
     radius = 5.0
     circle = {"radius_m": radius, "speed_m_s": 3.0, "laps": 4.0}
-    flight = vehicle.hovering(6.0, flight={"programme": ["circle"]}, circle=circle)
+    flight = vehicle.hovering(6.0, flight={"maneuvers": ["circle"]}, circle=circle)
     began = vehicle.relay.setpoints[-1] - 6.0
     sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
     lower = common.MAVLink_command_long_message(1, 1, 511, 0, 31, 1e6 / rate_hz, 0, 0, 0, 0, 0)

@@ -34,7 +34,7 @@ _HEARTBEATS_S = 1.2
 """PX4 tells once a second whether it is armed."""
 _TURN_ABOVE_M, _TURN_DEG_S = 1.5, 30.0
 HOVER = {
-    "flight": {"arm": True, "takeoff_height_m": 5.0, "programme": ["hover"]},
+    "flight": {"arm": True, "takeoff_height_m": 5.0, "maneuvers": ["hover"]},
     "hover": {"duration_s": 120.0},
 }
 

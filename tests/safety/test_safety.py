@@ -7,7 +7,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.unanswered import Unanswered
-from companion.flight.snapshot_builder import Lookout
+from companion.flight.snapshot_builder import SnapshotBuilder
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.monitor import Alarm, Monitor
@@ -63,10 +63,10 @@ def unanswered(reason, **changes):
 
 OLD = NOW - 0.6
 SILENT = {"answered": OLD, "sampled": OLD}
-WARN, HOLD, HAND_BACK, LAND, LET_GO = Action
+WARN, HOLD, HAND_BACK, LAND, RELEASE = Action
 STOOD_STILL = "this computer stood still for 0.4 s"
 BREACHES = [
-    ("unheard", control(**SILENT, heard=OLD), LET_GO, 0.0, "no attitude from the vehicle for 0.6"),
+    ("unheard", control(**SILENT, heard=OLD), RELEASE, 0.0, "no attitude from the vehicle for 0.6"),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
@@ -74,7 +74,7 @@ BREACHES = [
     ("silence", unanswered(Unanswered.LATE, stood_still=0.2), HAND_BACK, 0.0, "stale_ms"),
     ("silence", unanswered(Unanswered.LATE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
     ("silence", unanswered(Unanswered.AWAITING_MODE, stood_still=0.4), HAND_BACK, 0.0, STOOD_STILL),
-    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), LET_GO, 0.0, STOOD_STILL),
+    ("unheard", control(**SILENT, heard=OLD, stood_still=0.4), RELEASE, 0.0, STOOD_STILL),
     ("silence", unanswered(Unanswered.OLD_TARGET, placed=OLD), HAND_BACK, 0.0, "no position"),
     (
         "silence",
@@ -88,7 +88,7 @@ BREACHES = [
     ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
     ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot leave"),
     ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
-    ("disarmed", autopilot(armed=False), LET_GO, 0.0, "disarmed in flight"),
+    ("disarmed", autopilot(armed=False), RELEASE, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
     ("failsafe", autopilot(failsafe=True), HAND_BACK, 0.0, "failsafe"),
     ("battery", autopilot(battery=Battery(inf, 14.0, 0.15)), LAND, 0.2, "battery at 15 %"),
@@ -149,14 +149,14 @@ def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)
     loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0, held=HeldRates())
-    lookout = Lookout(link, loop, None, real_time=True)
+    snapshot_builder = SnapshotBuilder(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
-        lookout.listen(now)
-    assert lookout.stood_still(since=0.02) == pytest.approx(0.4)
-    assert lookout.stood_still(since=0.49) == 0.0
-    lookout.listen(3.53)
-    assert lookout.stood_still(since=0.49) == pytest.approx(3.0)
-    assert lookout.stood_still(since=3.53) == 0.0
+        snapshot_builder.listen(now)
+    assert snapshot_builder.stood_still(since=0.02) == pytest.approx(0.4)
+    assert snapshot_builder.stood_still(since=0.49) == 0.0
+    snapshot_builder.listen(3.53)
+    assert snapshot_builder.stood_still(since=0.49) == pytest.approx(3.0)
+    assert snapshot_builder.stood_still(since=3.53) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -220,7 +220,7 @@ def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
     both = autopilot(armed=False, failsafe=True)
     verdict, after = climb.see(both, 1.0)
     assert (verdict.action, verdict.reason, after) == (
-        LET_GO,
+        RELEASE,
         "the vehicle disarmed in flight",
         0.0,
     )

@@ -1,4 +1,4 @@
-"""Minimum snap: against the literature, a dense quadratic programme and its own optimality."""
+"""Minimum snap: against the literature, a dense quadratic maneuver and its own optimality."""
 
 import numpy as np
 import pytest
@@ -83,7 +83,7 @@ def _dense(knots, fixed, axis):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_it_is_the_optimum_of_the_dense_programme(seed):
+def test_it_is_the_optimum_of_the_dense_maneuver(seed):
     knots, fixed = _problem(seed)
     spline = minimum_snap(knots, fixed)
     for axis in range(3):

@@ -50,7 +50,7 @@ _TRUTH_PERIOD = 0.02
 """Between two requests of the true position, s of vehicle time."""
 _TRUTH_TIMEOUT = 1.0
 """For an answer, s of wall time; an answer takes about 0.1 ms."""
-_MEASURED_PHASE = "programme"
+_MEASURED_PHASE = "maneuvers"
 
 
 class PositionError(NamedTuple):
@@ -170,7 +170,7 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
         },
         "guidance": {"kind": task.guidance, "lead": task.lead},
         "flight": {
-            "programme": ("hover", "trajectory"),
+            "maneuvers": ("hover", "trajectory"),
             "trajectory": course,
             "takeoff_height_m": _HEIGHT_M,
             "arm": True,

@@ -16,7 +16,7 @@ from companion.mavlink.command import (
     Command,
 )
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from companion.vehicle.autopilot import FLIGHT_RATES, DeadMan
+from companion.vehicle.autopilot import FLIGHT_RATES, OffboardLossFailsafe
 from companion.vehicle.readiness import Readiness
 from companion.vehicle.roles import Role
 
@@ -68,7 +68,7 @@ class ArduPilot:
     )
     interval_step_us = 1000
     rates_along_target = True
-    dead_man = DeadMan(
+    offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
     )
     unready_in = frozenset[Role]()

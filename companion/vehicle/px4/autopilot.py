@@ -15,7 +15,7 @@ from companion.mavlink.command import (
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
-from companion.vehicle.autopilot import FLIGHT_RATES, DeadMan
+from companion.vehicle.autopilot import FLIGHT_RATES, OffboardLossFailsafe
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from companion.vehicle.readiness import Readiness
 from companion.vehicle.roles import Role
@@ -87,7 +87,9 @@ class Px4:
     )
     interval_step_us = 1
     rates_along_target = False
-    dead_man = DeadMan("COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True)
+    offboard_loss_failsafe = OffboardLossFailsafe(
+        "COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True
+    )
     unready_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS
 
