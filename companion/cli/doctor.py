@@ -143,7 +143,7 @@ class _Visit:
         finally:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
-        evidence = replace(evidence, survey=await survey(link, link.family.parameters))
+        evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _flown(config)
         code = self._told([*refusals, *examine(config, evidence)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
