@@ -204,12 +204,12 @@ class Assembled:
         """What the control loop counted."""
         loop = self.context.loop
         return LoopCounts(
-            samples=loop.samples,
-            setpoints=loop.setpoints,
-            missed_deadlines=loop.missed_deadlines,
-            stale=loop.stale,
-            refused=loop.refused,
-            unanswered={reason.value: count for reason, count in loop.unanswered.items()},
+            samples=loop.record.samples,
+            setpoints=loop.record.setpoints,
+            missed_deadlines=loop.record.missed_deadlines,
+            stale=loop.record.stale,
+            refused=loop.record.refused,
+            unanswered={reason.value: count for reason, count in loop.record.unanswered.items()},
             rate_hz=self.context.rate_hz,
         )
 
@@ -263,7 +263,7 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    loop.attitude_target = lambda: link.state.attitude_target
+    loop.planner.attitude_target = lambda: link.state.attitude_target
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     context = FlightContext(
         config,

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
-from companion.control.unanswered import Unanswered
+from companion.control.loop_record import Unanswered
 from companion.flight.snapshot_builder import SnapshotBuilder
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
