@@ -32,6 +32,10 @@ def test_imports_point_one_way():
     ("module", "line"),
     [
         ("sitl_mock/physics/vehicle.py", "import companion.attitude"),
+        ("sitl_mock/physics/sensors.py", "import sitl_mock.autopilot.state"),
+        ("sitl_mock/physics/rotors.py", "import sitl_mock.link.framing"),
+        ("sitl_mock/settings.py", "import sitl_mock.px4.parameters"),
+        ("sitl_mock/autopilot/events.py", "import sitl_mock.autopilot.personality"),
         ("companion/flight/watch.py", "import sitl_mock.physics.rigid_body"),
         ("companion/attitude/limits.py", "import companion.guidance"),
         ("companion/guidance/height.py", "import asyncio"),

@@ -15,7 +15,7 @@ from companion import demo
 from companion.cli import doctor, flights, identify, tools
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
 from companion.cli.identify import SHIPPED
-from companion.config.sections import FlightConfig
+from companion.config.flight import FlightConfig
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError

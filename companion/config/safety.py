@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from companion.config.units import Si
 from companion.files.yaml_file import Section
 from companion.guidance.fence import inside
 
@@ -83,6 +84,11 @@ class SafetyConfig(Section):
     """Share of a second by which our own timer may be late: the computer gives us no time."""
     computer_action: Any = "hand_back"
     """More of either for 1.5 s."""
+
+    max_reset_angle = Si("max_reset_deg")
+    tilt_margin = Si("tilt_margin_deg")
+    max_body_rate = Si("max_body_rate_deg_s")
+    max_round_trip = Si("max_round_trip_ms")
 
     @model_validator(mode="after")
     def _consistent(self) -> "SafetyConfig":

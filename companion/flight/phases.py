@@ -4,7 +4,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any
 
-from companion.config.sections import FlightConfig
+from companion.config.flight import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff
 from companion.flight.context import FlightContext
 from companion.safety.ending import Exit

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from companion.attitude.planner import FIRST_ORDER
 from companion.config import Config
-from companion.config.sections import AUTO
+from companion.config.guidance import AUTO
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.recording.dead_time import AxisDeadTime, DeadTimes
@@ -15,7 +15,6 @@ from companion.vehicle.parameter_rules import Verdict
 from companion.vehicle.registry import FAMILIES
 
 SAFE, INEFFECTIVE = Verdict.SAFE, Verdict.INEFFECTIVE
-_MS = 1e-3
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
@@ -48,11 +47,8 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
             source="summary.json",
         )
         return
-    configured = {name: axis.dead_time_ms for name, axis in config.vehicle.axes.items()}
-    axes = {
-        name: AxisDeadTime(measured.get(name), None if value is None else _MS * value)
-        for name, value in configured.items()
-    }
+    configured = {name: axis.dead_time for name, axis in config.vehicle.axes.items()}
+    axes = {name: AxisDeadTime(measured.get(name), value) for name, value in configured.items()}
     warning = DeadTimes(axes).warning()
     if warning is None:
         found = f"the dead time of {folder.name} was as configured"

@@ -1,7 +1,7 @@
 """Whether the fence holds if our program ends in flight: the last rates are weighed against it."""
 
 from collections.abc import Iterator
-from math import exp, hypot, radians
+from math import exp, hypot
 from typing import NamedTuple
 
 from companion.config import Config
@@ -57,7 +57,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if worst.breach is None:
         yield Finding(Key.OFFBOARD_LOSS, Verdict.SAFE, carried, source=source)
         return
-    shortest = shortest_hold(1e-3 * config.deadman.silence_limit_ms)
+    shortest = shortest_hold(config.deadman.silence_limit)
     shorter = f"set {offboard_loss_failsafe.parameter} to {shortest:g}, " if held > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,
@@ -83,7 +83,7 @@ def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, bra
         safety.reaction_s,
     )
     drag = least_drag(config)
-    max_tilt_rate = radians(limits.max_tilt_rate_deg_s)
+    max_tilt_rate = limits.max_tilt_rate
     loss, worst = Loss(held, brakes, drag, max_tilt_rate, fence), Worst()
     for time, flown in _flown(config, maneuvers, drag):
         there = reach(flown, loss)

@@ -16,7 +16,8 @@ from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.attitude.kinematics import cos_tilt
 from companion.attitude.representation import normalised
 from companion.guidance.thrust import specific_thrust
-from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)

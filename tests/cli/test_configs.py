@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from companion.cli.main import main
 from companion.config import Config
 from companion.config.files import json_schema, load
-from companion.config.sections import VehicleConfig
+from companion.config.vehicle import VehicleConfig
 from sitl_mock.settings import MockSettings, load_settings
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.config.sections import FlightConfig
+from companion.config.flight import FlightConfig
 from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import exit_phases, flight_phases, ground_phases
 from companion.safety.ending import Exit, FlightEnded

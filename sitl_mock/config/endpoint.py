@@ -1,4 +1,4 @@
-"""What the companion's wire is made of, as the configuration says it."""
+"""The companion endpoint as the configuration writes it: udp, tcpin or serial."""
 
 import re
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ _HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 @dataclass(frozen=True)
 class Udp:
-    """UDP on the ports that ``port`` names."""
+    """UDP; ``port`` sets the ports."""
 
 
 @dataclass(frozen=True)
 class TcpIn:
-    """A TCP port that waits for one client."""
+    """A TCP port that serves one client."""
 
     host: str
     port: int
@@ -23,19 +23,19 @@ class TcpIn:
 
 @dataclass(frozen=True)
 class SerialLine:
-    """A pseudo-terminal, with a symbolic link to it; None = no link."""
+    """A pseudo-terminal, with a symbolic link at ``path``; None = no link."""
 
     path: Path | None
 
 
-Wiring = Udp | TcpIn | SerialLine
+EndpointAddress = Udp | TcpIn | SerialLine
 
 
-def parse_wiring(text: str) -> Wiring:
+def parse_endpoint(text: str) -> EndpointAddress:
     """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
 
     Raises:
-        ValueError: it is none of these.
+        ValueError: the text is none of these.
     """
     if text == "udp":
         return Udp()
@@ -46,11 +46,11 @@ def parse_wiring(text: str) -> Wiring:
     found = _TCP.fullmatch(text)
     if found is not None and _is_host(found[1]) and 1 <= int(found[2]) <= 65535:
         return TcpIn(found[1] or "127.0.0.1", int(found[2]))
-    raise ValueError(f"this is no endpoint: {_HELP}")
+    raise ValueError(f"not an endpoint; {_HELP}")
 
 
 def _is_host(text: str) -> bool:
-    """Whether the resolver takes this name: no label empty or longer than 63 characters."""
+    """Whether the resolver accepts this name: no label is empty or longer than 63 characters."""
     try:
         text.encode("idna")
     except UnicodeError:
@@ -62,7 +62,7 @@ def for_vehicle(text: str, index: int) -> str:
     """Return the endpoint of the vehicle with this index: the next port, a path with its number."""
     if index == 0:
         return text
-    match parse_wiring(text):
+    match parse_endpoint(text):
         case TcpIn(host, port):
             return f"tcpin://{host}:{port + index}"
         case SerialLine(Path() as path):

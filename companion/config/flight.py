@@ -1,11 +1,48 @@
-"""The sections of the configuration that say how each maneuver is flown."""
+"""What is flown: the phases of a flight, and one section a maneuver."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
-from companion.config.sections import Seconds
-from companion.files.yaml_file import Section
+from companion.config.units import Si
+from companion.files.yaml_file import PathKey, Section
+
+Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
+
+
+class FlightConfig(Section):
+    """What to fly, and how long each phase may take."""
+
+    takeoff_height_m: Annotated[float, Field(ge=1.5, le=100.0)] = 5.0
+    """Height above home to which the autopilot takes off."""
+    maneuvers: Annotated[
+        tuple[Literal["hover", "steps", "circle", "corners", "identify", "trajectory"], ...],
+        Field(min_length=1, max_length=20),
+    ] = (
+        "hover",
+        "steps",
+        "circle",
+    )
+    """Flown in this order."""
+    trajectory: PathKey | None = None
+    """File of what the maneuver `trajectory` follows: configs/trajectories/figure8.yaml, say."""
+    slow_down: bool = False
+    """Slow a trajectory down that the limits do not allow, instead of refusing it."""
+    arm: StrictBool = False
+    """Arm by ourselves. Otherwise the pilot arms, and we wait for it; `fly --arm` says yes too."""
+    accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
+    """Unsafe findings of `companion doctor` with which it is flown all the same, by their names,
+    such as COM_OF_LOSS_T; each is told in the flight's events."""
+    connect_timeout_s: Seconds = 30.0
+    """Wait this long for a heartbeat."""
+    ready_timeout_s: Seconds = 60.0
+    """Wait this long for the autopilot's estimator and pre-arm checks."""
+    arming_timeout_s: Seconds = 60.0
+    """Wait this long for the vehicle to be armed."""
+    takeoff_timeout_s: Seconds = 40.0
+    """Wait this long to reach takeoff_height_m."""
+    landing_timeout_s: Seconds = 90.0
+    """Wait this long for the autopilot to report that it has landed."""
 
 
 class HoverConfig(Section):
@@ -67,3 +104,6 @@ class IdentifyConfig(Section):
     """How long their first part lasts; the vehicle rises by climb_m_s2 times its square."""
     settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
     """Position hold before each doublet and at the end."""
+
+    tilt_rate = Si("tilt_rate_deg_s")
+    yaw_rate = Si("yaw_rate_deg_s")
