@@ -6,8 +6,8 @@ from typing import NoReturn
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.control.guidance_command import GuidanceCommand
 from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.guidance_command import GuidanceCommand
 from companion.flight.assembly import hover_thrust, planner, rate_limits
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings

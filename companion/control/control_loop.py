@@ -28,7 +28,7 @@ from companion.vehicle.clock import Misfit
 from companion.vehicle.samples import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
-"""Sends time_boot_ms of the sample, body rates and thrust; False where the link does not take it."""
+"""Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 

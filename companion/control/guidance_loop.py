@@ -204,9 +204,7 @@ class GuidanceLoop:
     def _heading(self) -> float:
         return heading(self._loop.resets.attitude(self._q))
 
-    def _predicted(
-        self, now: float, linear: LinearCommand, inputs: GuidanceInput
-    ) -> LinearCommand:
+    def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
         """The command of predictive control while it flies, else `linear`.
 
         Its headings are in the autopilot's frame, resets included. Its target stays constant for a

@@ -93,7 +93,7 @@ class LoopRecord:
     held: HeldRates = field(default_factory=HeldRates)
 
     def note_arrival(self, sample: AttitudeSample) -> float:
-        """Note that a sample arrived; returns the vehicle time since the usable one before it, s."""
+        """Note an arrived sample; returns the vehicle time since the last usable one, s."""
         self.last_sample = sample.received
         period = sample.vehicle_time - self.last_vehicle_time
         if sample.misfit is None:

@@ -113,7 +113,7 @@ class MotionEstimate:
         return GuidanceInput(motion, later, thrust, disturbance, drag, thrust_limits)
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """`inputs` with attitude and body rates, for predictive control; `now` is s on our clock."""
+        """`inputs` with attitude and rates, for predictive control; `now` is s on our clock."""
         return Vehicle(
             now,
             inputs.now.position_ned,

@@ -168,14 +168,14 @@ class Assembled:
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
-        loop = self.context.loop
+        record = self.context.loop.record
         return LoopCounts(
-            samples=loop.record.samples,
-            setpoints=loop.record.setpoints,
-            missed_deadlines=loop.record.missed_deadlines,
-            stale=loop.record.stale,
-            refused=loop.record.refused,
-            unanswered={reason.value: count for reason, count in loop.record.unanswered.items()},
+            samples=record.samples,
+            setpoints=record.setpoints,
+            missed_deadlines=record.missed_deadlines,
+            stale=record.stale,
+            refused=record.refused,
+            unanswered={reason.value: count for reason, count in record.unanswered.items()},
             rate_hz=self.context.rate_hz,
         )
 

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
-from companion.control.guidance_command import GuidanceCommand
 from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
+from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeTarget
@@ -224,7 +225,8 @@ def test_a_late_answer_counts_as_a_missed_deadline():
     assert bench.loop.record.missed_deadlines == 2
 
 
-def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
+def test_each_unanswered_sample_has_one_reason_which_is_counted():
+    """Every reason of the enumeration occurs here."""
     bench = Bench()
     bench.loop.offboard_active = True
     bench.run(10)
@@ -244,8 +246,14 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
     bench.loop.command = None
     bench.time += 0.004
     bench.sample()
-    counted = {reason: n for reason, n in bench.loop.record.unanswered.items() if n}
-    assert counted == {
+    bench.loop.is_same_vehicle = lambda: False
+    bench.run(3)
+    bench.loop.is_same_vehicle = lambda: True
+    bench.loop._send = refuse_setpoint
+    bench.run(1)
+    assert bench.loop.record.unanswered == {
+        Unanswered.ANOTHER_VEHICLE: 3,
+        Unanswered.INVALID_SETPOINT: 1,
         Unanswered.NOT_NEWER: 1,
         Unanswered.AHEAD: 1,
         Unanswered.LATE: 1,
@@ -256,10 +264,14 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
         Unanswered.NO_TARGET: 1,
     }
     loop = bench.loop
-    assert (loop.record.stale, loop.record.refused) == (6, 3)
+    assert (loop.record.stale, loop.record.refused) == (9, 4)
     assert loop.record.samples == loop.record.setpoints + loop.record.stale + loop.record.refused
-    assert loop.record.reason is Unanswered.NO_TARGET
+    assert loop.record.reason is Unanswered.INVALID_SETPOINT
     assert all(reason.words for reason in Unanswered)
+
+
+def refuse_setpoint(*_):
+    raise InvalidSetpoint("out of range")
 
 
 @pytest.mark.parametrize(
