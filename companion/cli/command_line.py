@@ -12,7 +12,7 @@ from typing import TypeAlias, get_args
 from rich.console import Console
 
 from companion import demo
-from companion.cli import doctor, flights, identify, tools
+from companion.cli import config, doctor, flights, identify, tools
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
 from companion.cli.identify import SHIPPED
 from companion.config.flight import FlightConfig
@@ -87,6 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_benches(commands)
     _add_study(commands)
     _add_tools(commands)
+    _add_config(commands)
     return parser
 
 
@@ -195,6 +196,13 @@ def _add_link_options(command: argparse.ArgumentParser) -> None:
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="instead of the configuration's, such as limits.max_tilt_deg=20; as often as needed",
+    )
     command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
     command.add_argument("--json", action="store_true", help="end with one line of JSON")
 
@@ -254,17 +262,41 @@ def _add_tools(commands: Commands) -> None:
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
     plot.set_defaults(run=tools.plot)
 
+
+def _add_config(commands: Commands) -> None:
+    show = commands.add_parser(
+        "config",
+        help="print the configuration: every key, its default, unit, range and meaning",
+        description="Print every key as commented YAML, with the values of FILE or the defaults.",
+    )
+    which = show.add_mutually_exclusive_group()
+    which.add_argument("file", type=Path, nargs="?", metavar="FILE")
+    which.add_argument("--diff", type=Path, metavar="FILE", help="only what FILE changes")
+    which.add_argument("--get", metavar="KEY", help="only this key, such as limits.max_tilt_deg")
+    which.add_argument("--schema", action="store_true", help="the JSON Schema, for editors")
+    which.add_argument("--markdown", action="store_true", help="tables: docs/configuration.md")
+    show.set_defaults(run=config.show)
+
+    start = commands.add_parser("init", help="write a commented starting configuration")
+    start.add_argument("name", choices=list(config.STARTS), help="for which vehicle")
+    start.add_argument(
+        "--out",
+        type=Path,
+        default=Path("companion.yaml"),
+        metavar="FILE",
+        help="default: companion.yaml; an existing file is never replaced",
+    )
+    start.set_defaults(run=config.init)
+
     check = commands.add_parser(
         "check-config",
         help="check a configuration file",
         description="Check a configuration file and what it includes. It is read as YAML 1.2 "
-        "(010 is ten, yes is a text; no aliases, no tags), up to 250 kB and 6000 values; the "
-        "schema names the smallest and the largest value of each key.",
+        "(010 is ten, yes is a text; no aliases, no tags), up to 250 kB and 6000 values; "
+        "`companion config` names the smallest and the largest value of each key.",
     )
-    which = check.add_mutually_exclusive_group(required=True)
-    which.add_argument("file", type=Path, nargs="?", metavar="FILE")
-    which.add_argument("--schema", action="store_true", help="print the JSON Schema instead")
-    check.set_defaults(run=tools.check_config)
+    check.add_argument("file", type=Path, metavar="FILE")
+    check.set_defaults(run=config.check)
 
 
 def _maneuvers(text: str) -> tuple[str, ...]:
