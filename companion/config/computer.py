@@ -54,8 +54,7 @@ class LinkConfig(Section):
 
 
 class RealtimeConfig(Section):
-    """Real-time settings requested from the operating system. The flight reports which were
-    granted."""
+    """Real-time settings that the system grants or refuses; the flight reports which."""
 
     scheduler: Literal["other", "fifo"] = "other"
     """other: the normal scheduler. fifo: SCHED_FIFO, which runs before all normal programs."""
