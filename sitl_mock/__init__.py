@@ -1,1 +1,1 @@
-"""A multirotor with an autopilot that speaks MAVLink: the judge of programs that fly one."""
+"""A multirotor with an autopilot that speaks MAVLink: to test programs that fly one."""

@@ -6,18 +6,22 @@ import os
 import signal
 import sys
 import threading
+import time
+from math import degrees
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.autopilot.motion_telemetry import euler
+from sitl_mock.config.section import ConfigError
 from sitl_mock.server import Server
 from sitl_mock.settings import MockSettings, load_settings
-from sitl_mock.status import StatusLine
+from sitl_mock.simulation import Simulation
 
 EXIT_OK = 0
 EXIT_USAGE = 2
+_STATUS_PERIOD_S = 0.25
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -32,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         sys.stderr.write(f"sitl_mock: {error}\n")
         return EXIT_USAGE
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may have us begin with SIGINT ignored
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may start us with SIGINT ignored
         signal.signal(number, _interrupt)
     if options.end_with_stdin:
         threading.Thread(target=_end_with_stdin, name="stdin", daemon=True).start()
@@ -60,14 +64,18 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--port", type=int, help="where the companion listens (default 14540)")
     parser.add_argument("--endpoint", help="udp (default), tcpin://HOST:PORT or serial:///PATH")
     parser.add_argument("--gcs-port", type=int, help="where a ground station listens, 0 = none")
-    parser.add_argument("--control-port", type=int, help="JSON control channel, 0 = none")
-    parser.add_argument("--seed", type=int, help="of all noise and faults")
+    parser.add_argument(
+        "--control-port", type=int, help="UDP port of the JSON control channel, 0 = none"
+    )
+    parser.add_argument("--seed", type=int, help="seed of all noise and faults")
     parser.add_argument("--speed", type=float, help="vehicle seconds per wall second")
-    parser.add_argument("--lockstep", action="store_true", help="wait for an answer to each step")
-    parser.add_argument("--count", type=int, default=1, help="how many vehicles (1..100)")
+    parser.add_argument(
+        "--lockstep", action="store_true", help="lockstep: wait for an answer to each step"
+    )
+    parser.add_argument("--count", type=int, default=1, help="number of vehicles (1..100)")
     parser.add_argument("--headless", action="store_true", help="no live line on the terminal")
     parser.add_argument(
-        "--end-with-stdin", action="store_true", help="end when standard input does"
+        "--end-with-stdin", action="store_true", help="exit when standard input ends"
     )
     parser.add_argument("--check", action="store_true", help="check the configuration and exit")
     return parser
@@ -86,13 +94,13 @@ def _servers(settings: MockSettings, options: argparse.Namespace) -> list[Server
         raise ConfigError(f"--count must be 1 to 100, not {options.count}")
     shown = not options.headless and options.count == 1 and sys.stderr.isatty()
     return [
-        Server(settings.for_vehicle(index), 1 + index, StatusLine() if shown else None)
+        Server(settings.for_vehicle(index), 1 + index, StatusLine().show if shown else None)
         for index in range(options.count)
     ]
 
 
 def _run_all(servers: list[Server]) -> None:
-    """Run each vehicle in a process of its own; the sockets are bound already and inherited."""
+    """Run each vehicle in its own process, which inherits the bound sockets."""
     context = multiprocessing.get_context("fork")
     processes: list[BaseProcess] = [
         context.Process(target=_run_one, args=(server,), daemon=True) for server in servers
@@ -118,7 +126,7 @@ def _run_one(server: Server) -> None:
 
 
 def _end_with_stdin() -> None:
-    """Wait for the end of standard input, which is a pipe from whoever started us, and end."""
+    """Wait until standard input, a pipe from the parent process, ends; then exit."""
     while os.read(0, 4096):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
@@ -126,6 +134,32 @@ def _end_with_stdin() -> None:
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt
+
+
+class StatusLine:
+    """Writes one line about the vehicle to standard error, at most four times a second."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def show(self, simulation: Simulation) -> None:
+        """Write the line if the last one is old enough."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + _STATUS_PERIOD_S
+        state, truth = simulation.state, simulation.vehicle.truth
+        north, east, down = truth.position_ned
+        roll, pitch, heading = (degrees(angle) for angle in euler(truth.q))
+        text = (
+            f"{state.time_s:8.1f} s  {state.mode.name:<9} {'armed' if state.armed else 'disarmed'}"
+            f"{' FAILSAFE' if state.failsafe else ''}"
+            f"  N {north:7.2f}  E {east:7.2f}  up {0.0 - down:6.2f} m"
+            f"  roll {roll:4.0f}  pitch {pitch:4.0f}  heading {heading % 360:4.0f} deg"
+            f"  setpoints {simulation.stream.received}"
+        )
+        sys.stderr.write(f"\r{text}\x1b[K")
+        sys.stderr.flush()
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""The control channel: JSON requests that ask for faults or for the truth (pure).
+"""The control channel: JSON requests that inject faults or return the true state (pure).
 
 Requests, one object each:
 
 - ``{"fault": {"kind": "drop", "probability": 0.5, "duration_s": 3}}``: any fault of the
-  configuration; without a start condition it begins at once -> ``{"ok": true}``
+  configuration; without a start it begins at once -> ``{"ok": true}``
 - ``{"clear": true}``: end all faults -> ``{"ok": true}``
-- ``{"state": true}``: the truth -> see `truth`
+- ``{"state": true}``: return the true state -> see `truth`
 
 Anything else -> ``{"error": "..."}``.
 """
@@ -16,56 +16,56 @@ from typing import Any
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import fault_adapter
-from sitl_mock.simulation import Autopilot
+from sitl_mock.simulation import Simulation
 
 _USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
 
 
-def reply(autopilot: Autopilot, request: bytes) -> bytes:
-    """Carry out one request and return the answer, both JSON."""
-    return json.dumps(_answer(autopilot, request), allow_nan=False).encode()
+def reply(simulation: Simulation, request: bytes) -> bytes:
+    """Execute one request and return the answer, both JSON."""
+    return json.dumps(_answer(simulation, request), allow_nan=False).encode()
 
 
-def _answer(autopilot: Autopilot, request: bytes) -> dict[str, Any]:
+def _answer(simulation: Simulation, request: bytes) -> dict[str, Any]:
     try:
         asked = json.loads(request)
     except (ValueError, RecursionError):
         return {"error": f"not JSON; {_USAGE}"}
     match asked:
         case {"fault": dict(fault)} if len(asked) == 1:
-            return _add_fault(autopilot, fault)
+            return _add_fault(simulation, fault)
         case {"clear": True} if len(asked) == 1:
-            autopilot.clear_faults()
+            simulation.clear_faults()
             return {"ok": True}
         case {"state": True} if len(asked) == 1:
-            return truth(autopilot)
+            return truth(simulation)
     return {"error": _USAGE}
 
 
-def _add_fault(autopilot: Autopilot, fault: dict[str, Any]) -> dict[str, Any]:
+def _add_fault(simulation: Simulation, fault: dict[str, Any]) -> dict[str, Any]:
     try:
         valid = fault_adapter.validate_python(fault)
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
         return {"error": f"fault {where}: {detail['msg']}".replace("fault :", "fault:")}
-    autopilot.faults.add(valid, autopilot.time_us)
+    simulation.faults.add(valid, simulation.time_us)
     return {"ok": True}
 
 
-def truth(autopilot: Autopilot) -> dict[str, Any]:
-    """Return what is really so: SI, NED (origin: home on the ground), FRD, q body to world.
+def truth(simulation: Simulation) -> dict[str, Any]:
+    """Return the true state: SI, NED (origin: home on the ground), FRD, q body to world.
 
     Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
-    ``aborted`` (the autopilot's process has ended: nothing moves or answers any more),
+    ``aborted`` (the autopilot's process has ended: it neither flies nor answers),
     ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
-    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (how many
-    counted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or how many
-    frames of the companion were ``accepted``, ``unsigned``, ``refused``).
+    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (number
+    accepted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or the number
+    of the companion's frames that were ``accepted``, ``unsigned``, ``refused``).
     """
-    state, stream = autopilot.state, autopilot.stream
-    now = autopilot.vehicle.truth
-    signing = autopilot.companion.signing
+    state, stream = simulation.state, simulation.stream
+    now = simulation.vehicle.truth
+    signing = simulation.companion.signing
     touched = now.touchdown_speed == now.touchdown_speed  # not NaN
     return {
         "time": state.time_s,
@@ -82,7 +82,7 @@ def truth(autopilot: Autopilot) -> dict[str, Any]:
         "on_ground": now.on_ground,
         "crashed": now.crashed,
         "touchdown_speed": now.touchdown_speed if touched else None,
-        "battery": autopilot.vehicle.battery.remaining,
+        "battery": simulation.vehicle.battery.remaining,
         "setpoints": stream.received,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
         "signing": None if signing is None else signing.counts(),

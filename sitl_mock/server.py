@@ -1,77 +1,80 @@
-"""One vehicle in time: paced by the wall clock, or step by step with its companion."""
+"""Runs one vehicle in real time, or in lockstep with its companion."""
 
 import os
 import time
+from collections.abc import Callable
 from math import ceil
 
+from sitl_mock.connections import Arrived, Connections
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import Message, decode
 from sitl_mock.settings import MockSettings
-from sitl_mock.simulation import Autopilot
-from sitl_mock.status import StatusLine
-from sitl_mock.wires import Arrived, Wires
+from sitl_mock.simulation import Simulation
 
 BEACON_FIRST_S = 0.05
 """The first beacon is sent again after this much wall time without an answer."""
 BEACON_AGAIN_S = 0.2
 """A later beacon is sent again after this much wall time."""
 MAX_LAG_S = 1.0
-"""Paced time that is later than this is not caught up. A busy computer may hold us up for some
-tenths of a second; a vehicle whose clock lost them would look as if its link had become slow."""
+"""In real time, a lag above this is not made up. A busy computer delays us by tenths of a second;
+we make these up, because a lost tenth would look to the companion like a slower link."""
 
 SPIN_S = 0.0005
-"""The mock spins this long for an answer before it sleeps."""
+"""The server polls without sleeping for this long before it sleeps."""
 
 _ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
 
 
 def in_burst(elapsed_s: float, burst_s: float) -> float:
-    """When the burst comes that a time belongs to, both in s; without bursts that very time."""
+    """Return the time of the burst in which a step runs, s; without bursts the time itself."""
     return ceil(elapsed_s / burst_s) * burst_s if burst_s > 0.0 else elapsed_s
 
 
 class Server:
-    """Runs one vehicle in paced time or in lockstep.
+    """Runs one vehicle in real time or in lockstep.
 
     Args:
         settings: this vehicle's own (see `MockSettings.for_vehicle`).
         system_id: MAVLink system id.
-        status: shown while running, None = headless.
+        status: shows the running vehicle after each slot, None = headless.
 
     Raises:
         ConfigError: a port is in use.
     """
 
     def __init__(
-        self, settings: MockSettings, system_id: int = 1, status: StatusLine | None = None
+        self,
+        settings: MockSettings,
+        system_id: int = 1,
+        status: Callable[[Simulation], None] | None = None,
     ) -> None:
         self._settings = settings
         self._status = status
-        self._autopilot = Autopilot(settings, system_id)
-        self._wires = Wires(settings, self._autopilot)
-        self._companion = self._wires.companion
+        self._simulation = Simulation(settings, system_id)
+        self._connections = Connections(settings, self._simulation)
+        self._companion = self._connections.companion
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
         self._answered = False
         self._collected: list[Arrived] = []
         self._base_wall = 0.0
         self._base_us = 0
-        self._autopilot.set_clock(self._clock_ns)
+        self._simulation.set_clock(self._clock_ns)
 
     @property
     def where(self) -> str:
-        """Where a companion finds the vehicle, in words."""
+        """Address of the companion endpoint, for the user."""
         return self._companion.where
 
     def run(self) -> None:
-        """Run for ever; a signal's exception ends it."""
+        """Run until an exception, such as that of a signal, ends it."""
         try:
             if self._settings.lockstep.enabled:
                 self._await_answer_to_first_beacon()
             else:
                 self._await_client()
-                self._autopilot.boot()
-                self._wires.flush()
+                self._simulation.boot()
+                self._connections.flush()
             self._rebase()
             while True:
                 self._step()
@@ -80,40 +83,40 @@ class Server:
 
     def close(self) -> None:
         """Close the sockets."""
-        self._wires.close()
+        self._connections.close()
 
     def _step(self) -> None:
-        """Fly one slot: in lockstep after the answer to the latest beacon, else when it is time."""
+        """Simulate one slot: in lockstep after the latest answer, else when it is due."""
         if not self._lockstep:
             self._wait_for_time()
         self._handle_collected()
-        self._autopilot.tick()
+        self._simulation.tick()
         if self._settings.lockstep.enabled:
-            self._wires.flush(self._new_beacon())
+            self._connections.flush(self._new_beacon())
             if self._lockstep:
                 self._await_answer()
         else:
-            self._wires.flush()
+            self._connections.flush()
         if self._status is not None:
-            self._status.show(self._autopilot)
+            self._status(self._simulation)
 
     # Lockstep
 
     def _new_beacon(self) -> bytes:
-        self._beacon = self._autopilot.beacon()
+        self._beacon = self._simulation.beacon()
         self._answered = False
         return self._beacon
 
     def _await_answer_to_first_beacon(self) -> None:
-        """Before the time 0 nothing flies: send the beacon until somebody answers.
+        """Send the first beacon until a client answers it; the simulation starts then.
 
-        A client that speaks but does not answer has ``patience_s``.
+        If a client sends anything but no answer within ``patience_s``, continue in real time.
         """
-        self._wires.send_beacon(self._new_beacon())
+        self._connections.send_beacon(self._new_beacon())
         heard_at: float | None = None
         while not self._answered:
             self._collect(BEACON_FIRST_S)
-            self._wires.send_beacon(self._beacon)
+            self._connections.send_beacon(self._beacon)
             now = time.monotonic()
             if heard_at is None and self._companion.heard:
                 heard_at = now
@@ -122,29 +125,29 @@ class Server:
                 return
 
     def _await_answer(self) -> None:
-        """Wait for the answer, or lose patience and go on in paced time."""
+        """Wait for the answer; after ``patience_s`` continue in real time."""
         self._collect(BEACON_AGAIN_S)
         if self._answered:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_AGAIN_S
         while not self._answered and time.monotonic() < deadline:
-            self._wires.send_beacon(self._beacon)
+            self._connections.send_beacon(self._beacon)
             self._collect(BEACON_AGAIN_S)
         if not self._answered:
             self._lockstep = False
             self._rebase()
 
     def _collect(self, timeout_s: float) -> None:
-        """Collect datagrams until the answer comes or the wall time is over.
+        """Collect datagrams until the answer comes or the timeout ends.
 
-        Spinning a little before sleeping saves two wake-ups a step, most of a round trip's cost.
+        Polling for a moment before sleeping saves two wake-ups a step, most of a round trip's cost.
         """
         began = time.monotonic()
-        self._collect_companion()  # what a wire of bytes already holds wakes nobody
+        self._collect_companion()  # frames already buffered from a byte stream do not wake select
         self._poll(0.0)
         while not self._answered and time.monotonic() - began < SPIN_S:
             self._collect_companion()
-            os.sched_yield()  # whoever else wants this core may have it
+            os.sched_yield()  # let another process use this core
         while not self._answered:
             left = began + timeout_s - time.monotonic()
             if left <= 0.0:
@@ -152,15 +155,15 @@ class Server:
             self._poll(left)
 
     def _poll(self, timeout_s: float) -> None:
-        """Collect from the companion and serve the others, once something came or in time."""
-        for endpoint in self._wires.ready(timeout_s):
+        """Wait for input, at most ``timeout_s``; collect the companion's and handle the rest."""
+        for endpoint in self._connections.ready(timeout_s):
             if endpoint is self._companion:
                 self._collect_companion()
             else:
                 self._serve(endpoint)
 
     def _collect_companion(self) -> None:
-        """Read the companion's datagrams up to and including the answer, never beyond."""
+        """Read the companion's datagrams up to and including the answer."""
         while not self._answered:
             received = self._companion.receive()
             if received is None:
@@ -172,36 +175,35 @@ class Server:
                 self._answered = True
 
     def _is_answer(self, messages: list[Message]) -> bool:
-        now_ms = self._autopilot.time_us // 1000
+        now_ms = self._simulation.time_us // 1000
         return any(
             message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
             for message in messages
         )
 
     def _handle_collected(self) -> None:
-        """Handle what was collected while waiting, in its order."""
+        """Handle the collected datagrams in order."""
         collected, self._collected = self._collected, []
-        self._wires.deliver(collected, self._companion)
+        self._connections.deliver(collected, self._companion)
 
-    # Paced time
+    # Real time
 
     def _await_client(self) -> None:
-        """Where the wire knows whether somebody is there, nothing boots before."""
+        """Wait for a client where the endpoint can tell; the vehicle boots after that."""
         while not self._companion.connected:
-            self._wires.ready(BEACON_AGAIN_S)
+            self._connections.ready(BEACON_AGAIN_S)
 
     def _rebase(self) -> None:
         self._base_wall = time.monotonic()
-        self._base_us = self._autopilot.time_us
+        self._base_us = self._simulation.time_us
 
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
 
-        Faster than the machine can, or after a pause, the time lost is not caught up; nor is what
-        the clock slipped.
+        A lag above `MAX_LAG_S` is dropped, and so is the time of a ``slip_clock`` fault.
         """
-        self._base_wall += self._autopilot.effects.take_slip()
-        elapsed_s = self._elapsed_us(self._autopilot.next_us) / 1e6
+        self._base_wall += self._simulation.effects.take_slip()
+        elapsed_s = self._elapsed_us(self._simulation.next_us) / 1e6
         due = self._base_wall + in_burst(
             elapsed_s, self._settings.burst_ms * 1e-3 / self._settings.speed
         )
@@ -209,7 +211,7 @@ class Server:
         if left < -MAX_LAG_S:
             self._rebase()
         while True:
-            for endpoint in self._wires.ready(max(0.0, left)):
+            for endpoint in self._connections.ready(max(0.0, left)):
                 self._serve(endpoint)
             left = due - time.monotonic()
             if left <= 0.0 or self._lockstep:
@@ -219,22 +221,22 @@ class Server:
         return (vehicle_us - self._base_us) / self._settings.speed
 
     def _serve(self, endpoint: Endpoint) -> None:
-        """Read what waits on an endpoint, handle it now and answer now."""
+        """Read and handle all datagrams that wait on an endpoint, and send the answers."""
         while (received := endpoint.receive()) is not None:
             datagram, from_partner = received
             messages = decode(datagram)
-            self._wires.deliver([(datagram, messages)], endpoint)
+            self._connections.deliver([(datagram, messages)], endpoint)
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
             if in_lockstep and from_partner and self._is_answer(messages):
-                # The latest beacon is answered after all.
+                # The latest beacon is answered: lockstep resumes.
                 self._answered = self._lockstep = True
-        self._wires.flush()
+        self._connections.flush()
 
     def _clock_ns(self) -> int:
-        """Return vehicle time for TIMESYNC: between slots it goes with the wall clock."""
-        autopilot = self._autopilot
-        if self._lockstep or autopilot.effects.clock_frozen:
-            return autopilot.state.shown_us * 1000
+        """Return vehicle time for TIMESYNC, ns; between slots it advances with the wall clock."""
+        simulation = self._simulation
+        if self._lockstep or simulation.effects.clock_frozen:
+            return simulation.state.shown_us * 1000
         wall_us = (time.monotonic() - self._base_wall) * 1e6 * self._settings.speed
-        now_us = min(self._base_us + wall_us, autopilot.next_us)
-        return round(max(now_us, autopilot.time_us) * 1000)
+        now_us = min(self._base_us + wall_us, simulation.next_us)
+        return round(max(now_us, simulation.time_us) * 1000)

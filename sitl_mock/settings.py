@@ -1,123 +1,38 @@
-"""The ``mock:`` section of a configuration file: everything that can be set."""
+"""The ``mock:`` section of a configuration file, with the defaults of its autopilot."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import yaml
-from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import ValidationError, ValidationInfo, field_validator, model_validator
 
-from sitl_mock.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from sitl_mock.ardupilot.settings import with_ardupilot_defaults
-from sitl_mock.autopilot.parameters import Parameter, ParameterRefusedError, ParameterTable
-from sitl_mock.config.airframe import (
-    AirframeConfig,
-    BatteryConfig,
-    RateLoopConfig,
-    SensorConfig,
-    SigningConfig,
-    WindConfig,
-)
-from sitl_mock.config.errors import ConfigError, explain, suggestion
-from sitl_mock.config.faults import Fault
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section
-from sitl_mock.config.wiring import for_vehicle, parse_wiring
+from sitl_mock.autopilot.parameters import ParameterRefusedError, ParameterTable
+from sitl_mock.config.section import ConfigError, explain, suggestion
+from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.config.yaml_file import load_yaml
-from sitl_mock.px4.parameters import PX4_PARAMETERS
-
-PORT_OFFSET = 40
-"""The companion link is sent from this many ports above ``port``, as PX4's simulation does."""
-GCS_PORT_OFFSET = 4020
-"""The ground station link is sent from this many ports above ``gcs_port`` (18570 for 14550)."""
-
-_PARAMETERS = {"px4": PX4_PARAMETERS, "ardupilot": ARDUPILOT_PARAMETERS}
+from sitl_mock.personalities import PERSONALITIES
 
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
 
-Port = Annotated[int, Field(ge=0, le=65535)]
 
-
-class HomeConfig(Section):
-    """Where the vehicle stands at boot."""
-
-    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
-    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
-    altitude_m: Finite = 489.4
-    """Above mean sea level."""
-    heading_deg: Finite = 0.0
-
-
-class LockstepConfig(Section):
-    """The vehicle waits for an answer to each step."""
-
-    enabled: bool = False
-    period_ms: Annotated[int, Field(ge=1, le=100)] = 4
-    bundle: bool = True
-    """Send the frames of a step in one datagram (PX4 sends one each); the beacon stays alone."""
-    patience_s: Positive = 2.0
-    """Wall time without an answer after which the vehicle runs on in paced time."""
-
-
-class MockSettings(Section):
-    """Everything about one mock vehicle."""
-
-    autopilot: Literal["px4", "ardupilot"] = "px4"
-    """Whose rules it follows; each brings the errors of its navigation filter along, ArduPilot's
-    its own airframe, battery and rate loop, too."""
-    port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
-    endpoint: str = "udp"
-    """The companion's wire: udp (by ``port``), tcpin://HOST:PORT (for one client, and nothing boots
-    before it is there) or serial:///PATH (a pseudo-terminal, PATH a link to it)."""
-    gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
-    """0 = no ground station link."""
-    control_port: Port = 0
-    """JSON control channel on 127.0.0.1; 0 = none."""
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
-    speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
-    """Vehicle seconds per wall second, when not in lockstep."""
-    inner_loop_hz: Literal[250, 800] = 250
-    """Sets which telemetry rates PX4 achieves; ArduPilot has SCHED_LOOP_RATE for it."""
-    exact_rates: bool | None = None
-    """Never skip a slot at the full rate, as PX4's loop does; null: only in lockstep."""
-    burst_ms: NonNegative = 0.0
-    """In paced time the vehicle lives in bursts, one in this vehicle time, as ArduPilot's simulator
-    does, whose default is 5.6; 0 = it does not."""
-    prearm_delay_s: NonNegative = 4.5
-    """Arming is refused before; PX4 took 4.3 to 6.5 s, and ArduPilot, whose default it is, 41.6."""
-    lockstep: LockstepConfig = LockstepConfig()
-    signing: SigningConfig | None = None
-    """None: nothing is signed, and signatures are not looked at."""
-    home: HomeConfig = HomeConfig()
-    parameters: dict[str, Finite] = Field(default_factory=dict)
-    """Autopilot parameters that differ from their defaults."""
-    airframe: AirframeConfig = AirframeConfig()
-    rate_loop: RateLoopConfig = RateLoopConfig()
-    wind: WindConfig = WindConfig()
-    battery: BatteryConfig = BatteryConfig()
-    sensors: SensorConfig = SensorConfig()
-    faults: tuple[Fault, ...] = ()
-
-    @field_validator("endpoint")
-    @classmethod
-    def _known_endpoint(cls, endpoint: str) -> str:
-        parse_wiring(endpoint)
-        return endpoint
+class MockSettings(VehicleSettings):
+    """Every key of one vehicle, checked and completed by the rules of its autopilot."""
 
     @model_validator(mode="before")
     @classmethod
-    def _as_the_family_is(cls, section: object) -> object:
+    def _with_defaults(cls, section: object) -> object:
         if not isinstance(section, dict):
             return section
         section = {**section, "sensors": _with_ekf(section)}
-        if section.get("autopilot") == "ardupilot":
-            return with_ardupilot_defaults(section)
-        return section
+        personality = PERSONALITIES.get(str(section.get("autopilot", "px4")))
+        return section if personality is None else personality.with_defaults(section)
 
     @field_validator("parameters")
     @classmethod
     def _known_parameters(
         cls, parameters: dict[str, float], info: ValidationInfo
     ) -> dict[str, float]:
-        known = _PARAMETERS[info.data.get("autopilot", "px4")]
+        known = PERSONALITIES[info.data.get("autopilot", "px4")].parameters
         names = [parameter.name for parameter in known]
         for name in parameters:
             if name not in names:
@@ -128,31 +43,14 @@ class MockSettings(Section):
             raise ValueError(str(error)) from error
         return parameters
 
-    @property
-    def known_parameters(self) -> tuple[Parameter, ...]:
-        """The autopilot's parameters with their defaults."""
-        return _PARAMETERS[self.autopilot]
-
-    def for_vehicle(self, index: int) -> "MockSettings":
-        """Return the settings of the vehicle with this index: its own ports and its own luck."""
-        return self.model_copy(
-            update={
-                "port": self.port + index,
-                "endpoint": for_vehicle(self.endpoint, index),
-                "gcs_port": self.gcs_port + index if self.gcs_port else 0,
-                "control_port": self.control_port + index if self.control_port else 0,
-                "seed": self.seed + index,
-            }
-        )
-
 
 def _with_ekf(section: dict[str, Any]) -> object:
-    """Return the sensors' settings, with the errors of the autopilot's own navigation filter."""
+    """Return the ``sensors`` section with the navigation filter of this autopilot as default."""
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
     filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    # What a navigation filter tells is smooth, and no older than the attitude.
+    # The output of a navigation filter is smooth, and as recent as the attitude.
     return filled if filled["ekf"] in (None, "none") else {**SMOOTH, **filled}
 
 
@@ -160,11 +58,11 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
     """Read the ``mock:`` section of a YAML file; without a file, the defaults.
 
     Args:
-        path: the file; its other sections are not looked at.
+        path: the file; its other sections are ignored.
         overrides: values of top-level keys (and of ``lockstep``) from the command line.
 
     Raises:
-        ConfigError: the file cannot be read, or says something that cannot be.
+        ConfigError: the file cannot be read, or a key or value is invalid.
     """
     where = "the command line" if path is None else str(path)
     section = {} if path is None else _mock_section(path)

@@ -1,41 +1,40 @@
-"""The autopilot: messages in, messages out, one vehicle flown, in vehicle time (no I/O)."""
+"""One vehicle and its autopilot in vehicle time: messages in, messages out, no I/O."""
 
 from collections.abc import Callable
 from math import radians
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.fault_effects import FaultEffects
-from sitl_mock.autopilot.fault_schedule import FaultSchedule
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.faults import FaultEffects, FaultSchedule
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Parts
+from sitl_mock.autopilot.personality import VehicleParts
 from sitl_mock.autopilot.receiver import Receiver
+from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
 from sitl_mock.link.signing import link_signing
-from sitl_mock.personalities import personality_of
+from sitl_mock.personalities import PERSONALITIES
 from sitl_mock.physics.geodesy import Origin
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.settings import MockSettings
 
 COMMANDER_PERIOD_US = 50_000
-"""The rules of state run this often, vehicle time."""
+"""Period of the commander (arming, modes, failsafes), vehicle time."""
 
 
-class Autopilot:
+class Simulation:
     """One vehicle with its autopilot.
 
     Args:
-        settings: everything that can be set.
+        settings: of this vehicle.
         system_id: MAVLink system id.
     """
 
     def __init__(self, settings: MockSettings, system_id: int = 1) -> None:
-        personality = personality_of(settings)
+        personality = PERSONALITIES[settings.autopilot]
         overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}
-        self.parameters = ParameterTable(settings.known_parameters, overrides)
+        self.parameters = ParameterTable(personality.parameters, overrides)
         home = settings.home
         self.vehicle = Vehicle(
             settings.airframe,
@@ -69,7 +68,7 @@ class Autopilot:
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
         self._beacon_framer = Framer(system_id, 1, signed=signed)
         self._rules = personality.rules(
-            Parts(
+            VehicleParts(
                 self.state,
                 self.parameters,
                 self.vehicle,
@@ -102,16 +101,16 @@ class Autopilot:
         self.effects.apply([], self.faults.clear())
 
     def handle(self, message: Message, link: Link) -> None:
-        """Take one message that came on a link; answers are queued on that link."""
+        """Handle one message received on a link; answers are queued on that link."""
         if not self.state.aborted:
             self._receiver.handle(message, link)
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Give TIMESYNC a finer clock of vehicle time than the ticks are."""
+        """Set the clock of vehicle time for TIMESYNC, which is finer than the slots."""
         self._receiver.clock_ns = clock_ns
 
     def tick(self) -> None:
-        """Fly on to the next slot, then queue the telemetry that is due."""
+        """Simulate to the next slot, then queue the telemetry that is due."""
         state = self.state
         next_us = self.next_us
         self._slots += 1
@@ -127,22 +126,22 @@ class Autopilot:
         if not self.effects.clock_frozen:
             state.shown_us = next_us
         state.estimate = vehicle.estimate()
-        self._look_about()
+        self._update_state()
         self._rules.parameter_protocol.step()
         self._send_due(self._slots * self._slot_us)
 
     def boot(self) -> None:
-        """Queue the telemetry of the time 0."""
-        self._look_about()
+        """Queue the telemetry of time 0."""
+        self._update_state()
         self._send_due(0)
 
     def beacon(self) -> bytes:
-        """Return the lockstep beacon of the present time, unsigned; no fault touches it."""
+        """Return the lockstep beacon of the present time, unsigned; faults do not affect it."""
         return self._beacon_framer.frame(
             dialect.MAVLink_system_time_message(0, self.state.time_us // 1000)
         )
 
-    def _look_about(self) -> None:
+    def _update_state(self) -> None:
         state, vehicle, rules = self.state, self.vehicle, self._rules
         rules.land_detector.step(contact=vehicle.on_ground)
         if rules.commander.under_setpoints and self.effects.offboard_us is None:

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from companion.config import Config
-from companion.config.sections import RealtimeConfig
+from companion.config.computer import RealtimeConfig
 from companion.files.yaml_file import parse
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -12,7 +12,7 @@ from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
-from companion.config.sections import AxisKeys
+from companion.config.vehicle import AxisKeys
 from companion.files.yaml_file import ConfigError
 from companion.guidance.reference import GRAVITY
 from companion.identification import (

@@ -4,33 +4,25 @@ The defaults fly the bundled vehicle.
 """
 
 from collections.abc import Mapping
-from math import ceil, cos, degrees, floor, hypot, radians, sin
+from math import ceil, cos, degrees, floor, hypot, sin
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, model_validator
 
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
-from companion.config.maneuvers import (
+from companion.config.computer import LinkConfig, RealtimeConfig, RecordingConfig
+from companion.config.flight import (
     CircleConfig,
     CornersConfig,
+    FlightConfig,
     HoverConfig,
     IdentifyConfig,
     StepsConfig,
 )
+from companion.config.guidance import AUTO, GuidanceConfig, PlannerConfig
+from companion.config.limits import DeadmanConfig, LimitsConfig
 from companion.config.safety import SafetyConfig
-from companion.config.sections import (
-    AUTO,
-    DeadmanConfig,
-    FlightConfig,
-    GuidanceConfig,
-    LimitsConfig,
-    LinkConfig,
-    PlannerConfig,
-    RealtimeConfig,
-    RecordingConfig,
-    ThrustConfig,
-    VehicleConfig,
-)
+from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
 from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
 
@@ -39,7 +31,7 @@ MOST_INCLUDED = 32
 """Files that one configuration may include, those of its includes among them."""
 
 FORMER_KEYS = {
-    "flight.maneuvers": "is now called `flight.maneuvers`",
+    "flight.programme": "is now called `flight.maneuvers`",
     "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
     " no key of its own, only the extra `nmpc`",
 }
@@ -96,7 +88,7 @@ class Config(Section):
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
     """What no single section can know: (whether it is wrong, what to say)."""
     limits, thrust, flown = config.limits, config.thrust, config.flight.maneuvers
-    tilt = radians(limits.max_tilt_deg)
+    tilt = limits.max_tilt
     return [
         (
             config.planner.name == MODEL_FOLLOWING and not config.vehicle.known,
@@ -134,7 +126,7 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
     # An autopilot that makes up for tilt may do it with all the thrust there is.
     most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
     tilt = degrees(largest_tilt(hover, most))
-    needed = hover / cos(radians(limits.max_tilt_deg)) / FOR_TILT
+    needed = hover / cos(limits.max_tilt) / FOR_TILT
     remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
     if needed <= 1.0 and not thrust.autopilot_compensates_tilt:
         remedy += f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed)) / 100.0:.2f}"

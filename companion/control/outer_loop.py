@@ -1,7 +1,7 @@
 """The outer loop put together from the configuration."""
 
 from collections.abc import Callable
-from math import radians, tan
+from math import tan
 
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
@@ -27,7 +27,6 @@ from companion.guidance.follow import Follow
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.nmpc import Settings, Solver
 
-_MS = 1e-3
 _CALM = Weights(position=1.0, velocity=1.5)
 _LOCKSTEP_DEADLINE = 1.0
 """The vehicle waits for the answer, s of wall time."""
@@ -68,8 +67,8 @@ def slower_tilt(config: Config) -> tuple[float, float]:
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]
     return (
-        _MS * max(axis.lag_ms or 0.0 for axis in tilt),
-        _MS * max(axis.dead_time_ms or 0.0 for axis in tilt),
+        max(axis.lag or 0.0 for axis in tilt),
+        max(axis.dead_time or 0.0 for axis in tilt),
     )
 
 
@@ -78,8 +77,8 @@ def heading_response(config: Config) -> InnerResponse:
     yaw = config.vehicle.axes["yaw"]
     return InnerResponse(
         config.planner.yaw_gain_per_s,
-        _MS * (yaw.lag_ms or 0.0),
-        _MS * (yaw.dead_time_ms or 0.0),
+        yaw.lag or 0.0,
+        yaw.dead_time or 0.0,
         config.planner_name == MODEL_FOLLOWING,
     )
 
@@ -148,8 +147,8 @@ def linear_guidance(config: Config) -> LinearGuidance:
             ),
             tilt=tilt,
             heading=heading,
-            max_horizontal=GRAVITY * tan(radians(limits.max_tilt_deg)),
-            thrust_lag=_MS * (config.thrust.lag_ms or 0.0),
+            max_horizontal=GRAVITY * tan(limits.max_tilt),
+            thrust_lag=config.thrust.lag,
             period=period,
         )
     )
@@ -173,7 +172,7 @@ def motion_estimate(
         _CORRECTS_WITHIN,
         _CORRECTION_WINDOW,
         _LARGEST_CORRECTION,
-        _MS * guidance.position_lateness_ms,
+        guidance.position_lateness,
     )
     return MotionEstimate(
         MotionObserver(settings),
@@ -220,9 +219,9 @@ def predictive_settings(config: Config) -> Settings:
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=response.lag or model_lag(config.planner.gain_per_s, 0.0),
             dead_time=slower_tilt(config)[1],
-            max_tilt=radians(limits.max_tilt_deg),
-            max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
-            max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+            max_tilt=limits.max_tilt,
+            max_tilt_rate=limits.max_tilt_rate,
+            max_yaw_rate=limits.max_yaw_rate,
             min_thrust=min_thrust,
             max_thrust=max_thrust,
             lead=period,

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable
 
-from companion.config.sections import LinkConfig
+from companion.config.computer import LinkConfig
 from companion.mavlink.errors import LinkError
 from companion.safety.snapshot import Health
 from companion.vehicle.link import Link

@@ -3,14 +3,12 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians
 from pathlib import Path
 
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
 from companion.config.known_drag import drag_prior
-from companion.config.sections import AxisKeys
 from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
@@ -38,8 +36,6 @@ from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
 from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
-
-_MS = 1e-3
 
 
 def link_settings(config: Config) -> LinkSettings:
@@ -102,57 +98,27 @@ def planner(config: Config) -> Planner:
         gain=config.planner.gain_per_s,
         yaw_gain=config.planner.yaw_gain_per_s,
         limits=rate_limits(config),
-        recovery_angle=radians(config.limits.recovery_angle_deg),
-        **(vehicle_response(config) if following else {}),
+        recovery_angle=config.limits.recovery_angle,
+        **(config.vehicle.response if following else {}),
     )
-
-
-def vehicle_response(config: Config) -> dict[str, float]:
-    """What `vehicle` says, as `make_planner` takes it; keys that are null are left out."""
-    vehicle = config.vehicle
-    times = {
-        "lag": vehicle.lag_ms,
-        "dead_time": vehicle.dead_time_ms,
-        "pitch_lag": vehicle.pitch_lag_ms,
-        "pitch_dead_time": vehicle.pitch_dead_time_ms,
-        "yaw_lag": vehicle.yaw_lag_ms,
-        "yaw_dead_time": vehicle.yaw_dead_time_ms,
-        "frame_lead": vehicle.yaw_frame_lead_ms,
-    }
-    plain = {"damping": vehicle.damping, "pitch_damping": vehicle.pitch_damping}
-    limits = {
-        "acceleration": vehicle.acceleration_limit_deg_s2,
-        "pitch_acceleration": vehicle.pitch_acceleration_limit_deg_s2,
-        "yaw_acceleration": vehicle.yaw_acceleration_limit_deg_s2,
-    }
-    response = {key: _MS * value for key, value in times.items() if value is not None}
-    response |= {key: value for key, value in plain.items() if value is not None}
-    return response | {key: radians(value) for key, value in limits.items() if value is not None}
 
 
 def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
     """What `vehicle` says of roll, pitch and yaw."""
-    roll, pitch, yaw = (_rate_loop(axis) for axis in config.vehicle.axes.values())
-    return roll, pitch, yaw
-
-
-def _rate_loop(axis: AxisKeys) -> RateLoop:
-    lag, dead_time, limit, damping = axis
-    return RateLoop(
-        None if lag is None else _MS * lag,
-        None if dead_time is None else _MS * dead_time,
-        None if limit is None else radians(limit),
-        damping,
+    roll, pitch, yaw = (
+        RateLoop(axis.lag, axis.dead_time, axis.acceleration_limit, axis.damping)
+        for axis in config.vehicle.axes.values()
     )
+    return roll, pitch, yaw
 
 
 def rate_limits(config: Config) -> Limits:
     """What we never ask of the vehicle, whoever asks."""
     limits = config.limits
     return Limits(
-        max_tilt=radians(limits.max_tilt_deg),
-        max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
-        max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+        max_tilt=limits.max_tilt,
+        max_tilt_rate=limits.max_tilt_rate,
+        max_yaw_rate=limits.max_yaw_rate,
         shape=limits.rate_limit,
     )
 
@@ -169,7 +135,7 @@ def hover_thrust(config: Config) -> HoverThrust:
             highest=config.limits.max_thrust,
             curve_factor=thrust.curve_factor,
             battery_exponent=thrust.battery_exponent,
-            lag=_MS * (thrust.lag_ms or 0.0),
+            lag=thrust.lag,
             tilt_compensated=thrust.autopilot_compensates_tilt,
             drag=drag_prior(config).drag.linear,
         )
@@ -202,14 +168,14 @@ class Assembled:
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
-        loop = self.context.loop
+        record = self.context.loop.record
         return LoopCounts(
-            samples=loop.samples,
-            setpoints=loop.setpoints,
-            missed_deadlines=loop.missed_deadlines,
-            stale=loop.stale,
-            refused=loop.refused,
-            unanswered={reason.value: count for reason, count in loop.unanswered.items()},
+            samples=record.samples,
+            setpoints=record.setpoints,
+            missed_deadlines=record.missed_deadlines,
+            stale=record.stale,
+            refused=record.refused,
+            unanswered={reason.value: count for reason, count in record.unanswered.items()},
             rate_hz=self.context.rate_hz,
         )
 
@@ -235,9 +201,9 @@ def assemble(
         thrust,
         link.send_setpoint,
         Deadlines(
-            telemetry_stale=deadman.telemetry_stale_ms * _MS,
-            target_stale=deadman.target_stale_ms * _MS,
-            deadline=deadman.deadline_ms * _MS,
+            telemetry_stale=deadman.telemetry_stale,
+            target_stale=deadman.target_stale,
+            deadline=deadman.deadline,
         ),
         trace,
         rate_limits(config),
@@ -252,9 +218,9 @@ def assemble(
         link.state,
         ground,
         trace,
-        max_tilt=radians(config.limits.max_tilt_deg),
+        max_tilt=config.limits.max_tilt,
         period=1.0 / config.guidance.rate_hz,
-        position_stale=deadman.position_stale_ms * _MS,
+        position_stale=deadman.position_stale,
         clock=clock,
         vehicle_clock=link.clock,
     )
@@ -263,7 +229,7 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    loop.attitude_target = lambda: link.state.attitude_target
+    loop.planner.attitude_target = lambda: link.state.attitude_target
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     context = FlightContext(
         config,

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from math import radians, tau
+from math import tau
 
 import numpy as np
 
 from companion.config import Config, trajectory_file
+from companion.config.flight import IdentifyConfig
 from companion.config.known_drag import assumption, least_drag, most_drag
-from companion.config.maneuvers import IdentifyConfig
 from companion.control.outer_loop import thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
@@ -132,9 +132,9 @@ def _refuse(name: str, broken: Violation | None, drag: str = "") -> None:
 
 def _doublets(identify: IdentifyConfig) -> Doublets:
     return Doublets(
-        tilt_rate=radians(identify.tilt_rate_deg_s),
+        tilt_rate=identify.tilt_rate,
         tilt_step=identify.tilt_duration_s,
-        yaw_rate=radians(identify.yaw_rate_deg_s),
+        yaw_rate=identify.yaw_rate,
         yaw_step=identify.yaw_duration_s,
         climb=identify.climb_m_s2,
         climb_step=identify.climb_duration_s,
@@ -158,16 +158,16 @@ def _follow(config: Config) -> Follow:
         first = min(broken, key=lambda one: one.slowing_helps)
         drag = assumption(config) if first.slowing_helps else ""
         raise ConfigError(f"{path}: {first}; {first.remedy}{drag}")
-    return Follow(trajectory, radians(config.limits.max_yaw_rate_deg_s), factor)
+    return Follow(trajectory, config.limits.max_yaw_rate, factor)
 
 
 def _envelope(config: Config) -> Envelope:
     """What the vehicle may be asked for, from where the maneuver begins."""
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     return Envelope(
-        max_tilt=radians(limits.max_tilt_deg),
-        max_tilt_rate=radians(limits.max_tilt_rate_deg_s),
-        max_yaw_rate=radians(limits.max_yaw_rate_deg_s),
+        max_tilt=limits.max_tilt,
+        max_tilt_rate=limits.max_tilt_rate,
+        max_yaw_rate=limits.max_yaw_rate,
         min_thrust=min_thrust,
         max_thrust=max_thrust,
         max_climb=limits.max_climb_m_s,

@@ -17,7 +17,7 @@ _SAMPLES_NEEDED = 10
 
 def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How old a sample is when it arrives, as far as TIMESYNC tells."""
-    seconds, stale = evidence.samples.age, 1e-3 * config.deadman.telemetry_stale_ms
+    seconds, stale = evidence.samples.age, config.deadman.telemetry_stale
     if seconds is None:
         if evidence.link.other_clock:
             yield Finding(
@@ -70,7 +70,7 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) -> Finding:
     """Whether the rate is one that is followed; a pause at either end makes it look wrong."""
     behind = 1.0 - rate - MOST_DRIFT
-    stale_after = 1e-3 * config.deadman.telemetry_stale_ms / behind if behind > 0.0 else inf
+    stale_after = config.deadman.telemetry_stale / behind if behind > 0.0 else inf
     unsure = evidence.samples.longest_pause / max(evidence.window, 1e-3)
     too_slow = behind > unsure
     apart = abs(rate - 1.0) > MOST_DRIFT

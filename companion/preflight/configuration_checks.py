@@ -7,15 +7,14 @@ from pathlib import Path
 
 from companion.attitude.planner import FIRST_ORDER
 from companion.config import Config
-from companion.config.sections import AUTO
+from companion.config.guidance import AUTO
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.recording.dead_time import AxisDeadTime, DeadTimes
 from companion.vehicle.parameter_rules import Verdict
-from companion.vehicle.registry import FAMILIES
+from companion.vehicle.registry import AUTOPILOTS
 
 SAFE, INEFFECTIVE = Verdict.SAFE, Verdict.INEFFECTIVE
-_MS = 1e-3
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
@@ -48,11 +47,8 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
             source="summary.json",
         )
         return
-    configured = {name: axis.dead_time_ms for name, axis in config.vehicle.axes.items()}
-    axes = {
-        name: AxisDeadTime(measured.get(name), None if value is None else _MS * value)
-        for name, value in configured.items()
-    }
+    configured = {name: axis.dead_time for name, axis in config.vehicle.axes.items()}
+    axes = {name: AxisDeadTime(measured.get(name), value) for name, value in configured.items()}
     warning = DeadTimes(axes).warning()
     if warning is None:
         found = f"the dead time of {folder.name} was as configured"
@@ -71,9 +67,11 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
 
 def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether each exception names something that can be found at all."""
-    streams = {f"{Key.STREAMS}.{name}" for family in FAMILIES for name in family.wanted_rates}
+    streams = {
+        f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates
+    }
     limits = {"link.min_attitude_rate_hz", "link.min_position_rate_hz"}
-    parameters = {rule.name for family in FAMILIES for rule in family.parameters}
+    parameters = {rule.name for autopilot in AUTOPILOTS for rule in autopilot.parameters}
     for name in config.flight.accept:
         if name not in {*Key, *streams, *limits, *parameters}:
             yield Finding(

@@ -133,7 +133,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How late what arrives is, and how evenly it comes."""
-    stale = 1e-3 * config.deadman.telemetry_stale_ms
+    stale = config.deadman.telemetry_stale
     round_trip, jitter = evidence.link.round_trip, evidence.link.jitter
     if round_trip is None or jitter is None:
         yield Finding(

@@ -1,7 +1,5 @@
 """The one table of what is watched, how long a breach must last, and what it leads to."""
 
-from math import radians
-
 from companion.config import Config
 from companion.guidance.fence import Fence
 from companion.safety import authority, envelope, estimate, resources
@@ -9,7 +7,6 @@ from companion.safety.fence import braking, outside
 from companion.safety.monitor import Action, Monitor
 from companion.safety.silence import clock_changed, silence
 
-_MS = 1e-3
 _READ = 0.2
 """After a pause of ours what came meanwhile is read within so long, s; until then it looks old."""
 _GAPS = 2
@@ -28,7 +25,7 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
 
 def _authority(config: Config) -> tuple[Monitor, ...]:
     """What cannot be set otherwise."""
-    limit = config.deadman.silence_limit_ms * _MS
+    limit = config.deadman.silence_limit
     unheard, still = silence(limit, heard=False), silence(limit, heard=True)
     return (
         Monitor("unheard", unheard, _RELEASE, mutes=True),
@@ -45,8 +42,8 @@ def _authority(config: Config) -> tuple[Monitor, ...]:
 def _vehicle(config: Config) -> tuple[Monitor, ...]:
     """Its battery, and what it knows of itself."""
     safety = config.safety
-    resets = estimate.resets(safety.max_resets, safety.max_reset_m, radians(safety.max_reset_deg))
-    battery = resources.battery(config.limits.min_battery_percent / 100.0)
+    resets = estimate.resets(safety.max_resets, safety.max_reset_m, safety.max_reset_angle)
+    battery = resources.battery(config.limits.min_battery)
     position = Action(safety.position_action)
     return (
         Monitor("battery", battery, Action(safety.battery_action), lasts=_READ, calm=5.0),
@@ -60,8 +57,8 @@ def _vehicle(config: Config) -> tuple[Monitor, ...]:
 def _course(config: Config) -> tuple[Monitor, ...]:
     """Where it is and how it moves."""
     safety, limits, fence = config.safety, config.limits, fence_of(config)
-    lean = radians(limits.max_tilt_deg + safety.tilt_margin_deg)
-    spin = radians(safety.max_body_rate_deg_s)
+    lean = limits.max_tilt + safety.tilt_margin
+    spin = safety.max_body_rate
     off, fast = envelope.tracking(safety.max_tracking_error_m), envelope.speed(safety.max_speed_m_s)
     saturated = envelope.thrust(limits.min_thrust, limits.max_thrust)
     envelope_action, out = Action(safety.envelope_action), Action(safety.fence_action)
@@ -80,7 +77,7 @@ def _means(config: Config) -> tuple[Monitor, ...]:
     """The link and this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
-    trip = resources.round_trip(safety.max_round_trip_ms * _MS)
+    trip = resources.round_trip(safety.max_round_trip)
     answers = resources.answer_rate(config.link.min_attitude_rate_hz)
     positions = resources.position_rate(config.link.min_position_rate_hz)
     return (

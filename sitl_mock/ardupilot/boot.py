@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
-from sitl_mock.ardupilot.texts import INFO
+from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6
@@ -47,12 +46,12 @@ _SAVED = (
 """Parameters that it saves on the way, and tells of."""
 
 
-class Voice(NamedTuple):
+class Notifier(NamedTuple):
     """By what the boot makes itself heard."""
 
     announce: ArduPilotAnnouncer
-    tell_home: Callable[[], None]
-    tell_parameter: Callable[[str], None]
+    send_home: Callable[[], None]
+    send_parameter: Callable[[str], None]
 
 
 class Boot:
@@ -60,14 +59,16 @@ class Boot:
 
     Args:
         state: for the time.
-        voice: tells of what is reached.
+        notifier: tells of what is reached.
         ready_us: when the position estimate is good.
         elevation: of home above sea level, m.
     """
 
-    def __init__(self, state: State, voice: Voice, *, ready_us: int, elevation: float) -> None:
+    def __init__(
+        self, state: State, notifier: Notifier, *, ready_us: int, elevation: float
+    ) -> None:
         self._state = state
-        self._voice = voice
+        self._notifier = notifier
         self._share = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
         self._texts = list(_TEXTS)
@@ -96,15 +97,15 @@ class Boot:
 
     def step(self) -> None:
         """Tell of what is reached by now."""
-        voice = self._voice
+        notifier = self._notifier
         while self._saved and self.reached(self._saved[0][0]):
-            voice.tell_parameter(self._saved.pop(0)[1])
+            notifier.send_parameter(self._saved.pop(0)[1])
         while self._texts and self.reached(self._texts[0][0]):
             text = self._texts.pop(0)[1]
-            voice.announce.say(text.format(elevation=self._elevation), INFO)
+            notifier.announce.say(text.format(elevation=self._elevation), INFO)
         if self.origin_set and not self._home_told:
             self._home_told = True
-            voice.tell_home()
+            notifier.send_home()
         if self._state.time_us >= self._next_runtime_us:
             self._next_runtime_us += RUNTIME_PERIOD_US
-            voice.tell_parameter("STAT_RUNTIME")
+            notifier.send_parameter("STAT_RUNTIME")

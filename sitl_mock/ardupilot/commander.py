@@ -2,21 +2,17 @@
 
 from math import isfinite, isnan
 
-from sitl_mock.ardupilot.boot import Boot, Voice
-from sitl_mock.ardupilot.checks import arming_problem
+from sitl_mock.ardupilot.boot import Boot, Notifier
 from sitl_mock.ardupilot.failsafe import ArduPilotFailsafe
-from sitl_mock.ardupilot.guided import Guided, Task
+from sitl_mock.ardupilot.guided import FatalSetpointError, Guided, Task, attitude_setpoint
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
-from sitl_mock.ardupilot.modes import NEEDS_POSITION, STICKS_HOLD
-from sitl_mock.ardupilot.setpoints import FatalSetpointError, attitude_setpoint
+from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOT_MODES, arming_problem
 from sitl_mock.ardupilot.texts import CRITICAL, INFO
 from sitl_mock.autopilot.commander import ACCEPTED, FAILED
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.setpoints import position_setpoint
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.setpoints import OffboardStream, position_setpoint
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
@@ -37,7 +33,7 @@ class ArduPilotCommander:
         control: told of every mode entered.
         guided: told what GUIDED shall do.
         stream: counts the setpoints that are obeyed.
-        voice: tells the outside.
+        notifier: tells the outside.
         boot: how far the autopilot has come up.
     """
 
@@ -49,19 +45,19 @@ class ArduPilotCommander:
         control: ArduPilotModeControl,
         guided: Guided,
         stream: OffboardStream,
-        voice: Voice,
+        notifier: Notifier,
         boot: Boot,
     ) -> None:
         self.refusal: str | None = None
         self.pilot = False
-        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, voice.announce, self._act)
+        self.failsafe = ArduPilotFailsafe(state, parameters, vehicle, notifier.announce, self._act)
         self._state = state
         self._parameters = parameters
         self._control = control
         self._guided = guided
         self._stream = stream
-        self._announce = voice.announce
-        self._voice = voice
+        self._announce = notifier.announce
+        self._notifier = notifier
         self._boot = boot
         self._landed_since_us = 0
         self._crashed = False
@@ -82,23 +78,23 @@ class ArduPilotCommander:
             return ACCEPTED
         problem = self._check()
         if problem is not None and not (force and self._boot.initialised and not self._crashed):
-            self._announce(Occasion.ARMING_DENIED, problem)
+            self._announce(EventKind.ARMING_DENIED, problem)
             return FAILED
         state.armed = True
         state.armed_at_us = self._landed_since_us = state.time_us
         state.flown = self._yaw_aligned = False
         state.home_ned = state.estimate.position_ned
         state.home_set_at_us = state.time_us
-        self._announce(Occasion.ARMED, "")
-        self._voice.tell_home()
+        self._announce(EventKind.ARMED, "")
+        self._notifier.send_home()
         self._control.enter(state.mode)
         return ACCEPTED
 
-    def tell_problem(self) -> None:
+    def announce_problem(self) -> None:
         """Say what forbids arming now, if anything does."""
         problem = self._check()
         if problem is not None:
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+            self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
     def disarm(self, *, force: bool = False) -> int:
         """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
@@ -106,7 +102,7 @@ class ArduPilotCommander:
             return ACCEPTED
         if not self._state.landed and not force:
             return FAILED
-        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
+        self._stop_motors(EventKind.DISARMED_BY_COMMAND)
         return ACCEPTED
 
     def request_mode(self, mode: Mode) -> int:
@@ -115,7 +111,7 @@ class ArduPilotCommander:
         if not self._boot.initialised or mode is state.mode:
             return ACCEPTED
         if state.armed and mode in NEEDS_POSITION and not state.position_valid:
-            self._announce(Occasion.MODE_DENIED, mode.name)
+            self._announce(EventKind.MODE_DENIED, mode.name)
             return FAILED
         self._enter(mode)
         return ACCEPTED
@@ -132,7 +128,7 @@ class ArduPilotCommander:
     def take_over(self, mode: Mode) -> None:
         """Let the pilot's sticks change the mode (fault injection)."""
         self.pilot = True
-        self.request_mode(STICKS_HOLD.get(mode, mode))
+        self.request_mode(PILOT_MODES.get(mode, mode))
 
     def heard(self, heartbeat: Message) -> None:
         """Note a heartbeat."""
@@ -180,7 +176,7 @@ class ArduPilotCommander:
         self._crashed = crashed
         self._boot.step()
         if state.armed and crashed:
-            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
+            self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self.failsafe.step()
         self._check()
         if state.armed:
@@ -219,14 +215,14 @@ class ArduPilotCommander:
         delay = self._parameters["DISARM_DELAY"] * 1e6
         if self._control.landing and state.flown:
             if waited >= LANDED_TO_DISARM_US:
-                self._stop_motors(Occasion.DISARMED_BY_LANDING)
+                self._stop_motors(EventKind.DISARMED_BY_LANDING)
         elif 0.0 < delay <= waited:
-            self._stop_motors(Occasion.DISARMED_ON_GROUND)
+            self._stop_motors(EventKind.DISARMED_ON_GROUND)
 
-    def _stop_motors(self, occasion: Occasion) -> None:
+    def _stop_motors(self, kind: EventKind) -> None:
         self._state.armed = False
-        self._announce(occasion, "")
-        self._voice.tell_parameter("MOT_THST_HOVER")  # what was learned is saved
+        self._announce(kind, "")
+        self._notifier.send_parameter("MOT_THST_HOVER")  # what was learned is saved
         if self._state.mode is Mode.GUIDED:
             self._guided.hold()
 
@@ -234,7 +230,7 @@ class ArduPilotCommander:
         """Enter a failsafe's mode, LAND where it cannot be; on the ground, disarm."""
         state = self._state
         if state.landed:
-            self._stop_motors(Occasion.DISARMED_ON_GROUND)
+            self._stop_motors(EventKind.DISARMED_ON_GROUND)
         elif mode in NEEDS_POSITION and not state.position_valid:
             self._enter(Mode.LAND)
         elif state.mode is not mode:

@@ -4,15 +4,13 @@ from math import isfinite
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
 from sitl_mock.ardupilot.commander import ArduPilotCommander
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
-from sitl_mock.ardupilot.texts import INFO
+from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.commander import ACCEPTED, DENIED, FAILED
 from sitl_mock.autopilot.commands import Command, Commands
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 

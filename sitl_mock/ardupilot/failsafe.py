@@ -3,11 +3,9 @@
 from typing import Protocol
 
 from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOTED
-from sitl_mock.autopilot.commander import Announce
-from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import BatteryWarning, State
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
@@ -76,10 +74,10 @@ class ArduPilotFailsafe:
         lost = bool(enabled) and state.time_us - self._gcs_us >= limit
         if self.gcs_lost and not lost:
             self.gcs_lost = False
-            self._announce(Occasion.GCS_REGAINED, "")
+            self._announce(EventKind.GCS_REGAINED, "")
         elif lost and not self.gcs_lost and state.armed:
             self.gcs_lost = True
-            self._announce(Occasion.GCS_LOST, "")
+            self._announce(EventKind.GCS_LOST, "")
             goes_on = int(parameters["FS_OPTIONS"]) & _PILOT_GOES_ON and state.mode in PILOTED
             mode = _GCS_ACTIONS.get(enabled)
             if mode is not None and not goes_on:
@@ -100,7 +98,7 @@ class ArduPilotFailsafe:
         critical = warning is BatteryWarning.CRITICAL
         used = parameters["BATT_CAPACITY"] - left_mah
         detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used:.0f} mAh"
-        self._announce(Occasion.BATTERY_CRITICAL if critical else Occasion.BATTERY_LOW, detail)
+        self._announce(EventKind.BATTERY_CRITICAL if critical else EventKind.BATTERY_LOW, detail)
         action = parameters["BATT_FS_CRT_ACT" if critical else "BATT_FS_LOW_ACT"]
         mode = _BATTERY_ACTIONS.get(int(action))
         if state.armed and mode is not None:
@@ -126,5 +124,5 @@ class ArduPilotFailsafe:
         began = lost and not self._position_lost and state.mode in NEEDS_POSITION
         self._position_lost = lost and (self._position_lost or began)
         if began and self._parameters["FS_EKF_ACTION"]:
-            self._announce(Occasion.POSITION_LOST, "")
+            self._announce(EventKind.POSITION_LOST, "")
             self._act(Mode.LAND)

@@ -1,8 +1,7 @@
 """How ArduCopter flies what is not rates: a point and a heading held, a climb rate followed."""
 
-from math import radians
+from math import radians, sqrt
 
-from sitl_mock.ardupilot.climb import Climb
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import (
     PositionController,
@@ -12,6 +11,35 @@ from sitl_mock.autopilot.position_control import (
 )
 from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
+
+
+class ClimbProfile:
+    """The height, climb rate and acceleration that are followed now; SI, up positive."""
+
+    def __init__(self) -> None:
+        self.height = 0.0
+        self.rate = 0.0
+        self.acceleration = 0.0
+
+    def begin(self, height: float, rate: float) -> None:
+        """Begin where the vehicle is, as fast as it climbs."""
+        self.height = height
+        self.rate = rate
+        self.acceleration = 0.0
+
+    def step(self, asked: float, acceleration: float, dt: float) -> None:
+        """Move on by ``dt`` s towards the climb rate ``asked``."""
+        most = acceleration * dt
+        change = max(-most, min(most, asked - self.rate))
+        self.acceleration = change / dt
+        self.rate += change
+        self.height += self.rate * dt
+
+
+def approach_speed(way: float, acceleration: float, fastest: float) -> float:
+    """Return the speed from which ``acceleration`` still stops within the ``way``, m/s."""
+    return min(fastest, sqrt(2.0 * acceleration * max(0.0, way)))
+
 
 STOPPING_S = 0.65
 """The point to hold lies this many seconds of velocity ahead (recorded on entering LAND)."""
@@ -33,7 +61,7 @@ class PositionHold:
         self._state = state
         self._parameters = parameters
         self._controller = PositionController(self._gains)
-        self.climb = Climb()
+        self.climb = ClimbProfile()
         self.point = (0.0, 0.0)
         """Held, NED, m."""
         self.yaw = 0.0

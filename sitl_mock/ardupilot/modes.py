@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 
 MODE_NUMBERS: dict[Mode, int] = {
     Mode.STABILIZE: 0,
@@ -14,22 +14,18 @@ MODE_NUMBERS: dict[Mode, int] = {
     Mode.BRAKE: 17,
 }
 """HEARTBEAT.custom_mode of each mode."""
-
 MODES_BY_NUMBER = {number: mode for mode, number in MODE_NUMBERS.items()}
-
 NEEDS_POSITION = frozenset({Mode.GUIDED, Mode.LOITER, Mode.RTL, Mode.BRAKE})
 """Modes that need a horizontal position."""
+NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
 
-NEVER_ARMED_IN = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
-
-STICKS_HOLD = {
+PILOT_MODES = {
     Mode.POSCTL: Mode.LOITER,
     Mode.ALTCTL: Mode.ALT_HOLD,
     Mode.STABILIZED: Mode.STABILIZE,
     Mode.MANUAL: Mode.STABILIZE,
 }
 """PX4's words for what a pilot switches to -> ArduCopter's."""
-
 PILOTED = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
 """Modes that a pilot flies."""
 
@@ -49,3 +45,36 @@ def base_mode(*, armed: bool, position_controlled: bool) -> int:
     if armed:
         flags |= dialect.MAV_MODE_FLAG_SAFETY_ARMED
     return int(flags)
+
+
+def arming_problem(
+    state: State,
+    *,
+    initialised: bool,
+    home_set: bool,
+    crashed: bool,
+    gcs_failsafe: bool,
+    refusal: str | None,
+) -> str | None:
+    """Return why arming is refused now, None if it is not.
+
+    Args:
+        state: the autopilot's state.
+        initialised: whether the autopilot has said that it is ready.
+        home_set: whether the estimator has settled on its origin.
+        crashed: whether the vehicle is broken.
+        gcs_failsafe: whether the ground station is lost.
+        refusal: a reason given from outside (fault injection).
+    """
+    mode: Mode = state.mode
+    problems = (
+        (not initialised, "System not initialised"),
+        (refusal is not None, refusal),
+        (crashed, "Vehicle has crashed"),
+        (not home_set, "AHRS: waiting for home"),
+        (mode in NEEDS_POSITION and not state.position_valid, "Need Position Estimate"),
+        (mode in NOT_ARMABLE, "Mode not armable"),
+        (state.battery_warning > BatteryWarning.OK, "Battery failsafe on"),
+        (gcs_failsafe, "GCS failsafe on"),
+    )
+    return next((problem for present, problem in problems if present), None)

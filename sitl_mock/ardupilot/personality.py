@@ -1,32 +1,36 @@
 """ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.ardupilot.announcer import ArduPilotAnnouncer
-from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Voice
+from sitl_mock.ardupilot.boot import INITIALISED_S, RECORDED_READY_S, Boot, Notifier
 from sitl_mock.ardupilot.commander import ArduPilotCommander
 from sitl_mock.ardupilot.commands import ArduPilotCommands
+from sitl_mock.ardupilot.defaults import (
+    ARDUPILOT_PARAMETERS,
+    ARDUPILOT_TYPES,
+    with_ardupilot_defaults,
+)
 from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
 from sitl_mock.ardupilot.modes import MODES_BY_NUMBER
 from sitl_mock.ardupilot.motion_telemetry import ArduPilotMotionTelemetry
-from sitl_mock.ardupilot.parameters import ARDUPILOT_TYPES
 from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
-from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS
+from sitl_mock.ardupilot.texts import ARDUPILOT_EVENTS, ArduPilotAnnouncer
 from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
-from sitl_mock.link.link import Link
-from sitl_mock.link.streams import StreamSchedule
-from sitl_mock.settings import MockSettings
+from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.state import Mode
+from sitl_mock.config.settings import VehicleSettings
+from sitl_mock.link.link import Link, StreamSchedule
 
 LANDED_AFTER_US = 1_000_000
 """Contact with little thrust for this long is a landing."""
@@ -69,11 +73,12 @@ _SUPPORTED = frozenset(
 class ArduPilot:
     """The ArduPilot personality, a Copter."""
 
-    events: Mapping[Occasion, Event] = ARDUPILOT_EVENTS
+    events: Mapping[EventKind, Event] = ARDUPILOT_EVENTS
     boot_mode = Mode.STABILIZE
     any_component = True
     system_id_parameter = "MAV_SYSID"
     unsigned_links: Collection[str] = ("companion",)
+    parameters = ARDUPILOT_PARAMETERS
     identity = Identity(
         capabilities=64495,
         flight_sw_version=0x04070000,
@@ -82,11 +87,15 @@ class ArduPilot:
         flight_custom_version=tuple(b"12f6aa4e"),
     )
 
-    def slot_us(self, settings: MockSettings) -> int:
+    def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
+        """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
+        return with_ardupilot_defaults(section)
+
+    def slot_us(self, settings: VehicleSettings) -> int:
         """Return a turn of the main loop."""
         return self._loop_us(settings)
 
-    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+    def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the streams of a link: silent but for the boot's until it is asked."""
         silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
@@ -100,21 +109,21 @@ class ArduPilot:
         """Return the mode a custom_mode means, None if the mock has none such."""
         return MODES_BY_NUMBER.get(custom_mode)
 
-    def rules(self, parts: Parts) -> Rules:
+    def rules(self, parts: VehicleParts) -> Rules:
         """Put ArduCopter's rules together."""
         state, parameters, links = parts.state, parts.parameters, parts.links
         announce = ArduPilotAnnouncer(links)
         protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
         guided = Guided()
         control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
-        voice = Voice(
+        notifier = Notifier(
             announce,
-            tell_home=lambda: _tell(commands, _HOME, links),
-            tell_parameter=lambda name: protocol.tell(name, [x for x in links if x.heard]),
+            send_home=lambda: _tell(commands, _HOME, links),
+            send_parameter=lambda name: protocol.send_changed(name, [x for x in links if x.heard]),
         )
-        boot = Boot(state, voice, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
+        boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
         commander = ArduPilotCommander(
-            state, parameters, parts.vehicle, control, guided, parts.stream, voice, boot
+            state, parameters, parts.vehicle, control, guided, parts.stream, notifier, boot
         )
         builders = self._builders(parts, boot)
         commands = ArduPilotCommands(state, commander, builders, announce)
@@ -136,7 +145,7 @@ class ArduPilot:
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )
 
-    def _builders(self, parts: Parts, boot: Boot) -> dict[int, Builder]:
+    def _builders(self, parts: VehicleParts, boot: Boot) -> dict[int, Builder]:
         motion = ArduPilotMotionTelemetry(parts.state, parts.vehicle, parts.origin)
         system = ArduPilotSystemTelemetry(
             parts.state,
@@ -149,7 +158,7 @@ class ArduPilot:
         return motion.builders() | system.builders()
 
     @staticmethod
-    def _loop_us(settings: MockSettings) -> int:
+    def _loop_us(settings: VehicleSettings) -> int:
         rate = settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ)
         return round(1e6 / rate)
 

@@ -35,7 +35,7 @@ def specific_thrust(thrust: float) -> float:
     return GRAVITY * _MEASURED[-1][1]
 
 
-def boosted(thrust: float, cos_tilt: float) -> float:
+def angle_boosted(thrust: float, cos_tilt: float) -> float:
     """Return the thrust divided by the cosine of the tilt, as ATC_ANGLE_BOOST does.
 
     Towards the horizon and beyond it the thrust is taken back to nothing.
@@ -44,12 +44,12 @@ def boosted(thrust: float, cos_tilt: float) -> float:
     return thrust * upright / max(0.1, min(1.0, cos_tilt))
 
 
-def asked_thrust(thrust: float) -> float:
+def thrust_of_setpoint(thrust: float) -> float:
     """Return the thrust that a setpoint's field asks: NaN is none, infinity all (measured)."""
     return 0.0 if isnan(thrust) else max(0.0, min(1.0, thrust))
 
 
-def asked_climb(thrust: float, fastest_up: float, fastest_down: float) -> float:
+def climb_rate_of_setpoint(thrust: float, fastest_up: float, fastest_down: float) -> float:
     """Return the climb rate that a setpoint's thrust field asks, m/s: 0.5 and NaN are none.
 
     Args:

@@ -1,22 +1,19 @@
 """Arming, modes and what ends them: what every autopilot family's rules of state must answer."""
 
-from collections.abc import Callable
 from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.personality import Occasion
+from sitl_mock.autopilot.state import Mode
 from sitl_mock.link.framing import Message
+from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.vehicle import ActuatorCommand
 
 ACCEPTED = int(dialect.MAV_RESULT_ACCEPTED)
 TEMPORARILY_REJECTED = int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
 DENIED = int(dialect.MAV_RESULT_DENIED)
 UNSUPPORTED = int(dialect.MAV_RESULT_UNSUPPORTED)
 FAILED = int(dialect.MAV_RESULT_FAILED)
-
-Announce = Callable[[Occasion, str], None]
-"""Tells the outside of an occasion, with a detail."""
 
 
 class Commander(Protocol):
@@ -34,7 +31,7 @@ class Commander(Protocol):
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
 
-    def tell_problem(self) -> None:
+    def announce_problem(self) -> None:
         """Say what forbids arming now, if anything does."""
 
     def disarm(self, *, force: bool = False) -> int:
@@ -54,3 +51,13 @@ class Commander(Protocol):
 
     def step(self, *, crashed: bool) -> None:
         """Run the rules once; called at 20 Hz of vehicle time."""
+
+
+class ModeControl(Protocol):
+    """Turns mode, estimate and setpoints into one actuator command a period."""
+
+    def command(self, dt: float) -> ActuatorCommand:
+        """Return the command for the next ``dt`` s."""
+
+    def shift(self, yaw_step: float, position_step: Vector) -> None:
+        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""

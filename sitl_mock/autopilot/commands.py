@@ -82,7 +82,7 @@ class Commands:
     def _run_checks(self, _: Command, __: Link) -> int:
         if self._state.armed:
             return TEMPORARILY_REJECTED
-        self._commander.tell_problem()
+        self._commander.announce_problem()
         return ACCEPTED
 
     def _get_interval(self, command: Command, link: Link) -> int:

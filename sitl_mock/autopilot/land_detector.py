@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 
-from sitl_mock.autopilot.commander import Announce
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import Landed, State
+from sitl_mock.autopilot.events import Announce, EventKind
+from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
 """Little thrust: below this share of the hover thrust."""
@@ -44,7 +42,7 @@ class LandDetector:
         was_landed = state.landed
         self._look(contact=contact)
         if was_landed != state.landed and state.armed:
-            landed = Occasion.LANDING_DETECTED if state.landed else Occasion.TAKEOFF_DETECTED
+            landed = EventKind.LANDING_DETECTED if state.landed else EventKind.TAKEOFF_DETECTED
             self._announce(landed, "")
         state.landed_state = self._landed_state()
 

@@ -73,7 +73,7 @@ class ParameterProtocol:
             return
         self._send_alone(name, link)
 
-    def tell(self, name: str, links: Iterable[Link]) -> None:
+    def send_changed(self, name: str, links: Iterable[Link]) -> None:
         """Send a parameter that the autopilot has changed by itself."""
         for link in links:
             self._send_alone(name, link)

@@ -63,7 +63,7 @@ class Receiver:
 
         What is not for this autopilot, unknown, or not signed as it must be, is ignored in silence.
         """
-        if not link.admits(message):
+        if not link.accepts(message):
             return
         link.heard = True
         handler = self._handlers.get(message.get_type())

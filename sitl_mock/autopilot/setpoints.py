@@ -9,14 +9,12 @@ from sitl_mock.link.framing import Message
 from sitl_mock.physics.quaternion import Quaternion, Vector
 
 NAN = float("nan")
-
 ROLL_OR_PITCH_RATE_IGNORED = 1 | 2
 YAW_RATE_IGNORED = 4
 THRUST_BODY = 32
 THROTTLE_IGNORED = 64
 ATTITUDE_IGNORED = 128
 """ATTITUDE_TARGET_TYPEMASK of SET_ATTITUDE_TARGET."""
-
 POSITION_BITS = (1, 2, 4)
 VELOCITY_BITS = (8, 16, 32)
 ACCELERATION_BITS = (64, 128, 256)
@@ -24,7 +22,6 @@ FORCE = 512
 YAW_IGNORED = 1024
 POSITION_YAW_RATE_IGNORED = 2048
 """POSITION_TARGET_TYPEMASK of SET_POSITION_TARGET_LOCAL_NED."""
-
 _BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
 
 
@@ -90,3 +87,35 @@ def _masked(mask: int, bits: tuple[int, int, int], values: Vector) -> Vector:
         for bit, value in zip(bits, values, strict=True)
     )
     return (x, y, z)
+
+
+DETECTION_US = 60_000
+"""How much later than COM_OF_LOSS_T the loss is seen (measured: 1.06 to 1.11 s for 1.0 s)."""
+
+
+class OffboardStream:
+    """The setpoints that count, and when they came (vehicle time in us)."""
+
+    def __init__(self) -> None:
+        self.setpoint: Setpoint | None = None
+        self.received = 0
+        self.last_us: int | None = None
+        self.fresh = False
+
+    def accept(self, setpoint: Setpoint, now_us: int) -> None:
+        """Take a setpoint as the newest; it stays in force until the next."""
+        self.setpoint = setpoint
+        self.received += 1
+        self.last_us = now_us
+        self.fresh = True
+
+    def take_fresh(self) -> bool:
+        """Whether a setpoint came since the last call."""
+        fresh, self.fresh = self.fresh, False
+        return fresh
+
+    def alive(self, now_us: int, loss_s: float) -> bool:
+        """Whether the stream counts as alive with COM_OF_LOSS_T = ``loss_s``."""
+        if self.last_us is None:
+            return False
+        return now_us - self.last_us <= round(loss_s * 1e6) + DETECTION_US

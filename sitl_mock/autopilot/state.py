@@ -1,11 +1,29 @@
 """What the autopilot's parts tell one another: one mutable record, as a bus of latest values."""
 
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import Enum, IntEnum, auto
 
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
+
+
+class Mode(Enum):
+    """A flight mode, as its autopilot calls it: PX4's down to OFFBOARD, then ArduCopter's own."""
+
+    MANUAL = auto()
+    ALTCTL = auto()
+    POSCTL = auto()
+    STABILIZED = auto()
+    LOITER = auto()
+    TAKEOFF = auto()
+    RTL = auto()
+    LAND = auto()
+    OFFBOARD = auto()
+    STABILIZE = auto()
+    ALT_HOLD = auto()
+    GUIDED = auto()
+    BRAKE = auto()
+
 
 NAN = float("nan")
 NAN_VECTOR = (NAN, NAN, NAN)

@@ -1,12 +1,11 @@
-"""The faults that can be asked of the mock, in the configuration or over the control channel."""
+"""The faults that the configuration or the control channel can inject."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, TypeAdapter, model_validator
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.errors import suggestion
-from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section
+from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, suggestion
 
 _MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
 
@@ -24,53 +23,53 @@ Direction = Literal["to_companion", "from_companion", "both"]
 
 
 class Timed(Section):
-    """When a fault is active, in vehicle time; without a start it begins at once."""
+    """Start and duration of a fault, in vehicle time; without a start it begins at once."""
 
     at_s: NonNegative | None = None
     """Begin this long after boot."""
     after_offboard_s: NonNegative | None = None
-    """Begin this long after OFFBOARD was first entered with the motors armed."""
+    """Begin this long after setpoints first controlled the armed vehicle."""
     duration_s: Positive | None = None
-    """End after this long; without it, the fault stays."""
+    """End after this time; without it, the fault does not end."""
 
     @model_validator(mode="after")
     def _one_start(self) -> Self:
         if self.at_s is not None and self.after_offboard_s is not None:
-            raise ValueError("give at_s or after_offboard_s, not both")
+            raise ValueError("give either at_s or after_offboard_s")
         return self
 
 
 class LinkFault(Timed):
-    """Datagrams of the companion's link are lost, late, doubled, swapped or damaged."""
+    """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted."""
 
     kind: Literal["drop", "delay", "duplicate", "reorder", "corrupt"]
     direction: Direction = "both"
     probability: Fraction = 1.0
-    """Share of the datagrams that it strikes."""
+    """Probability with which it affects a datagram."""
     delay_ms: NonNegative = 100.0
-    """For ``delay``: how much later the datagram arrives, vehicle time."""
+    """For ``delay``: delay of the datagram in vehicle time."""
 
 
 class StopTelemetry(Timed):
-    """The vehicle's streams fall silent; answers still come."""
+    """Telemetry streams stop; answers are still sent."""
 
     kind: Literal["stop_telemetry"]
     messages: tuple[MessageName, ...] = ()
-    """Names of the messages that stop; empty = all."""
+    """Names of the messages to stop; empty = all."""
 
 
 class FreezeClock(Timed):
-    """Telemetry goes on, but its time stands still."""
+    """Telemetry continues with a constant timestamp."""
 
     kind: Literal["freeze_clock"]
 
 
 class SlipClock(Timed):
-    """The vehicle stands still for a moment, and its clock does not catch up (paced time only)."""
+    """The simulation stalls, and the vehicle clock does not catch up (real time only)."""
 
     kind: Literal["slip_clock"]
     slip_ms: Annotated[float, Field(gt=0.0, le=60_000.0)] = 12.0
-    """How far the clock falls behind; ArduPilot's simulator on a busy computer: 10 to 16."""
+    """Time that the clock loses; ArduPilot's simulator on a busy computer: 10 to 16 ms."""
 
 
 class NanField(Timed):
@@ -91,15 +90,15 @@ class NanField(Timed):
 
 
 class PilotTakeover(Timed):
-    """The pilot takes the sticks and changes the mode."""
+    """The pilot takes over and changes the mode."""
 
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
-    """PX4's words; ArduCopter takes them as LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
+    """PX4's mode names; ArduCopter enters LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
 
 
 class EstimatorReset(Timed):
-    """The estimate jumps, and the reset counter grows."""
+    """The estimate jumps, and the reset counter increments."""
 
     kind: Literal["estimator_reset"]
     yaw_deg: Finite = 0.0
@@ -114,14 +113,14 @@ class RefuseArming(Timed):
 
 
 class LowBattery(Timed):
-    """The battery falls to a charge."""
+    """The battery charge drops to a value."""
 
     kind: Literal["low_battery"]
     remaining: Fraction = 0.06
 
 
 class GpsLoss(Timed):
-    """GPS has no fix; the position is lost EKF2_NOAID_TOUT later."""
+    """GPS loses its fix; the position becomes invalid after EKF2_NOAID_TOUT."""
 
     kind: Literal["gps_loss"]
 

@@ -1,9 +1,11 @@
-"""What every section of the configuration has in common."""
+"""Base class and number types of every configuration section, and its error messages."""
 
-from collections.abc import Mapping
-from typing import Annotated
+import difflib
+import typing
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -12,19 +14,86 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Section(BaseModel):
-    """Base of every configuration section: unknown keys are refused, values never change."""
+    """Base of every configuration section: unknown keys are errors, values are constant."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def meaning(words: Mapping[str, object], value: object, what: str) -> object:
-    """Return what a word stands for, and anything else as it is.
+def preset(words: Mapping[str, object], value: object, what: str) -> object:
+    """Return the preset that a word names; return anything but a word as it is.
+
+    Args:
+        words: preset by word.
+        value: from the configuration.
+        what: the presets in the plural, for the message.
 
     Raises:
-        ValueError: the word is not known.
+        ValueError: no preset has this name.
     """
     if not isinstance(value, str):
         return value
     if value not in words:
         raise ValueError(f"known {what} are {', '.join(words)}")
     return words[value]
+
+
+_LISTED = 20
+"""A message shows the list of known words up to this length."""
+
+
+class ConfigError(Exception):
+    """The configuration cannot be used; the message is one sentence for the user."""
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean ...?`` with the nearest known word, or nothing."""
+    names = list(known)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; known are {', '.join(sorted(names))}" if len(names) <= _LISTED else ""
+
+
+def explain(error: ValidationError, model: type[BaseModel]) -> str:
+    """Return the first validation error as one sentence: key, problem, value given."""
+    detail = error.errors()[0]
+    path = [str(part) for part in detail["loc"]]
+    where = ".".join(["mock", *path])
+    if detail["type"] == "extra_forbidden":
+        owner = _model_at(model, path[:-1])
+        hint = suggestion(path[-1], owner.model_fields) if owner else ""
+        return f"unknown key {where}{hint}"
+    message = detail["msg"].removeprefix("Value error, ")
+    if message[1:2].islower():
+        message = message[0].lower() + message[1:]
+    return f"{where}: {message} (got {detail['input']!r:.60})"
+
+
+def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:
+    """Return the model at a path of keys, None if there is none.
+
+    Positions in lists are skipped. In a union, the path names the member's ``kind``.
+    """
+    candidates = [model]
+    for key in path:
+        tagged = [each for each in candidates if key in _kinds(each)]
+        if tagged:
+            candidates = tagged
+        elif len(candidates) == 1 and key in candidates[0].model_fields:
+            candidates = list(_models_of(candidates[0].model_fields[key].annotation))
+    return candidates[0] if len(candidates) == 1 else None
+
+
+def _kinds(model: type[BaseModel]) -> tuple[str, ...]:
+    field = model.model_fields.get("kind")
+    return typing.get_args(field.annotation) if field else ()
+
+
+def _models_of(annotation: Any) -> Iterable[type[BaseModel]]:
+    """Yield the models named in a type hint."""
+    arguments = typing.get_args(annotation)
+    if arguments:
+        for argument in arguments:
+            yield from _models_of(argument)
+    elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation

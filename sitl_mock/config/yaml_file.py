@@ -1,6 +1,6 @@
-"""Reading YAML that may be anything: a bounded file, its numbers as YAML 1.2 has them, no aliases.
+"""Reads untrusted YAML: limited size, numbers as in YAML 1.2, no aliases, no tags.
 
-Its own reader, as a judge's should be: it shares nothing with the program it judges.
+The mock has its own reader because it shares no code with the program it tests.
 """
 
 import os
@@ -25,7 +25,7 @@ _PLAIN = {
 
 
 class _Loader(yaml.SafeLoader):
-    """Plain YAML 1.2 values; refuses what grows."""
+    """Loads plain YAML 1.2 values; refuses aliases, tags and large documents."""
 
     yaml_implicit_resolvers = {}  # noqa: RUF012  as the base class has it
 
@@ -35,12 +35,12 @@ class _Loader(yaml.SafeLoader):
         self._depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Compose one node, if there is still room for it."""
+        """Compose one node; raise an error beyond the limits."""
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         self._nodes += 1
         self._depth += 1
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
-            raise yaml.YAMLError("aliases and tags are not read")
+            raise yaml.YAMLError("aliases and tags are not supported")
         if self._nodes > _MOST_NODES or self._depth > _DEEPEST:
             raise yaml.YAMLError("too many values, or nested too deeply")
         if isinstance(event, yaml.ScalarEvent) and len(event.value) > _LONGEST:
@@ -50,7 +50,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def construct_decimal(self, node: yaml.ScalarNode) -> int:
-        """A whole number; a leading zero makes no octal of it."""
+        """Return an integer in decimal; a leading zero does not make it octal."""
         return int(self.construct_scalar(node))
 
 
@@ -62,12 +62,12 @@ _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_decimal)
 
 
 def load_yaml(path: Path) -> Any:
-    """The document in a file.
+    """Return the document in a file.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no regular file, too large, or not text.
-        yaml.YAMLError: it is not YAML, or out of bounds.
+        ValueError: the file is not regular, too large, or not text.
+        yaml.YAMLError: the content is not YAML, or exceeds a limit.
     """
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):

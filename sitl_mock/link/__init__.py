@@ -1,1 +1,1 @@
-"""MAVLink on its way: sockets, framing, signing, a bad link."""
+"""MAVLink transport: sockets, framing, signing, link faults."""

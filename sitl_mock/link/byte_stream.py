@@ -1,4 +1,4 @@
-"""MAVLink frames over a file descriptor that carries bytes: a TCP connection, a serial line."""
+"""MAVLink frames over a byte stream: a TCP connection or a serial line."""
 
 import os
 from collections import deque
@@ -9,16 +9,16 @@ _READ_BYTES = 65536
 
 
 class ByteStream:
-    """Whole frames in, whole frames out, neither way blocking.
+    """Reads and writes whole frames without blocking.
 
-    A frame is never cut short: what the kernel does not take of it goes before anything else, and
-    the frames that come meanwhile are lost, as an autopilot's are when its transmit buffer is full.
+    Frames are never truncated. The rest of a partly written frame is written first; until then,
+    further frames are dropped, as an autopilot does when its transmit buffer is full.
 
     Attributes:
-        open: False once the other side is gone.
+        open: False after the other side closed.
 
     Args:
-        descriptor: non-blocking; its owner closes it.
+        descriptor: non-blocking; the caller closes it.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -29,13 +29,13 @@ class ByteStream:
         self._unsent = b""
 
     def receive(self) -> bytes | None:
-        """Return the next whole frame, None if there is none yet."""
+        """Return the next complete frame, None if there is none yet."""
         if not self._frames:
             self._read()
         return self._frames.popleft() if self._frames else None
 
     def send(self, frames: list[bytes]) -> None:
-        """Send frames, as far as the kernel takes them."""
+        """Send the frames; drop those that the kernel does not accept."""
         if self._unsent:
             self._unsent = self._unsent[self._write(self._unsent) :]
         if not self._unsent:

@@ -1,45 +1,45 @@
-"""One end of a wire, whatever it is made of: UDP, TCP or a serial line."""
+"""The interface of an endpoint: UDP, TCP or serial."""
 
 from typing import Protocol
 
 MAX_BUNDLE = 1400
-"""Bytes of frames joined in one datagram at most."""
+"""Largest datagram that bundled frames make, bytes."""
 
 
 class Endpoint(Protocol):
-    """Bytes in and out, never blocking. What cannot leave at once is lost."""
+    """Sends and receives bytes without blocking. Bytes that cannot be sent at once are dropped."""
 
     @property
     def where(self) -> str:
-        """Where it is to be found, in words."""
+        """Address, for the user."""
 
     @property
     def heard(self) -> bool:
-        """Whether anybody has spoken yet."""
+        """Whether anything was received yet."""
 
     @property
     def connected(self) -> bool:
-        """Whether somebody is there to hear; a wire that cannot know says yes."""
+        """Whether a client is connected; True where that cannot be known."""
 
     @property
     def readable(self) -> list[int]:
-        """The file descriptors to wait on."""
+        """File descriptors for select."""
 
     def receive(self) -> tuple[bytes, bool] | None:
-        """Return the next datagram (a wire of bytes: the next frame), None if there is none.
+        """Return the next datagram (of a byte stream: the next frame), None if there is none.
 
-        With it comes whether the one who is also sent to has sent it.
+        The flag says whether it came from the client to which we send.
         """
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send; what the network refuses is lost, as on any bad link."""
+        """Send datagrams; those that the network refuses are dropped."""
 
     def close(self) -> None:
-        """Let go of the wire."""
+        """Close the endpoint."""
 
 
 def bundles(frames: list[bytes]) -> list[bytes]:
-    """Return the frames joined, in their order, into datagrams that a network carries whole."""
+    """Return the frames joined in order into datagrams of at most `MAX_BUNDLE` bytes."""
     joined: list[bytes] = []
     size = 0
     start = 0

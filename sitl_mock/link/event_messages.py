@@ -1,7 +1,7 @@
-"""The four messages of PX4's events interface, which pymavlink's dialects leave out.
+"""The four messages of the MAVLink events interface, which pymavlink's dialects lack.
 
-Source: MAVLink common, messages 410 to 413; the layouts and CRC_EXTRA follow from its XML, and 410
-and 411 agree with recorded frames.
+Source: MAVLink common, messages 410 to 413. Layouts and CRC_EXTRA follow from its XML; 410 and 411
+agree with recorded frames.
 """
 
 import struct
@@ -12,7 +12,7 @@ from fastcrc import crc16
 
 
 class Layout(NamedTuple):
-    """How one message looks on the wire."""
+    """Id, CRC_EXTRA and payload layout of one message."""
 
     message_id: int
     crc_extra: int
@@ -34,7 +34,7 @@ _CRC_BYTES = 2
 
 @dataclass(frozen=True)
 class EventRequest:
-    """A REQUEST_EVENT that arrived; the methods are those of pymavlink's messages."""
+    """A received REQUEST_EVENT, with the methods of a pymavlink message."""
 
     frame: bytes
     first_sequence: int
@@ -60,7 +60,7 @@ class EventRequest:
 
 
 def event_request(unknown: Any) -> EventRequest | None:
-    """Return the REQUEST_EVENT that pymavlink did not know, None if it is another or damaged."""
+    """Decode a message unknown to pymavlink; None if it is no valid REQUEST_EVENT."""
     frame = bytes(unknown.get_msgbuf())
     if frame[0] != 0xFD or int.from_bytes(frame[7:10], "little") != REQUEST_EVENT.message_id:
         return None

@@ -1,7 +1,6 @@
-"""MAVLink frames to messages and back, for the mock's side of a link.
+"""Decodes and encodes MAVLink frames on the vehicle's side of a link.
 
-pymavlink is the codec. The dialect is ``development`` (a superset of ``common``), as PX4 main
-speaks.
+pymavlink is the codec. The dialect is ``development`` (a superset of ``common``), that of PX4 main.
 """
 
 import struct
@@ -16,7 +15,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.link.event_messages import event_request
 
 Message = Any
-"""A pymavlink message object; the generated classes carry no usable types."""
+"""A pymavlink message object; the generated classes have no usable types."""
 
 _MAGIC_V1 = 0xFE
 _MAGIC_V2 = 0xFD
@@ -26,7 +25,7 @@ SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
 _OVERHEAD_V2 = 12
 _FLAGS_AT = 2
-_UNTOLD = -1
+_UNKNOWN_LENGTH = -1
 
 _HEADER = struct.Struct("<BBBBBBHB")
 _CRC = struct.Struct("<H")
@@ -36,10 +35,9 @@ _decoder = dialect.MAVLink(None)
 
 
 def decode(datagram: bytes) -> list[Message]:
-    """Return the valid messages of a datagram in their order; whatever else is in it is skipped.
+    """Return the valid messages of a datagram in order; other bytes are skipped.
 
-    MAVLink 1 and 2 frames are taken, signed ones without checking the signature (`Link.admits`
-    does that). A frame may not span datagrams.
+    It accepts MAVLink 1 and 2. `Link.accepts` checks signatures. A frame must not span datagrams.
     """
     messages: list[Message] = []
     start = 0
@@ -62,15 +60,15 @@ def decode(datagram: bytes) -> list[Message]:
 
 
 def split(data: bytes) -> tuple[list[bytes], bytes]:
-    """Return what seem to be the whole frames in a stream of bytes, and the rest that waits.
+    """Return the complete frames in a byte stream, and the remaining bytes.
 
-    What cannot begin a frame is skipped; whether a frame is intact, `decode` finds out.
+    Bytes that cannot begin a frame are skipped. `decode` checks whether a frame is valid.
     """
     frames: list[bytes] = []
     start = 0
     while start < len(data):
         length = _announced_length(data, start)
-        if length == _UNTOLD or length > len(data) - start:
+        if length == _UNKNOWN_LENGTH or length > len(data) - start:
             break
         if length:
             frames.append(data[start : start + length])
@@ -81,28 +79,28 @@ def split(data: bytes) -> tuple[list[bytes], bytes]:
 def _announced_length(data: bytes, start: int) -> int:
     """Return the length of the frame whose header is at ``start``.
 
-    0 if no frame begins there, `_UNTOLD` if the data ends before the header tells.
+    0 if no frame begins there, `_UNKNOWN_LENGTH` if the header is incomplete.
     """
     left = len(data) - start
     if data[start] == _MAGIC_V2:
         if left < _FLAGS_AT + 1:
-            return _UNTOLD
+            return _UNKNOWN_LENGTH
         flags = data[start + _FLAGS_AT]
         if flags & ~SIGNED:
             return 0
         return _OVERHEAD_V2 + data[start + 1] + (SIGNATURE_BYTES if flags & SIGNED else 0)
     if data[start] == _MAGIC_V1:
-        return _UNTOLD if left < _FLAGS_AT else _OVERHEAD_V1 + data[start + 1]
+        return _UNKNOWN_LENGTH if left < _FLAGS_AT else _OVERHEAD_V1 + data[start + 1]
     return 0
 
 
 class Framer:
-    """Packs messages of one component on one link, as MAVLink 2, counting the sequence number.
+    """Packs the MAVLink 2 frames of one component on one link, with their sequence numbers.
 
     Args:
         system_id: of the sender.
         component_id: of the sender.
-        signed: leave each frame to be signed; see `Signing.sign`.
+        signed: set the flag of signed frames; `Signing.sign` appends the signature.
     """
 
     def __init__(self, system_id: int, component_id: int, *, signed: bool = False) -> None:
@@ -121,7 +119,7 @@ class Framer:
         return self.frame_raw(kind.id, kind.crc_extra, payload)
 
     def frame_raw(self, message_id: int, crc_extra: int, payload: bytes) -> bytes:
-        """Return the frame of a message by its full wire payload; trailing zeros are left out."""
+        """Return the frame of a message given as payload; trailing zeros are truncated."""
         payload = payload.rstrip(b"\0") or b"\0"
         body = _HEADER.pack(
             len(payload),
@@ -139,9 +137,9 @@ class Framer:
 
 
 def _wire_order(kind: Any) -> Callable[[Message], Iterable[Any]]:
-    """Return a function from a message of a class to the values of its wire struct.
+    """Return the function that lists the field values of a message class in wire order.
 
-    pymavlink's own ``pack`` does the same three times slower, which the lockstep budget feels.
+    pymavlink's own ``pack`` takes three times as long, too long for lockstep.
     """
     names = kind.ordered_fieldnames
     texts = {

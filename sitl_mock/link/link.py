@@ -1,20 +1,37 @@
-"""One MAVLink link of the vehicle: its streams, what was heard on it, what waits to be sent."""
+"""One MAVLink link of the vehicle: telemetry streams, signing, queue of outgoing frames."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.signing import Signing
-from sitl_mock.link.streams import StreamSchedule
+
+
+class StreamSchedule(Protocol):
+    """Decides when each telemetry message of a link is due; each autopilot has its own rules."""
+
+    def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
+        """Set the interval of a message; 0 = the rate at boot, negative = never.
+
+        Returns:
+            the reason for a refusal, None if accepted.
+        """
+
+    def interval(self, message_id: int) -> int:
+        """Return the interval of a message in us, -1 if it is not streamed."""
+
+    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
 
 
 class Link:
-    """One link. The server empties ``outbox`` and owns the socket; here are only frames.
+    """One link, without its socket: `Connections` sends the frames in ``outbox``.
 
     Args:
         name: for logs and faults, e.g. ``companion`` or ``gcs``.
-        framer: packs this link's frames.
-        streams: this link's telemetry.
-        signing: signs and judges this link's frames; None = nothing is signed or asked to be.
+        framer: packs frames.
+        streams: schedules telemetry.
+        signing: signs and verifies frames; None = no signing.
     """
 
     def __init__(
@@ -36,18 +53,18 @@ class Link:
         self.outbox.append(self._framer.frame(message))
 
     def send_raw(self, message_id: int, crc_extra: int, payload: bytes) -> None:
-        """Queue a message that the dialect module lacks, by its wire payload."""
+        """Queue a message that the dialect lacks, given as its payload."""
         self.outbox.append(self._framer.frame_raw(message_id, crc_extra, payload))
 
     def take(self) -> list[bytes]:
-        """Return the frames that wait, in order, signed as they leave, and forget them."""
+        """Return the queued frames in order, signed, and clear the queue."""
         frames, self.outbox = self.outbox, []
         return [self.sign(frame) for frame in frames]
 
     def sign(self, frame: bytes) -> bytes:
-        """Return a frame as it leaves on this link."""
+        """Return the frame, signed if this link signs."""
         return frame if self.signing is None else self.signing.sign(frame)
 
-    def admits(self, message: Message) -> bool:
-        """Whether a message that arrived here may be obeyed."""
-        return self.signing is None or self.signing.admits(message)
+    def accepts(self, message: Message) -> bool:
+        """Whether the signature policy of this link accepts a received message."""
+        return self.signing is None or self.signing.accepts(message)

@@ -1,4 +1,4 @@
-"""A bad link: datagrams in, datagrams out, some lost, late, doubled, swapped or damaged (pure)."""
+"""Link faults: drops, delays, duplicates, reorders and corrupts datagrams (pure)."""
 
 import heapq
 import random
@@ -12,7 +12,7 @@ class DatagramPipe:
 
     Args:
         direction: ``to_companion`` or ``from_companion``.
-        seed: of this direction's luck.
+        seed: of the random numbers of this direction.
     """
 
     def __init__(self, direction: str, seed: int) -> None:
@@ -23,19 +23,19 @@ class DatagramPipe:
         self._held: bytes | None = None
 
     def is_clear(self, faults: tuple[LinkFault, ...]) -> bool:
-        """Whether datagrams pass untouched and none is still under way."""
+        """Whether no fault is active and no datagram is held back."""
         return not faults and not self._late and self._held is None
 
     def push(
         self, datagrams: list[bytes], faults: tuple[LinkFault, ...], now_us: int
     ) -> list[bytes]:
-        """Send datagrams in, and return those that come out now, late ones that are due first."""
+        """Accept datagrams; return those to deliver now, delayed ones first."""
         mine = [fault for fault in faults if fault.direction in (self._direction, "both")]
         out = [heapq.heappop(self._late)[2] for _ in range(self._due(now_us))]
         for datagram in datagrams:
             survivors = [datagram]
             for fault in mine:
-                survivors = [out for one in survivors for out in self._strike(one, fault, now_us)]
+                survivors = [out for one in survivors for out in self._apply(one, fault, now_us)]
             if survivors and self._held is not None:
                 survivors.append(self._held)
                 self._held = None
@@ -45,15 +45,15 @@ class DatagramPipe:
     def _due(self, now_us: int) -> int:
         return sum(1 for due, _, _ in self._late if due <= now_us)
 
-    def _strike(self, datagram: bytes, fault: LinkFault, now_us: int) -> list[bytes]:
-        """Return what one fault leaves of one datagram."""
+    def _apply(self, datagram: bytes, fault: LinkFault, now_us: int) -> list[bytes]:
+        """Apply one fault to one datagram; return the datagrams to deliver now."""
         if self._random.random() >= fault.probability:
             return [datagram]
         match fault.kind:
             case "duplicate":
                 return [datagram, datagram]
             case "corrupt":
-                return [self._damaged(datagram)]
+                return [self._corrupted(datagram)]
             case "delay":
                 due = now_us + fault.delay_ms * 1e3
                 heapq.heappush(self._late, (due, next(self._order), datagram))
@@ -65,9 +65,9 @@ class DatagramPipe:
                 pass
         return []
 
-    def _damaged(self, datagram: bytes) -> bytes:
+    def _corrupted(self, datagram: bytes) -> bytes:
         if not datagram:
             return datagram
-        damaged = bytearray(datagram)
-        damaged[self._random.randrange(len(damaged))] ^= self._random.randrange(1, 256)
-        return bytes(damaged)
+        corrupted = bytearray(datagram)
+        corrupted[self._random.randrange(len(corrupted))] ^= self._random.randrange(1, 256)
+        return bytes(corrupted)

@@ -1,32 +1,32 @@
-"""A serial line of the mock: one end of a pseudo-terminal, whose other end a companion opens."""
+"""A serial endpoint: a pseudo-terminal; the companion opens its other end."""
 
 import os
 import select
 import tty
 from pathlib import Path
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 
 
 class SerialEndpoint:
-    """A UART without a baud rate. While nobody has the other end open, what is sent is lost.
+    """A UART without a baud rate. Frames are dropped while the other end is closed.
 
     Args:
-        path: a symbolic link to make to the device; None = none.
+        path: of a symbolic link to the device; None = no link.
 
     Raises:
-        ConfigError: the link cannot be made there, or the system has no pseudo-terminals left.
+        ConfigError: the link cannot be created, or the system has no free pseudo-terminal.
     """
 
     def __init__(self, path: Path | None) -> None:
         try:
             self._master, slave = os.openpty()
         except OSError as error:
-            raise ConfigError(f"no pseudo-terminal to be had: {error.strerror}") from error
+            raise ConfigError(f"cannot open a pseudo-terminal: {error.strerror}") from error
         tty.setraw(slave)
         self._device = os.ttyname(slave)
-        # Not kept open: only so does the kernel tell whether anybody else has it open.
+        # Closed here, so that the kernel reports whether anybody else has it open.
         os.close(slave)
         os.set_blocking(self._master, False)
         self._poll = select.poll()
@@ -40,12 +40,12 @@ class SerialEndpoint:
 
     @property
     def connected(self) -> bool:
-        """A UART cannot know, so yes."""
+        """Always True: a UART cannot know."""
         return True
 
     @property
     def readable(self) -> list[int]:
-        """Our end, while the other is open; hung up, it would always be readable."""
+        """Our end while the other is open; after a hang-up it would always be readable."""
         return [self._master] if self._attached() else []
 
     def receive(self) -> tuple[bytes, bool] | None:
@@ -59,18 +59,18 @@ class SerialEndpoint:
         return frame, True
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to whoever has the other end open."""
+        """Send if the other end is open."""
         if self._attached():
             self._stream.send(datagrams)
 
     def close(self) -> None:
-        """Close our end and remove the link."""
+        """Close our end and remove the symbolic link."""
         os.close(self._master)
         if self._path is not None:
             self._path.unlink(missing_ok=True)
 
     def _attached(self) -> bool:
-        """Whether anybody has the other end open; after a hang-up, begin with a clean stream."""
+        """Whether the other end is open; a hang-up clears the stream."""
         hung_up = any(event & select.POLLHUP for _, event in self._poll.poll(0))
         if hung_up or not self._stream.open:
             self._stream = ByteStream(self._master)
@@ -79,11 +79,11 @@ class SerialEndpoint:
     def _link(self, path: Path) -> None:
         try:
             if path.is_symlink():
-                path.unlink()  # of a mock that was killed
+                path.unlink()  # left by a mock that was killed
             path.symlink_to(self._device)
         except OSError as error:
             os.close(self._master)
             raise ConfigError(
-                f"endpoint serial://{path}: cannot make this link ({error.strerror}); "
+                f"endpoint serial://{path}: cannot create this link ({error.strerror}); "
                 "choose another path"
             ) from error

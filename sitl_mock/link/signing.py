@@ -1,4 +1,4 @@
-"""MAVLink 2 signing on one link; pymavlink makes and judges the signatures."""
+"""MAVLink 2 signing on one link; pymavlink computes and verifies the signatures."""
 
 import hashlib
 import time
@@ -7,19 +7,19 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.airframe import SigningConfig
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
+from sitl_mock.config.settings import SigningConfig
 from sitl_mock.link.framing import SIGNED, Message
 
 _EPOCH_UNIX_S = 1420070400
-"""Stamps count 10 us since 2015-01-01 UTC."""
+"""Signature timestamps count 10 us since 2015-01-01 UTC."""
 _TICKS_PER_S = 100_000
 _FLAGS_AT = 2
 _MAGIC_V2 = 0xFD
 
 
 def key_from_passphrase(path: Path) -> bytes:
-    """Return SHA-256 of the file's first line, as ground stations make a key.
+    """Return SHA-256 of the file's first line, as ground stations derive the key.
 
     Raises:
         ConfigError: the file cannot be read, or its first line is empty.
@@ -41,9 +41,9 @@ def link_signing(
     """Return the signing of a link (``companion`` or ``gcs``), None if there is none.
 
     Args:
-        config: what the user asks for.
+        config: the user's settings, None = no signing.
         link: its name.
-        unsigned_links: where the autopilot obeys frames without a signature by itself.
+        unsigned_links: links on which the autopilot accepts unsigned frames by default.
 
     Raises:
         ConfigError: the passphrase cannot be used.
@@ -57,20 +57,20 @@ def link_signing(
 
 
 class Signing:
-    """Signs what leaves on one link, and judges what arrives on it.
+    """Signs outgoing frames of one link, and verifies incoming ones.
 
-    Stamps are of the wall clock even where vehicle time is another, as the other side judges them
-    by its own.
+    Timestamps follow the wall clock, not vehicle time, because the other side compares them with
+    its wall clock.
 
     Attributes:
-        accepted: frames rightly signed and newer than all before them of their sender.
+        accepted: frames with a valid signature, newer than all before from their sender.
         unsigned: frames without a signature.
-        refused: frames signed with another key, or played again.
+        refused: frames signed with another key, or replayed.
 
     Args:
         key: 32 bytes.
-        link_id: number of this link in our signatures, 0..255.
-        accept_unsigned: obey frames without a signature, too.
+        link_id: of this link in our signatures, 0..255.
+        accept_unsigned: accept frames without a signature, too.
         clock: Unix time in s.
     """
 
@@ -91,37 +91,37 @@ class Signing:
 
     def sign(self, frame: bytes) -> bytes:
         """Return a frame of `Framer(signed=True)` with its signature."""
-        self._look_at_clock()
+        self._update_timestamp()
         carrier = dialect.MAVLink_message(0, "")
         carrier._msgbuf = bytearray(frame)
         carrier.sign_packet(self._mav)
         return bytes(carrier.get_msgbuf())
 
-    def admits(self, message: Message) -> bool:
-        """Whether a message that arrived may be obeyed; counts it."""
+    def accepts(self, message: Message) -> bool:
+        """Whether a received message is accepted; counts it."""
         frame = bytearray(message.get_msgbuf())
         if frame[0] != _MAGIC_V2 or not frame[_FLAGS_AT] & SIGNED:
             self.unsigned += 1
             return self._accept_unsigned
-        self._look_at_clock()
+        self._update_timestamp()
         before = dict(self._mav.signing.stream_timestamps)
         if self._mav.check_signature(frame, message.get_srcSystem(), message.get_srcComponent()):
             self.accepted += 1
             return True
-        # pymavlink keeps a stamp before it looks at the signature; kept, a forger's could silence
-        # the true sender.
+        # pymavlink stores the timestamp before it verifies the signature. We restore the old one,
+        # else a forged future timestamp would lock out the true sender.
         self._mav.signing.stream_timestamps = before
         self.refused += 1
         return False
 
     def counts(self) -> dict[str, int]:
-        """Return how many frames arrived ``accepted``, ``unsigned`` and ``refused``."""
+        """Return the numbers of ``accepted``, ``unsigned`` and ``refused`` frames."""
         return {
             "accepted": self.accepted,
             "unsigned": self.unsigned,
             "refused": self.refused,
         }
 
-    def _look_at_clock(self) -> None:
+    def _update_timestamp(self) -> None:
         now = int((self._clock() - _EPOCH_UNIX_S) * _TICKS_PER_S)
         self._mav.signing.timestamp = max(self._mav.signing.timestamp, now)

@@ -1,20 +1,20 @@
-"""A TCP port of the mock, with ArduPilot's rule: one client, and whoever else comes is sent off."""
+"""A TCP endpoint for one client; it rejects a second one, as ArduPilot does."""
 
 import socket
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 
 
 class TcpEndpoint:
-    """Listens for one client at a time; when that one leaves, another may come.
+    """Serves one client at a time; after it disconnects, another may connect.
 
     Args:
         host: address to listen on.
         port: to listen on.
 
     Raises:
-        ConfigError: the port is in use, or the address not ours.
+        ConfigError: the port is in use, or the address is not local.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -33,13 +33,13 @@ class TcpEndpoint:
 
     @property
     def connected(self) -> bool:
-        """Whether there is a client."""
+        """Whether a client is connected."""
         self._accept()
         return self._stream is not None
 
     @property
     def readable(self) -> list[int]:
-        """The port, and the client's connection."""
+        """The listening socket and the client's connection."""
         descriptors = [self._listener.fileno()]
         if self._client is not None:
             descriptors.append(self._client.fileno())
@@ -51,17 +51,17 @@ class TcpEndpoint:
         if self._stream is None:
             return None
         frame = self._stream.receive()
-        self._let_go()
+        self._release_client()
         if frame is None:
             return None
         self.heard = True
         return frame, True
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to the client, if there is one."""
+        """Send to the client, if one is connected."""
         if self._stream is not None:
             self._stream.send(datagrams)
-            self._let_go()
+            self._release_client()
 
     def close(self) -> None:
         """Close the port and the connection."""
@@ -81,8 +81,8 @@ class TcpEndpoint:
         caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client, self._stream = caller, ByteStream(caller.fileno())
 
-    def _let_go(self) -> None:
-        """Forget a client that has left."""
+    def _release_client(self) -> None:
+        """Close the connection of a client that has disconnected."""
         if self._client is not None and self._stream is not None and not self._stream.open:
             self._client.close()
             self._client = self._stream = None

@@ -1,23 +1,23 @@
-"""A UDP socket of the mock, with PX4's rule about whom it talks to."""
+"""A UDP endpoint; it sends to the first client that it hears, as PX4 does."""
 
 import contextlib
 import socket
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 
 HOST = "127.0.0.1"
 _MAX_DATAGRAM = 2048
 
 
 class UdpEndpoint:
-    """Sends to ``remote_port`` on this machine until somebody speaks, then there for good.
+    """Sends to ``remote_port`` on this machine until it receives, then to the first sender only.
 
-    A second sender is heard but gets nothing.
+    It receives from other senders, but does not send to them.
 
     Args:
         local_port: to bind.
-        remote_port: to send to from the start; None = nobody until somebody speaks.
-        option: the command-line option that changes the port, for the error message.
+        remote_port: to send to at first; None = send nothing before something is received.
+        option: command-line option of the port, for the error message.
 
     Raises:
         ConfigError: the local port is in use.
@@ -40,7 +40,7 @@ class UdpEndpoint:
 
     @property
     def connected(self) -> bool:
-        """UDP cannot know, so yes."""
+        """Always True: UDP cannot know."""
         return True
 
     @property
@@ -60,7 +60,7 @@ class UdpEndpoint:
         return datagram, sender == self._partner
 
     def receive_from(self) -> tuple[bytes, tuple[str, int]] | None:
-        """Return the next datagram and its sender, without taking anyone as partner."""
+        """Return the next datagram and its sender; the partner stays unchanged."""
         try:
             return self.socket.recvfrom(_MAX_DATAGRAM)
         except OSError:
@@ -72,7 +72,7 @@ class UdpEndpoint:
             self.socket.sendto(datagram, address)
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send to the partner; what the network refuses is lost, as on any bad link."""
+        """Send to the partner; datagrams that the network refuses are dropped."""
         if self._partner is None:
             return
         for datagram in datagrams:

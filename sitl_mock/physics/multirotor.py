@@ -3,7 +3,8 @@
 No ground, battery, wind, sensors or MAVLink: what a vehicle adds to it, or a study leaves out.
 """
 
-from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.rate_loop import RateLoop
 from sitl_mock.physics.rate_shaping import RateShaping, Shaped

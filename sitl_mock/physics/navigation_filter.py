@@ -9,7 +9,7 @@ from math import exp, radians, sqrt
 from random import Random
 from typing import NamedTuple
 
-from sitl_mock.config.ekf import EkfConfig
+from sitl_mock.config.sensors import EkfConfig
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.rigid_body import Motion
 

@@ -1,11 +1,11 @@
 """The autopilot's body-rate controller: PI with feed-forward and damping on each axis."""
 
+from collections import deque
 from math import exp, isfinite
 from typing import NamedTuple
 
-from sitl_mock.config.airframe import AxisGains, RateLoopConfig
+from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.physics.setpoint_delay import SetpointDelay
 
 
 class AxisLaw(NamedTuple):
@@ -110,3 +110,28 @@ class RateLoop:
         """A step without control (disarmed, or standing): memory cleared, setpoints delayed."""
         self._delay.step(setpoint)
         self._axes = (AT_REST, AT_REST, AT_REST)
+
+
+class SetpointDelay:
+    """Holds setpoints back, to the nearest whole step; before the first they were zero.
+
+    Args:
+        delays_ms: of roll, pitch and yaw.
+        dt: step, s.
+    """
+
+    __slots__ = ("_pitch", "_roll", "_yaw")
+
+    def __init__(self, delays_ms: Vector, dt: float) -> None:
+        self._roll, self._pitch, self._yaw = (
+            deque([0.0] * steps, maxlen=steps)
+            for steps in (1 + round(delay_ms * 1e-3 / dt) for delay_ms in delays_ms)
+        )
+
+    def step(self, setpoint: Vector) -> Vector:
+        """Take this step's setpoint; return the one that arrives."""
+        roll, pitch, yaw = self._roll, self._pitch, self._yaw
+        roll.append(setpoint[0])
+        pitch.append(setpoint[1])
+        yaw.append(setpoint[2])
+        return roll[0], pitch[0], yaw[0]

@@ -6,9 +6,9 @@ ArduPilot's way with a body-rate setpoint. What comes out is the setpoint of the
 from math import atan2, copysign, inf, isnan, sqrt
 from typing import NamedTuple
 
-from sitl_mock.config.airframe import AxisShaping
+from sitl_mock.config.rate_loop import AxisShaping
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise, to_body
-from sitl_mock.physics.setpoint_delay import SetpointDelay
+from sitl_mock.physics.rate_loop import SetpointDelay
 
 AT_REST: Vector = (0.0, 0.0, 0.0)
 
@@ -22,7 +22,7 @@ class Shaped(NamedTuple):
     """Attitude target, body to world."""
 
 
-def slewed(goal: float, rate: float, most: float) -> float:
+def slew(goal: float, rate: float, most: float) -> float:
     """The rate moved to its goal, by `most` at the farthest.
 
     A NaN goal holds the rate. An infinite one is never reached: the rate runs away, as ArduPilot
@@ -34,7 +34,7 @@ def slewed(goal: float, rate: float, most: float) -> float:
     return rate + (most if change > most else -most if change < -most else change)
 
 
-def turned(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
+def rotated(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
     """The attitude after `dt` seconds of body rates (rad/s); its angle errs by (rate dt)^3 / 12."""
     half = 0.5 * dt
     return normalise(multiply(q, (1.0, half * rates[0], half * rates[1], half * rates[2])))
@@ -48,7 +48,7 @@ def rotation_vector(q: Quaternion) -> Vector:
     return scale * x, scale * y, scale * z
 
 
-def closing(angle: float, gain: float, acceleration: float) -> float:
+def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     """Rate that closes an angle: proportional, then so that it can stop at this deceleration.
 
     ArduPilot's sqrt_controller.
@@ -95,11 +95,11 @@ class RateShaping:
         rates, target = self._shaped or Shaped(AT_REST, q)
         most = self._most
         rates = (
-            slewed(goals[0], rates[0], most[0]),
-            slewed(goals[1], rates[1], most[1]),
-            slewed(goals[2], rates[2], most[2]),
+            slew(goals[0], rates[0], most[0]),
+            slew(goals[1], rates[1], most[1]),
+            slew(goals[2], rates[2], most[2]),
         )
-        target = turned(target, rates, self._dt)
+        target = rotated(target, rates, self._dt)
         self._shaped = Shaped(rates, target)
         w, x, y, z = target
         ahead = multiply((w, -x, -y, -z), q)  # the body as the attitude target sees it
@@ -107,9 +107,9 @@ class RateShaping:
         roll, pitch, yaw = to_body(ahead, rates)
         for_roll, for_pitch, for_yaw = self._closing
         return (
-            roll - closing(turn_x, *for_roll),
-            pitch - closing(turn_y, *for_pitch),
-            yaw - closing(turn_z, *for_yaw),
+            roll - sqrt_controller(turn_x, *for_roll),
+            pitch - sqrt_controller(turn_y, *for_pitch),
+            yaw - sqrt_controller(turn_z, *for_yaw),
         )
 
     def idle(self, setpoint: Vector) -> None:

@@ -5,7 +5,7 @@ from math import radians
 from random import Random
 from typing import NamedTuple
 
-from sitl_mock.config.airframe import SensorConfig
+from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_filter import NavigationError, NavigationFilter, Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
 

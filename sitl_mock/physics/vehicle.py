@@ -3,15 +3,11 @@
 from math import nan
 from typing import NamedTuple
 
-from sitl_mock.config.airframe import (
-    AirframeConfig,
-    BatteryConfig,
-    RateLoopConfig,
-    SensorConfig,
-    WindConfig,
-)
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
+from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.battery import Battery, BatteryState
-from sitl_mock.physics.ground import Ground
+from sitl_mock.physics.environment import Ground, Wind
 from sitl_mock.physics.multirotor import ZERO, Multirotor
 from sitl_mock.physics.navigation_filter import Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw
@@ -19,7 +15,6 @@ from sitl_mock.physics.rate_shaping import Shaped
 from sitl_mock.physics.rigid_body import Load
 from sitl_mock.physics.rotors import Four
 from sitl_mock.physics.sensors import Estimate, Estimator
-from sitl_mock.physics.wind import Wind
 
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 

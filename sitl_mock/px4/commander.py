@@ -3,25 +3,21 @@
 import struct
 
 from sitl_mock.autopilot.commander import ACCEPTED, TEMPORARILY_REJECTED
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.setpoints import position_setpoint
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.px4.checks import NEVER_ARMED_IN, arming_problem
-from sitl_mock.px4.failsafe import Announce, Failsafe
-from sitl_mock.px4.health import HealthReport
+from sitl_mock.px4.arming import NOT_ARMABLE, ArmingChecks, AutoDisarm
+from sitl_mock.px4.failsafe import Failsafe
+from sitl_mock.px4.failsafe_actions import Announce
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
-from sitl_mock.px4.setpoints import attitude_setpoint
+from sitl_mock.px4.setpoints import decode_setpoint
 from sitl_mock.px4.sticks import Sticks
 
-PREFLIGHT_MARGIN_US = 1_000_000
-"""Armed but never flown, the vehicle disarms this much after COM_DISARM_PRFLT (measured 11 s)."""
 STATUS_PERIOD_US = 500_000
 """The vehicle's status is published this often, and whenever it changes (measured)."""
 
@@ -34,9 +30,8 @@ class Px4Commander:
         parameters: its parameters.
         control: told of every mode entered.
         stream: the offboard setpoints.
-        announce: tells the outside of an occasion, with a detail.
-        health: tells which checks fail.
-        ready_us: vehicle time from which arming is possible.
+        announce: tells the outside of an kind, with a detail.
+        checks: finds what forbids arming.
     """
 
     def __init__(
@@ -46,9 +41,7 @@ class Px4Commander:
         control: Px4ModeControl,
         stream: OffboardStream,
         announce: Announce,
-        health: HealthReport,
-        *,
-        ready_us: int,
+        checks: ArmingChecks,
     ) -> None:
         self.refusal: str | None = None
         self.pilot = False
@@ -56,15 +49,13 @@ class Px4Commander:
             state, parameters, stream, announce, self._enter, self._stop_motors
         )
         self._sticks = Sticks(parameters)
-        self._health = health
+        self._checks = checks
+        self._auto_disarm = AutoDisarm(state, parameters)
         self._state = state
         self._parameters = parameters
         self._control = control
         self._stream = stream
         self._announce = announce
-        self._ready_us = ready_us
-        self._landed_since_us = 0
-        self._crashed = False
         self._asked_takeoff_z: float | None = None
         self._status: tuple[bool, Mode, Mode, bool] | None = None
 
@@ -73,18 +64,19 @@ class Px4Commander:
         state = self._state
         if state.armed:
             return ACCEPTED
-        problem = self.check()
-        if problem is not None and (not force or self._crashed):
-            self._announce(Occasion.ARMING_DENIED, "")
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
+        problem = self._problem()
+        if problem is not None and (not force or self._checks.crashed):
+            self._announce(EventKind.ARMING_DENIED, "")
+            self._announce(EventKind.PREFLIGHT_FAIL, problem)
             return TEMPORARILY_REJECTED
         state.armed = True
-        state.armed_at_us = self._landed_since_us = state.time_us
+        state.armed_at_us = state.time_us
+        self._auto_disarm.begin()
         state.flown = False
         state.home_ned = state.estimate.position_ned
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
-        self._announce(Occasion.ARMED, "")
+        self._announce(EventKind.ARMED, "")
         self._enter(state.mode)
         return ACCEPTED
 
@@ -93,9 +85,9 @@ class Px4Commander:
         if not self._state.armed:
             return ACCEPTED
         if not self._state.landed and not force:
-            self._announce(Occasion.DISARM_DENIED, "")
+            self._announce(EventKind.DISARM_DENIED, "")
             return TEMPORARILY_REJECTED
-        self._stop_motors(Occasion.DISARMED_BY_COMMAND)
+        self._stop_motors(EventKind.DISARMED_BY_COMMAND)
         return ACCEPTED
 
     def request_mode(
@@ -114,7 +106,7 @@ class Px4Commander:
         state = self._state
         if state.armed and not self._can_run(mode):
             asked = struct.pack("<I", custom_mode(mode))
-            self._announce(Occasion.MODE_DENIED, mode.name.capitalize(), asked)
+            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), asked)
             return TEMPORARILY_REJECTED
         self._intend(mode)
         self.failsafe.clear()
@@ -127,13 +119,13 @@ class Px4Commander:
         """Land here, and return a MAV_RESULT; it is told, as a change of mode is not."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
-            self._announce(Occasion.LANDING_COMMANDED, "")
+            self._announce(EventKind.LANDING_COMMANDED, "")
         return result
 
     def take_over(self, mode: Mode) -> None:
         """Let the pilot's sticks change the mode (fault injection)."""
         self.pilot = True
-        self._announce(Occasion.PILOT_TOOK_OVER, "")
+        self._announce(EventKind.PILOT_TOOK_OVER, "")
         self.request_mode(mode)
 
     def heard(self, heartbeat: Message) -> None:
@@ -146,10 +138,7 @@ class Px4Commander:
 
     def setpoint(self, message: Message) -> None:
         """Take a setpoint if PX4 would count it, whatever the mode."""
-        decode = (
-            attitude_setpoint if message.get_type() == "SET_ATTITUDE_TARGET" else position_setpoint
-        )
-        setpoint = decode(message)
+        setpoint = decode_setpoint(message)
         if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
             self._stream.accept(setpoint, self._state.time_us)
 
@@ -158,46 +147,20 @@ class Px4Commander:
         """Whether it is armed in OFFBOARD."""
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
-    def tell_problem(self) -> None:
+    def announce_problem(self) -> None:
         """Say what forbids arming now, if anything does."""
-        problem = self.check()
+        problem = self._problem()
         if problem is not None:
-            self._announce(Occasion.PREFLIGHT_FAIL, problem)
-
-    def check(self) -> str | None:
-        """Look for what forbids arming, note it in the state and return it."""
-        state = self._state
-        problem = arming_problem(
-            state,
-            self._parameters,
-            ready_us=self._ready_us,
-            crashed=self._crashed,
-            offboard_alive=self.offboard_alive,
-            gcs_alive=self.failsafe.gcs_alive,
-            pilot=self._at_sticks,
-            refusal=self.refusal,
-        )
-        state.prearm_problem = problem
-        return problem
-
-    @property
-    def offboard_alive(self) -> bool:
-        """Whether setpoints stream in often enough."""
-        return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
+            self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
     def step(self, *, crashed: bool) -> None:
         """Run the rules once; called at 20 Hz of vehicle time."""
         state = self._state
-        self._crashed = crashed
+        self._checks.crashed = crashed
         if state.armed and crashed:
-            self._stop_motors(Occasion.DISARMED_AFTER_CRASH)
-        self.check()
-        self._health.step(
-            offboard_alive=self.offboard_alive,
-            pilot=self._at_sticks,
-            gcs_alive=self.failsafe.gcs_alive,
-            gcs_required=self._parameters["NAV_DLL_ACT"] > 0,
-        )
+            self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
+        self._problem()
+        self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._at_sticks)
         self._watch_sticks()
         self.failsafe.step(pilot=self._at_sticks)
         if state.armed:
@@ -205,13 +168,20 @@ class Px4Commander:
                 if state.intended_mode is Mode.TAKEOFF:
                     self._intend(Mode.LOITER)
                 self._enter(Mode.LOITER)
-            self._disarm_on_ground()
+            kind = self._auto_disarm.due()
+            if kind is not None:
+                self._stop_motors(kind)
         self._publish_status()
 
     @property
     def _at_sticks(self) -> bool:
         """Whether a pilot is there, by fault injection or by MANUAL_CONTROL."""
         return self.pilot or self._sticks.present(self._state.time_us)
+
+    def _problem(self) -> str | None:
+        return self._checks.problem(
+            gcs_alive=self.failsafe.gcs_alive, pilot=self._at_sticks, refusal=self.refusal
+        )
 
     def _watch_sticks(self) -> None:
         """A pilot who moves the sticks takes over, in the air and from any automatic mode."""
@@ -220,32 +190,17 @@ class Px4Commander:
         if not flies_itself or self.failsafe.holds_before_acting:
             return
         if self._sticks.override(state.time_us):
-            self._announce(Occasion.PILOT_TOOK_OVER, "")
+            self._announce(EventKind.PILOT_TOOK_OVER, "")
             self.request_mode(Mode.POSCTL)
 
-    def _disarm_on_ground(self) -> None:
-        state, parameters = self._state, self._parameters
-        if not state.landed:
-            self._landed_since_us = state.time_us
-            return
-        waited = state.time_us - self._landed_since_us
-        if state.flown:
-            limit = parameters["COM_DISARM_LAND"]
-            if limit > 0 and waited >= limit * 1e6:
-                self._stop_motors(Occasion.DISARMED_BY_LANDING)
-        else:
-            limit = parameters["COM_DISARM_PRFLT"]
-            if limit > 0 and waited >= limit * 1e6 + PREFLIGHT_MARGIN_US:
-                self._stop_motors(Occasion.DISARMED_ON_GROUND)
-
-    def _stop_motors(self, occasion: Occasion) -> None:
+    def _stop_motors(self, kind: EventKind) -> None:
         state = self._state
         state.armed = False
         # Measured: a landing entered from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
         state.intended_mode = state.after_disarming
         self.failsafe.clear()
         self._enter(state.intended_mode)
-        self._announce(occasion, "")
+        self._announce(kind, "")
 
     def _intend(self, mode: Mode) -> None:
         """Note the mode that the user wants.
@@ -253,7 +208,7 @@ class Px4Commander:
         On disarming the last one comes back that may be armed; measured: TAKEOFF does not count.
         """
         self._state.intended_mode = mode
-        if mode not in NEVER_ARMED_IN and mode is not Mode.TAKEOFF:
+        if mode not in NOT_ARMABLE and mode is not Mode.TAKEOFF:
             self._state.after_disarming = mode
 
     def _publish_status(self) -> None:
@@ -265,7 +220,7 @@ class Px4Commander:
 
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
-            return self.offboard_alive
+            return self._checks.offboard_alive
         if mode in PILOTED and not self._at_sticks:
             return False
         return self._state.position_valid or mode not in NEEDS_POSITION
@@ -283,5 +238,5 @@ class Px4Commander:
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
             packed = struct.pack("<f", altitude)
-            self._announce(Occasion.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
+            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
         return self._state.home_ned[2] - altitude

@@ -6,9 +6,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.commander import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED
 from sitl_mock.autopilot.commands import Command, Commands
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.state import State
+from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.link import Link
 from sitl_mock.physics.geodesy import Geodetic, Origin, to_local
 from sitl_mock.physics.quaternion import Vector

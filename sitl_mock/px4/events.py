@@ -6,7 +6,7 @@ the numbers of those that were recorded agree. Texts end in a tab.
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.personality import Event, Occasion
+from sitl_mock.autopilot.events import Event, EventKind
 
 _INFO = dialect.MAV_SEVERITY_INFO
 _WARNING = dialect.MAV_SEVERITY_WARNING
@@ -31,95 +31,95 @@ def _event(
     return Event(text + "\t", severity, event_id(name), arguments, internal)
 
 
-PX4_EVENTS: dict[Occasion, Event] = {
-    Occasion.ARMED: _event("commander_armed_by", _INFO, "Armed by external command", b"\x04"),
-    Occasion.ARMING_DENIED: _event(
+PX4_EVENTS: dict[EventKind, Event] = {
+    EventKind.ARMED: _event("commander_armed_by", _INFO, "Armed by external command", b"\x04"),
+    EventKind.ARMING_DENIED: _event(
         "commander_arm_denied_resolve_failures",
         _CRITICAL,
         "Arming denied: Resolve system health failures first",
         internal=_INFO,
     ),
-    Occasion.PREFLIGHT_FAIL: Event("Preflight Fail: {}", _CRITICAL),
-    Occasion.DISARMED_BY_COMMAND: _event(
+    EventKind.PREFLIGHT_FAIL: Event("Preflight Fail: {}", _CRITICAL),
+    EventKind.DISARMED_BY_COMMAND: _event(
         "commander_disarmed_by", _INFO, "Disarmed by external command", b"\x04"
     ),
-    Occasion.DISARMED_BY_LANDING: _event(
+    EventKind.DISARMED_BY_LANDING: _event(
         "commander_disarmed_by", _INFO, "Disarmed by landing", b"\x06"
     ),
-    Occasion.DISARMED_ON_GROUND: _event(
+    EventKind.DISARMED_ON_GROUND: _event(
         "commander_disarmed_by", _INFO, "Disarmed by auto preflight disarming", b"\x07"
     ),
-    Occasion.DISARMED_AFTER_CRASH: _event(
+    EventKind.DISARMED_AFTER_CRASH: _event(
         "commander_disarmed_by", _INFO, "Disarmed by failure detector", b"\x0a"
     ),
-    Occasion.DISARMED_BY_FAILSAFE: _event(
+    EventKind.DISARMED_BY_FAILSAFE: _event(
         "commander_disarmed_by", _INFO, "Disarmed by failsafe", b"\x0e"
     ),
-    Occasion.DISARM_DENIED: _event(
+    EventKind.DISARM_DENIED: _event(
         "commander_disarm_denied_not_landed",
         _CRITICAL,
         "Disarming denied: not landed",
         internal=_INFO,
     ),
-    Occasion.MODE_DENIED: _event(
+    EventKind.MODE_DENIED: _event(
         "commander_modeswitch_not_avail",
         _CRITICAL,
         "Switching to mode '{}' is currently not possible",
         internal=_INFO,
     ),
-    Occasion.DEFAULT_TAKEOFF_ALTITUDE: _event(
+    EventKind.DEFAULT_TAKEOFF_ALTITUDE: _event(
         "navigator_takeoff_default_alt", _INFO, "Using default takeoff altitude: {} m"
     ),
-    Occasion.TAKEOFF_DETECTED: _event("commander_takeoff_detected", _INFO, "Takeoff detected"),
-    Occasion.LANDING_COMMANDED: _event(
+    EventKind.TAKEOFF_DETECTED: _event("commander_takeoff_detected", _INFO, "Takeoff detected"),
+    EventKind.LANDING_COMMANDED: _event(
         "commander_landing_current_pos", _INFO, "Landing at current position"
     ),
-    Occasion.LANDING_DETECTED: _event("commander_landing_detected", _INFO, "Landing detected"),
-    Occasion.FAILSAFE: _event(
+    EventKind.LANDING_DETECTED: _event("commander_landing_detected", _INFO, "Landing detected"),
+    EventKind.FAILSAFE: _event(
         "commander_failsafe_enter", _CRITICAL, "Failsafe activated", internal=_WARNING
     ),
-    Occasion.FAILSAFE_UNNAMED: _event(
+    EventKind.FAILSAFE_UNNAMED: _event(
         "commander_failsafe_enter_generic", _CRITICAL, "Failsafe activated", internal=_WARNING
     ),
-    Occasion.FAILSAFE_HOLD: _event(
+    EventKind.FAILSAFE_HOLD: _event(
         "commander_failsafe_enter_hold",
         _CRITICAL,
         "Failsafe activated, entering Hold for {} seconds",
         internal=_WARNING,
     ),
-    Occasion.FAILSAFE_WARNING: _event(
+    EventKind.FAILSAFE_WARNING: _event(
         "commander_failsafe_enter_generic_warn", _WARNING, "Failsafe activated"
     ),
-    Occasion.PILOT_LOST: _event("commander_rc_lost", _INFO, "Manual control lost"),
-    Occasion.GCS_LOST: _event(
+    EventKind.PILOT_LOST: _event("commander_rc_lost", _INFO, "Manual control lost"),
+    EventKind.GCS_LOST: _event(
         "commander_gcs_lost", _WARNING, "Connection to ground station lost", internal=_INFO
     ),
-    Occasion.GCS_REGAINED: _event("commander_dl_regained", _INFO, "GCS connection regained"),
-    Occasion.COMPANION_LOST: _event(
+    EventKind.GCS_REGAINED: _event("commander_dl_regained", _INFO, "GCS connection regained"),
+    EventKind.COMPANION_LOST: _event(
         "commander_mission_comp_lost", _CRITICAL, "Connection to mission computer lost"
     ),
-    Occasion.COMPANION_REGAINED: _event(
+    EventKind.COMPANION_REGAINED: _event(
         "commander_onboard_ctrl_regained", _INFO, "Onboard controller regained"
     ),
-    Occasion.BATTERY_LOW: _event(
+    EventKind.BATTERY_LOW: _event(
         "commander_failsafe_enter_low_bat",
         _WARNING,
         "Low battery level, return advised",
         internal=_INFO,
     ),
-    Occasion.BATTERY_CRITICAL: _event(
+    EventKind.BATTERY_CRITICAL: _event(
         "commander_failsafe_enter_crit_bat_warn",
         _CRITICAL,
         "Critical battery level, land now",
         internal=_INFO,
     ),
-    Occasion.BATTERY_EMERGENCY: _event(
+    EventKind.BATTERY_EMERGENCY: _event(
         "commander_failsafe_enter_crit_low_bat_warn",
         _EMERGENCY,
         "Emergency battery level, land immediately",
         internal=_INFO,
     ),
-    Occasion.PILOT_TOOK_OVER: _event(
+    EventKind.PILOT_TOOK_OVER: _event(
         "commander_rc_override", _INFO, "Pilot took over using sticks"
     ),
 }

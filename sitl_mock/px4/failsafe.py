@@ -1,27 +1,22 @@
 """What PX4 does when a link, the position or the battery is lost."""
 
-import struct
 from collections.abc import Callable
-from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.modes import Mode
-from sitl_mock.autopilot.offboard import OffboardStream
+from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Occasion
-from sitl_mock.autopilot.state import BatteryWarning, State
+from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.px4.failsafe_actions import (
-    DISARM,
-    HOLD,
     LAND,
-    LINK_ACTIONS,
     OFFBOARD_ACTIONS,
     POSITION,
     RETURN,
-    TERMINATE,
-    Action,
+    Announce,
     Cause,
+    EnterMode,
+    FailsafeActions,
 )
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 
@@ -29,33 +24,19 @@ _NO_MANUAL_CONTROL = 4
 """COM_RC_IN_MODE: nobody expects a pilot."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT."""
-_ENTER_HOLD = struct.Struct("<IBHB")
-_ENTER = struct.Struct("<IBB")
 _GCS_MARGIN_US = 2_000_000
 """A lost ground station is noticed this much after COM_DL_LOSS_T (measured 12 s for 10 s)."""
 _ACTED = -1
 _COMPANION_MARGIN_US = 1_500_000
 """A lost companion is told of this much after COM_OBC_LOSS_T (measured 6.5 s for 5 s)."""
 _WARNINGS = {
-    BatteryWarning.LOW: Occasion.BATTERY_LOW,
-    BatteryWarning.CRITICAL: Occasion.BATTERY_CRITICAL,
-    BatteryWarning.EMERGENCY: Occasion.BATTERY_EMERGENCY,
+    BatteryWarning.LOW: EventKind.BATTERY_LOW,
+    BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
+    BatteryWarning.EMERGENCY: EventKind.BATTERY_EMERGENCY,
 }
 
 
-class Announce(Protocol):
-    """Tells the outside of what happens."""
-
-    def __call__(self, occasion: Occasion, detail: str, arguments: bytes = b"", /) -> None:
-        """Tell of an occasion, with a detail for its text and the values of its event."""
-
-
-class _Enter(Protocol):
-    def __call__(self, mode: Mode) -> None: ...
-
-
 _AUTO_MODES = frozenset({Mode.LOITER, Mode.TAKEOFF, Mode.RTL, Mode.LAND})
-_DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 
 
 class Failsafe:
@@ -76,21 +57,19 @@ class Failsafe:
         parameters: ParameterTable,
         stream: OffboardStream,
         announce: Announce,
-        enter: _Enter,
-        stop: Callable[[Occasion], None],
+        enter: EnterMode,
+        stop: Callable[[EventKind], None],
     ) -> None:
         self._state = state
         self._parameters = parameters
         self._stream = stream
         self._announce = announce
         self._enter = enter
-        self._stop = stop
+        self._actions = FailsafeActions(state, parameters, announce, enter, stop)
         self._pilot = False
         self._pilot_optional = True
         self._pilot_lost_us: int | None = None
         self._warned = False
-        self._told: tuple[Cause, Action] | None = None
-        self._cause: Cause | None = None
         self._gcs_us: int | None = None
         self._gcs_lost_us: int | None = None
         self._companion_us: int | None = None
@@ -98,8 +77,7 @@ class Failsafe:
 
     def clear(self) -> None:
         """End any failsafe: a mode was commanded, or the vehicle disarmed."""
-        self._cause = self._told = None
-        self._state.failsafe = False
+        self._actions.clear()
         # What was already acted on acts again only after being regained.
         if self._gcs_lost_us is not None:
             self._gcs_lost_us = _ACTED
@@ -136,59 +114,9 @@ class Failsafe:
     @property
     def holds_before_acting(self) -> bool:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
-        return self._told is not None and self._told[1] is HOLD and self._cause in _DELAYED
+        return self._actions.holds_before_acting
 
-    def _act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
-        """Do something for a cause, unless a graver one acts; tell of it when it is new.
-
-        Args:
-            cause: why.
-            action: what is done now.
-            then: what is done after COM_FAIL_ACT_T, when that is not it yet.
-        """
-        if self._cause is not None and self._cause.rank > cause.rank:
-            return
-        state = self._state
-        if not state.position_valid and action.mode in NEEDS_POSITION:
-            action = LAND
-        if self._told != (cause, action):
-            self._tell(cause, action, then)
-        self._cause, self._told = cause, (cause, action)
-        state.failsafe = True
-        mode = action.mode
-        if mode is None:
-            self._stop(Occasion.DISARMED_BY_FAILSAFE)
-            return
-        if state.landed:
-            mode = Mode.LOITER  # stays where it stands, and disarms
-        if state.mode is not mode:
-            self._enter(mode)
-
-    def _tell(self, cause: Cause, action: Action, then: Action | None) -> None:
-        intended = custom_mode(self._state.intended_mode)
-        if then is not None:
-            delay = round(self._parameters["COM_FAIL_ACT_T"])
-            values = _ENTER_HOLD.pack(intended, then.number, delay, cause.number)
-            self._announce(Occasion.FAILSAFE_HOLD, str(delay), values)
-        elif cause.number:
-            values = _ENTER.pack(intended, action.number, cause.number)
-            self._announce(Occasion.FAILSAFE, "", values)
-        else:
-            values = _ENTER.pack(intended, action.number, 0)
-            self._announce(Occasion.FAILSAFE_UNNAMED, "", values)
-
-    def _act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Hold for COM_FAIL_ACT_T, then do what a parameter says."""
-        action = LINK_ACTIONS.get(int(self._parameters[parameter]))
-        if action is None:
-            return
-        waited = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
-        if waited or action in (HOLD, DISARM, TERMINATE):
-            self._act(cause, action)
-        else:
-            self._act(cause, HOLD, then=action)
-
-    def _excepted(self, parameter: str) -> bool:
+    def _exempt(self, parameter: str) -> bool:
         """Whether a loss is of no matter in the intended mode."""
         bits = int(self._parameters[parameter])
         mode = self._state.intended_mode
@@ -202,18 +130,18 @@ class Failsafe:
         if pilot:
             self._pilot_lost_us = None
         elif self._pilot:
-            self._announce(Occasion.PILOT_LOST, "")
+            self._announce(EventKind.PILOT_LOST, "")
         self._pilot = pilot
         # A pilot who was not there at arming is not missed until he has been.
         self._pilot_optional = not pilot and (self._pilot_optional or not state.armed)
         expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
-        optional = not expected or self._pilot_optional or self._excepted("COM_RCL_EXCEPT")
+        optional = not expected or self._pilot_optional or self._exempt("COM_RCL_EXCEPT")
         if pilot or not state.armed or (optional and state.intended_mode not in PILOTED):
             return
         if self._pilot_lost_us is None:
             self._pilot_lost_us = state.time_us
         if self._pilot_lost_us != _ACTED or state.mode in PILOTED:
-            self._act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
+            self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
     def _watch_offboard(self) -> None:
         state = self._state
@@ -224,8 +152,8 @@ class Failsafe:
             action = OFFBOARD_ACTIONS.get(int(self._parameters["COM_OBL_RC_ACT"]), POSITION)
             if action.mode in PILOTED and not self._pilot:
                 action = RETURN
-            self._act(Cause.OFFBOARD_LOST, action)
-        elif alive and self._cause is Cause.OFFBOARD_LOST:
+            self._actions.act(Cause.OFFBOARD_LOST, action)
+        elif alive and self._actions.cause is Cause.OFFBOARD_LOST:
             self.clear()
             self._enter(Mode.OFFBOARD)
 
@@ -236,7 +164,7 @@ class Failsafe:
         lost = not state.armed and state.mode is Mode.OFFBOARD and not alive
         if lost and not self._warned:
             mode = custom_mode(state.mode).to_bytes(4, "little")
-            self._announce(Occasion.FAILSAFE_WARNING, "", mode)
+            self._announce(EventKind.FAILSAFE_WARNING, "", mode)
         self._warned = lost
 
     def _watch_gcs(self) -> None:
@@ -245,15 +173,15 @@ class Failsafe:
             return
         if self.gcs_alive:
             if self._gcs_lost_us is not None:
-                self._announce(Occasion.GCS_REGAINED, "")
+                self._announce(EventKind.GCS_REGAINED, "")
             self._gcs_lost_us = None
             return
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
-            self._announce(Occasion.GCS_LOST, "")
-        ignored = state.intended_mode is Mode.LAND or self._excepted("COM_DLL_EXCEPT")
+            self._announce(EventKind.GCS_LOST, "")
+        ignored = state.intended_mode is Mode.LAND or self._exempt("COM_DLL_EXCEPT")
         if state.armed and not ignored and self._gcs_lost_us != _ACTED:
-            self._act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
+            self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
         if self._companion_us is None:
@@ -262,12 +190,12 @@ class Failsafe:
         lost = self._state.time_us - self._companion_us > limit
         if lost != self._companion_lost:
             self._companion_lost = lost
-            self._announce(Occasion.COMPANION_LOST if lost else Occasion.COMPANION_REGAINED, "")
+            self._announce(EventKind.COMPANION_LOST if lost else EventKind.COMPANION_REGAINED, "")
 
     def _watch_position(self) -> None:
         state = self._state
         if not state.position_valid and state.mode in NEEDS_POSITION:
-            self._act(Cause.POSITION_LOST, LAND)
+            self._actions.act(Cause.POSITION_LOST, LAND)
 
     def _watch_battery(self) -> None:
         state, parameters = self._state, self._parameters
@@ -288,4 +216,4 @@ class Failsafe:
         if not state.armed or action not in (2, 3) or warning < BatteryWarning.CRITICAL:
             return
         lands = action == 2 or warning is BatteryWarning.EMERGENCY
-        self._act(Cause.BATTERY, LAND if lands else RETURN)
+        self._actions.act(Cause.BATTERY, LAND if lands else RETURN)

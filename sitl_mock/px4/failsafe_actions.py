@@ -1,9 +1,17 @@
 """What PX4's failsafes may do, by which parameter, and for which cause (source: PX4's failsafe)."""
 
+import struct
+from collections.abc import Callable
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.events import EventKind
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.state import Mode, State
+from sitl_mock.px4.modes import NEEDS_POSITION, custom_mode
+
+_ENTER_HOLD = struct.Struct("<IBHB")
+_ENTER = struct.Struct("<IBB")
 
 
 class Action(NamedTuple):
@@ -54,3 +62,109 @@ class Cause(Enum):
     def number(self) -> int:
         """Its number in PX4's events."""
         return self.value[1]
+
+
+_DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
+
+
+class Announce(Protocol):
+    """Tells the outside of what happens."""
+
+    def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
+        """Tell of an kind, with a detail for its text and the values of its event."""
+
+
+class EnterMode(Protocol):
+    """Enters a mode and leaves the intended mode as it is."""
+
+    def __call__(self, mode: Mode) -> None:
+        """Enter the mode."""
+
+
+class FailsafeActions:
+    """Carries out what a failsafe does, the gravest cause first.
+
+    Args:
+        state: the autopilot's state; ``failsafe`` is written here.
+        parameters: COM_FAIL_ACT_T, and the parameters that name actions.
+        announce: sends texts and events.
+        enter: enters a mode and leaves the intended mode as it is.
+        stop: stops the motors and announces the occasion.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        announce: Announce,
+        enter: EnterMode,
+        stop: Callable[[EventKind], None],
+    ) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._announce = announce
+        self._enter = enter
+        self._stop = stop
+        self._told: tuple[Cause, Action] | None = None
+        self.cause: Cause | None = None
+        """Of the active failsafe, None if none is active."""
+
+    def clear(self) -> None:
+        """End the active failsafe."""
+        self.cause = self._told = None
+        self._state.failsafe = False
+
+    @property
+    def holds_before_acting(self) -> bool:
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
+        return self._told is not None and self._told[1] is HOLD and self.cause in _DELAYED
+
+    def act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
+        """Do something for a cause, unless a graver one acts; tell of it when it is new.
+
+        Args:
+            cause: why.
+            action: what is done now.
+            then: what is done after COM_FAIL_ACT_T, when that is not it yet.
+        """
+        if self.cause is not None and self.cause.rank > cause.rank:
+            return
+        state = self._state
+        if not state.position_valid and action.mode in NEEDS_POSITION:
+            action = LAND
+        if self._told != (cause, action):
+            self._tell(cause, action, then)
+        self.cause, self._told = cause, (cause, action)
+        state.failsafe = True
+        mode = action.mode
+        if mode is None:
+            self._stop(EventKind.DISARMED_BY_FAILSAFE)
+            return
+        if state.landed:
+            mode = Mode.LOITER  # stays where it stands, and disarms
+        if state.mode is not mode:
+            self._enter(mode)
+
+    def _tell(self, cause: Cause, action: Action, then: Action | None) -> None:
+        intended = custom_mode(self._state.intended_mode)
+        if then is not None:
+            delay = round(self._parameters["COM_FAIL_ACT_T"])
+            values = _ENTER_HOLD.pack(intended, then.number, delay, cause.number)
+            self._announce(EventKind.FAILSAFE_HOLD, str(delay), values)
+        elif cause.number:
+            values = _ENTER.pack(intended, action.number, cause.number)
+            self._announce(EventKind.FAILSAFE, "", values)
+        else:
+            values = _ENTER.pack(intended, action.number, 0)
+            self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
+
+    def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
+        """Hold for COM_FAIL_ACT_T, then do what a parameter says."""
+        action = LINK_ACTIONS.get(int(self._parameters[parameter]))
+        if action is None:
+            return
+        waited = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
+        if waited or action in (HOLD, DISARM, TERMINATE):
+            self.act(cause, action)
+        else:
+            self.act(cause, HOLD, then=action)

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.modes import Mode
+from sitl_mock.autopilot.state import Mode
 
 _ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _MANUAL = dialect.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED

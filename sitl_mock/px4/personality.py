@@ -2,27 +2,30 @@
 
 from collections.abc import Collection, Mapping
 from random import Random
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.autopilot.events import Event, EventKind
 from sitl_mock.autopilot.land_detector import LandDetector
-from sitl_mock.autopilot.modes import Mode
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Event, Identity, Occasion, Parts, Rules
-from sitl_mock.link.streams import StreamSchedule
-from sitl_mock.px4.announcer import Announcer
+from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.state import Mode
+from sitl_mock.config.settings import VehicleSettings
+from sitl_mock.link.link import StreamSchedule
+from sitl_mock.px4.arming import ArmingChecks
 from sitl_mock.px4.commander import Px4Commander
 from sitl_mock.px4.commands import Px4Commands
-from sitl_mock.px4.event_log import EventLog
+from sitl_mock.px4.event_log import Announcer, EventLog
 from sitl_mock.px4.events import PX4_EVENTS
 from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import mode_of
+from sitl_mock.px4.parameters import PX4_PARAMETERS
 from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
-from sitl_mock.settings import MockSettings
 
 CONVERGED_SHARE = 0.7
 """The position becomes valid this far into the time before arming is possible (recorded: 3.2 s)."""
@@ -79,11 +82,12 @@ _GCS_RATES: dict[int, float] = {
 class Px4:
     """The PX4 personality."""
 
-    events: Mapping[Occasion, Event] = PX4_EVENTS
+    events: Mapping[EventKind, Event] = PX4_EVENTS
     boot_mode = Mode.LOITER
     any_component = False
     system_id_parameter = "MAV_SYS_ID"
     unsigned_links: Collection[str] = ()
+    parameters = PX4_PARAMETERS
     identity = Identity(
         capabilities=0xE8FF,
         flight_sw_version=18022464,
@@ -92,11 +96,15 @@ class Px4:
         flight_custom_version=(0, 0, 0, 245, 216, 154, 203, 253),
     )
 
-    def slot_us(self, settings: MockSettings) -> int:
+    def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
+        """Return the ``mock:`` section as it is: the general defaults are PX4's."""
+        return section
+
+    def slot_us(self, settings: VehicleSettings) -> int:
         """Return the slot period that the inner loop sets."""
         return SLOT_US[settings.inner_loop_hz]
 
-    def streams(self, link: str, settings: MockSettings) -> StreamSchedule:
+    def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the measured onboard rates, and lower ones for the ground station's link."""
         lockstep = settings.lockstep.enabled
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
@@ -110,20 +118,21 @@ class Px4:
         """Return the mode a custom_mode means, None if there is no such mode."""
         return mode_of(custom_mode)
 
-    def rules(self, parts: Parts) -> Rules:
+    def rules(self, parts: VehicleParts) -> Rules:
         """Put PX4's rules together."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)
         announce = Announcer(self, parts.links, events)
         control = Px4ModeControl(state, parameters, parts.stream)
+        health = HealthReport(state, events, parts.ready_us)
+        checks = ArmingChecks(state, parameters, parts.stream, health, parts.ready_us)
         commander = Px4Commander(
             state,
             parameters,
             control,
             parts.stream,
             announce,
-            HealthReport(state, events, parts.ready_us),
-            ready_us=parts.ready_us,
+            checks,
         )
         builders = {
             **MotionTelemetry(state, vehicle, parts.origin).builders(),

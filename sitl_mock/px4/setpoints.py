@@ -10,6 +10,8 @@ from sitl_mock.autopilot.setpoints import (
     THRUST_BODY,
     YAW_RATE_IGNORED,
     AttitudeSetpoint,
+    Setpoint,
+    position_setpoint,
 )
 from sitl_mock.link.framing import Message
 
@@ -18,6 +20,13 @@ NAN = float("nan")
 _THRUST_BODY_FIELD = struct.Struct("<3f")
 _FULL_LENGTH = 51
 _MAGIC_V2 = 0xFD
+
+
+def decode_setpoint(message: Message) -> Setpoint | None:
+    """Return what a setpoint message asks, or None when PX4 would not count it."""
+    if message.get_type() == "SET_ATTITUDE_TARGET":
+        return attitude_setpoint(message)
+    return position_setpoint(message)
 
 
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:

@@ -3,9 +3,8 @@
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.motion_telemetry import Builder, clip
-from sitl_mock.autopilot.offboard import OffboardStream
 from sitl_mock.autopilot.personality import Identity
-from sitl_mock.autopilot.setpoints import AttitudeSetpoint
+from sitl_mock.autopilot.setpoints import AttitudeSetpoint, OffboardStream
 from sitl_mock.autopilot.state import NAN, State
 from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry
 from sitl_mock.link.framing import Message

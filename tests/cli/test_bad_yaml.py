@@ -19,7 +19,7 @@ from companion.config.root import FORMER_KEYS
 from companion.files import bounded_yaml
 from companion.files.bounded_yaml import MOST_BYTES, YamlError
 from companion.files.yaml_file import ConfigError, Section, parse
-from sitl_mock.config import errors as config_errors
+from sitl_mock.config.section import ConfigError as MockConfigError
 from sitl_mock.settings import load_settings
 
 QUICK = 2.0
@@ -103,7 +103,7 @@ def test_the_bundled_vehicle_ends_an_attack_as_soon(tmp_path, text):
     path = tmp_path / "attack.yaml"
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     began = time.process_time()
-    with contextlib.suppress(config_errors.ConfigError):  # other sections are not its business
+    with contextlib.suppress(MockConfigError):  # other sections are not its business
         load_settings(path, {})
     assert time.process_time() - began < QUICK
 
@@ -125,7 +125,7 @@ def test_what_is_no_file_of_text_is_refused_at_once(tmp_path, kind):
     (tmp_path / "main.yaml").write_text("include: c.yaml\n")
     with pytest.raises(ConfigError, match=r"c\.yaml: .*\(included by .*main\.yaml\)"):
         load(tmp_path / "main.yaml")
-    with pytest.raises(config_errors.ConfigError, match=r"c\.yaml: "):
+    with pytest.raises(MockConfigError, match=r"c\.yaml: "):
         load_settings(path, {})
 
 
@@ -197,7 +197,7 @@ def test_the_bundled_vehicle_reads_numbers_as_yaml_1_2_has_them(tmp_path):
     assert (settings.seed, settings.airframe.mass_kg) == (10, 1.0)
     for wrong in ("1:30", "2024-01-01", "0o17"):
         path.write_text(f"mock: {{seed: {wrong}}}")
-        with pytest.raises(config_errors.ConfigError, match=r"mock\.seed"):
+        with pytest.raises(MockConfigError, match=r"mock\.seed"):
             load_settings(path, {})
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.config.sections import LimitsConfig
+from companion.config.limits import LimitsConfig
 from companion.flight.observer import Silent
 from tests.flight.fly import fly, mock_vehicle
 

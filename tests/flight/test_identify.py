@@ -12,7 +12,8 @@ from scipy.signal import lfilter
 from companion.guidance.reference import GRAVITY
 from companion.identification import identify_vehicle
 from companion.vehicle.flight_log import read_flight_log
-from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 from tests.flight.fly import fly, mock_vehicle
 

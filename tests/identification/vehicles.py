@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 
 RATE_NOISE = 0.002

@@ -31,14 +31,14 @@ class ArduRig(Rig):
         super().__init__(boot=boot, quick=False, autopilot="ardupilot", **settings)
 
     def _take(self) -> None:
-        for frame in self.autopilot.companion.take():
+        for frame in self.simulation.companion.take():
             message = _parser.decode(bytearray(frame))
             self.received.append((self.time, message))
 
     def say_frame(self, frame: bytes) -> None:
         """Deliver a frame as it is."""
         for each in decode(frame):
-            self.autopilot.handle(each, self.autopilot.companion)
+            self.simulation.handle(each, self.simulation.companion)
         self._take()
 
     def texts(self) -> list[str]:

@@ -12,8 +12,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.link.framing import Framer, decode
-from sitl_mock.settings import GCS_PORT_OFFSET, PORT_OFFSET
 
 HOST = "127.0.0.1"
 

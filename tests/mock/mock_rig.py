@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.link.framing import Framer, decode
 from sitl_mock.settings import MockSettings
-from sitl_mock.simulation import Autopilot
+from sitl_mock.simulation import Simulation
 
 HOVER = 0.4903
 IGNORE_ATTITUDE = 128
@@ -30,7 +30,7 @@ class Rig:
             settings.setdefault("prearm_delay_s", 0.2)
         settings.setdefault("lockstep", {"enabled": True})
         settings.setdefault("gcs_port", 0)
-        self.autopilot = Autopilot(MockSettings.model_validate(settings))
+        self.simulation = Simulation(MockSettings.model_validate(settings))
         self.framer = Framer(255, 190) if gcs else Framer(1, 191)
         self.heartbeat_type = dialect.MAV_TYPE_GCS if gcs else dialect.MAV_TYPE_ONBOARD_CONTROLLER
         self.received: list[tuple[float, Any]] = []
@@ -41,31 +41,31 @@ class Rig:
 
     @property
     def time(self) -> float:
-        return self.autopilot.time_us / 1e6
+        return self.simulation.time_us / 1e6
 
     @property
     def state(self):
-        return self.autopilot.state
+        return self.simulation.state
 
     @property
     def truth(self):
-        return self.autopilot.vehicle.truth
+        return self.simulation.vehicle.truth
 
     def say(self, message: Any) -> None:
         """Deliver a message through the wire format, as the socket would."""
         for each in decode(self.framer.frame(message)):
-            self.autopilot.handle(each, self.autopilot.companion)
+            self.simulation.handle(each, self.simulation.companion)
         self._take()
 
     def heartbeat(self) -> None:
         self.say(dialect.MAVLink_heartbeat_message(self.heartbeat_type, 8, 0, 0, 4, 3))
 
     def run(self, seconds: float) -> None:
-        end = self.autopilot.time_us + round(seconds * 1e6)
-        while self.autopilot.time_us < end:
+        end = self.simulation.time_us + round(seconds * 1e6)
+        while self.simulation.time_us < end:
             if self.each_tick is not None:
                 self.each_tick()
-            self.autopilot.tick()
+            self.simulation.tick()
             self._take()
 
     def run_until(self, condition: Callable[[], bool], limit: float) -> None:
@@ -75,7 +75,7 @@ class Rig:
             self.run(0.004)
 
     def _take(self) -> None:
-        for frame in self.autopilot.companion.take():
+        for frame in self.simulation.companion.take():
             self.received.extend((self.time, message) for message in decode(frame))
 
     def messages(self, name: str, since: float = 0.0) -> list[Any]:
@@ -120,13 +120,13 @@ class Rig:
     ) -> None:
         self.say(
             dialect.MAVLink_set_attitude_target_message(
-                self.autopilot.time_us // 1000, *target, mask, q, roll, pitch, yaw, thrust
+                self.simulation.time_us // 1000, *target, mask, q, roll, pitch, yaw, thrust
             )
         )
 
     def take_off(self, height: float = 5.0) -> None:
         """Arm, climb and arrive in LOITER."""
-        self.autopilot.parameters.set("MIS_TAKEOFF_ALT", height)
+        self.simulation.parameters.set("MIS_TAKEOFF_ALT", height)
         assert self.mode(4, 2) == ACCEPTED
         assert self.arm() == ACCEPTED
         self.run_until(lambda: self.state.mode.name == "LOITER", 20.0)

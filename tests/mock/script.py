@@ -78,7 +78,7 @@ class Script:
                 if start <= now <= stop and now - sent >= 1.0 / hz - 1e-6:
                     rig.rates(thrust=self._hover)
                     sent = now
-            rig.run(rig.autopilot.next_us / 1e6 - now)
+            rig.run(rig.simulation.next_us / 1e6 - now)
 
     def _ask(self, kind: str, values: dict[str, Any]) -> None:
         message_type = getattr(ardupilotmega, f"MAVLink_{kind.lower()}_message")
@@ -88,7 +88,7 @@ class Script:
         self.rig.say(message_type(**filled))
 
     def _take(self) -> None:
-        frames = self.rig.autopilot.companion.take()
+        frames = self.rig.simulation.companion.take()
         if self.rig.time < self.here(self.recording["from_s"]):
             return  # nobody recorded it
         for frame in frames:

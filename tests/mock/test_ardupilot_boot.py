@@ -72,7 +72,7 @@ def test_a_link_on_which_nobody_spoke_hears_little_and_no_words():
     assert len(rig.messages("HEARTBEAT")) == 11
     assert len(rig.messages("TIMESYNC")) == 1
     rig.command(511, 31, 10_000)
-    assert rig.autopilot.gcs.streams.interval(31) == -1  # asked on one link, for that one
+    assert rig.simulation.gcs.streams.interval(31) == -1  # asked on one link, for that one
 
 
 def test_one_setting_shortens_the_whole_boot():

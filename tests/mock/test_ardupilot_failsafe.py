@@ -11,8 +11,8 @@ from sitl_mock.link.framing import Framer
 
 
 def fault(rig, kind, **values):
-    rig.autopilot.faults.add(
-        fault_adapter.validate_python({"kind": kind, **values}), rig.autopilot.time_us
+    rig.simulation.faults.add(
+        fault_adapter.validate_python({"kind": kind, **values}), rig.simulation.time_us
     )
 
 
@@ -25,7 +25,7 @@ def heartbeat_from(rig, system):
 def test_a_lost_ground_station_returns_after_5_s_though_setpoints_go_on():
     rig = ArduRig(parameters=THRUST_IS_THRUST)
     rig.lift(3.0)
-    rig.autopilot.parameters.set("FS_GCS_ENABLE", 1)
+    rig.simulation.parameters.set("FS_GCS_ENABLE", 1)
     rig.heartbeat()
     last = rig.time
     rig.each_tick = lambda: rig.rates(thrust=HOVER)
@@ -49,7 +49,7 @@ def test_what_else_a_lost_ground_station_may_do():
     rig.lift(3.0)
     for enable, mode in ((0, "GUIDED"), (5, "LAND"), (7, "BRAKE")):
         rig.switch(GUIDED)
-        rig.autopilot.parameters.set("FS_GCS_ENABLE", enable)
+        rig.simulation.parameters.set("FS_GCS_ENABLE", enable)
         rig.heartbeat()
         rig.run(0.9)
         assert rig.state.mode.name == "GUIDED"
@@ -57,7 +57,7 @@ def test_what_else_a_lost_ground_station_may_do():
         assert rig.state.mode.name == mode
         rig.heartbeat()
     # Another system id can be the ground station's, and a pilot flies on.
-    rig.autopilot.parameters.set("MAV_GCS_SYSID", 7)
+    rig.simulation.parameters.set("MAV_GCS_SYSID", 7)
     heartbeat_from(rig, 7)
     assert rig.switch(LOITER) == ACCEPTED
     rig.run(1.1)
@@ -81,11 +81,11 @@ def test_a_low_battery_does_what_its_parameters_say():
     fault(rig, "low_battery", remaining=0.15)
     rig.run(0.2)
     assert (rig.state.mode.name, rig.state.failsafe) == ("GUIDED", False)  # 0 mAh: no limit
-    rig.autopilot.parameters.set("BATT_LOW_MAH", 660.0)
+    rig.simulation.parameters.set("BATT_LOW_MAH", 660.0)
     rig.run(0.1)
     assert (rig.state.mode.name, rig.state.failsafe) == ("RTL", True)
     assert rig.texts()[-1].startswith("Battery 1 is low 12.60V used 28")
-    rig.autopilot.parameters.set("BATT_CRT_MAH", 330.0)
+    rig.simulation.parameters.set("BATT_CRT_MAH", 330.0)
     fault(rig, "low_battery", remaining=0.05)
     rig.run(0.2)
     assert rig.state.mode.name == "LAND"
@@ -115,10 +115,10 @@ def test_the_pilot_and_an_estimators_reset_by_the_faults_of_every_family():
     assert rig.truth.position_ned == pytest.approx(before.position_ned, abs=0.3)
     fault(rig, "pilot_takeover")
     rig.run(0.1)
-    told = truth(rig.autopilot)
+    told = truth(rig.simulation)
     assert (told["mode"], told["aborted"]) == ("LOITER", False)
     rig.rates(thrust=HOVER)
-    assert not rig.autopilot.commander.under_setpoints
+    assert not rig.simulation.commander.under_setpoints
 
 
 def test_return_climbs_flies_home_waits_and_lands():

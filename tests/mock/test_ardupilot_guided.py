@@ -52,16 +52,16 @@ def test_a_flight_from_the_ground_to_the_ground_with_its_times_and_flags():
     assert rig.start(12.0) == FAILED  # flying
     assert rig.command(400, 0) == FAILED
     assert rig.state.armed
-    assert 0.364 < rig.autopilot.parameters["MOT_THST_HOVER"] < 0.39  # it learns
+    assert 0.364 < rig.simulation.parameters["MOT_THST_HOVER"] < 0.39  # it learns
 
     rig.each_tick = lambda: rig.rates(roll=0.1, thrust=HOVER)
     rig.run(1.0)
     assert rig.base_mode() == 209
     assert rig.messages("HEARTBEAT")[-1].custom_mode == GUIDED
     assert rig.switch(BRAKE) == ACCEPTED
-    counted = rig.autopilot.stream.received
+    counted = rig.simulation.stream.received
     rig.run(2.0)
-    assert rig.autopilot.stream.received == counted  # in BRAKE nobody listens to setpoints
+    assert rig.simulation.stream.received == counted  # in BRAKE nobody listens to setpoints
     assert hypot(*rig.truth.velocity_ned) < 0.3
     assert rig.base_mode() == 217
     rig.each_tick = None
@@ -114,19 +114,19 @@ def aloft():
 
 
 def test_without_the_option_thrust_is_a_climb_rate(aloft):
-    aloft.autopilot.parameters.set("GUID_OPTIONS", 0)
+    aloft.simulation.parameters.set("GUID_OPTIONS", 0)
     for thrust, speed in ((0.0, -1.5), (nan, 0.0), (1.0, 2.5), (0.5, 0.0)):
         aloft.each_tick = lambda thrust=thrust: aloft.rates(thrust=thrust)
         aloft.run(1.6)
         assert climb(aloft) == pytest.approx(speed, abs=0.2), thrust
     aloft.each_tick = None
-    aloft.autopilot.parameters.set("GUID_OPTIONS", 8)
+    aloft.simulation.parameters.set("GUID_OPTIONS", 8)
 
 
 def test_the_angle_boost_divides_by_the_cosine_of_the_tilt(aloft):
     """At 25 degrees, dividing oneself, too: measured -1.05 m/s^2; -0.02 if not."""
     for boost, twice, down in ((1, False, 0.0), (1, True, -1.0), (0, False, 0.9), (0, True, 0.0)):
-        aloft.autopilot.parameters.set("ATC_ANGLE_BOOST", boost)
+        aloft.simulation.parameters.set("ATC_ANGLE_BOOST", boost)
         thrust = HOVER / cos(radians(25.0)) if twice else HOVER
         aloft.rates(mask=7, q=tilted(25.0), thrust=thrust)
         aloft.run(1.0)
@@ -135,14 +135,14 @@ def test_the_angle_boost_divides_by_the_cosine_of_the_tilt(aloft):
         assert felt == pytest.approx(down, abs=0.25), (boost, twice)
         assert aloft.switch(BRAKE) == aloft.switch(GUIDED) == ACCEPTED
         aloft.run(0.8)
-    aloft.autopilot.parameters.set("ATC_ANGLE_BOOST", 1)
+    aloft.simulation.parameters.set("ATC_ANGLE_BOOST", 1)
 
 
 @pytest.mark.parametrize("target", [(1, 1), (1, 0), (0, 0), (1, 42)])
 def test_targets_that_are_obeyed(aloft, target):
     aloft.rates(thrust=HOVER, target=target)
     aloft.run(0.01)
-    assert aloft.autopilot.commander.under_setpoints
+    assert aloft.simulation.commander.under_setpoints
     assert aloft.switch(BRAKE) == aloft.switch(GUIDED) == ACCEPTED
 
 
@@ -154,7 +154,7 @@ def test_what_is_ignored_in_silence(aloft, target, source):
     aloft.rates(thrust=HOVER, target=target)
     aloft.framer = mine
     aloft.run(0.01)
-    assert not aloft.autopilot.commander.under_setpoints
+    assert not aloft.simulation.commander.under_setpoints
 
 
 @pytest.mark.parametrize(
@@ -165,10 +165,10 @@ def test_what_is_ignored_in_silence(aloft, target, source):
 def test_what_cannot_be_flown_falls_back_to_holding_the_position(aloft, mask, q):
     aloft.rates(thrust=HOVER)
     aloft.run(0.05)
-    assert aloft.autopilot.commander.under_setpoints
+    assert aloft.simulation.commander.under_setpoints
     aloft.rates(thrust=HOVER, mask=mask, q=q)
     aloft.run(0.05)
-    assert not aloft.autopilot.commander.under_setpoints
+    assert not aloft.simulation.commander.under_setpoints
     assert aloft.state.position_controlled
 
 
@@ -226,7 +226,7 @@ def test_a_setpoint_ends_a_take_off_at_once():
     rig.run_until(lambda: rig.height > 1.0, 6.0)
     rig.rates(thrust=HOVER)
     rig.run(0.02)
-    assert rig.autopilot.commander.under_setpoints
+    assert rig.simulation.commander.under_setpoints
     assert rig.base_mode() == 209
 
 
@@ -292,7 +292,7 @@ def test_attitude_target_tells_the_axes_along_which_the_rates_are_taken():
     assert told[-1].body_yaw_rate == pytest.approx(0.5)
     lead = yaw(tuple(told[-1].q)) - yaw(rig.truth.q)
     assert 0.5 * 0.08 < lead < 0.5 * 0.2
-    rig.autopilot.vehicle.shift_estimate(yaw=0.5)
+    rig.simulation.vehicle.shift_estimate(yaw=0.5)
     rig.run(0.02)
     assert yaw(tuple(rig.messages("ATTITUDE_TARGET")[-1].q)) - yaw(rig.truth.q) == pytest.approx(
         lead + 0.5, abs=0.02

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.__main__ import main
 from sitl_mock.settings import MockSettings
-from sitl_mock.simulation import Autopilot
+from sitl_mock.simulation import Simulation
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 
@@ -63,9 +63,9 @@ def test_parameters_travel_as_floats_with_their_own_types(rig):
     assert read(rig, "MOT_THST_HOVER").param_type == REAL32
     value = write(rig, "GUID_OPTIONS", 8.0, REAL32)  # recorded: the type sent does not matter
     assert (value.param_value, value.param_type) == (8.0, INT32)
-    assert rig.autopilot.parameters["GUID_OPTIONS"] == 8
+    assert rig.simulation.parameters["GUID_OPTIONS"] == 8
     rig.say(dialect.MAVLink_param_set_message(1, 1, b"GUID_OPTIONS", nan, REAL32))
-    assert rig.autopilot.parameters["GUID_OPTIONS"] == 8
+    assert rig.simulation.parameters["GUID_OPTIONS"] == 8
     rig.say(dialect.MAVLink_param_request_read_message(1, 1, b"SYSID_MYGCS", -1))
     assert rig.messages("PARAM_ERROR")[-1].error == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
@@ -80,7 +80,7 @@ def test_the_whole_list_comes_without_a_hash(rig):
 
 
 def test_a_second_vehicle_has_its_own_system_id():
-    second = Autopilot(MockSettings(autopilot="ardupilot"), 2)
+    second = Simulation(MockSettings(autopilot="ardupilot"), 2)
     assert second.parameters["MAV_SYSID"] == 2
 
 

@@ -5,14 +5,14 @@ from math import cos, inf, nan, radians
 
 import pytest
 
-from sitl_mock.ardupilot.climb import Climb, approach
-from sitl_mock.ardupilot.settings import AIRFRAME
+from sitl_mock.ardupilot.defaults import AIRFRAME
+from sitl_mock.ardupilot.hold import ClimbProfile, approach_speed
 from sitl_mock.ardupilot.thrust import (
     GRAVITY,
-    asked_climb,
-    asked_thrust,
-    boosted,
+    angle_boosted,
+    climb_rate_of_setpoint,
     specific_thrust,
+    thrust_of_setpoint,
 )
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.physics.rotors import Rotors
@@ -46,23 +46,23 @@ def test_the_airframe_can_give_all_of_it():
     ("asked", "thrust"), [(0.4, 0.4), (nan, 0.0), (inf, 1.0), (-1.0, 0.0), (1.5, 1.0)]
 )
 def test_odd_thrusts(asked, thrust):
-    assert asked_thrust(asked) == thrust
+    assert thrust_of_setpoint(asked) == thrust
 
 
 @pytest.mark.parametrize(
     ("asked", "climb"), [(0.5, 0.0), (1.0, 2.5), (0.0, -1.5), (0.75, 1.25), (nan, 0.0), (inf, 2.5)]
 )
 def test_thrust_as_a_climb_rate(asked, climb):
-    assert asked_climb(asked, 2.5, 1.5) == climb
+    assert climb_rate_of_setpoint(asked, 2.5, 1.5) == climb
 
 
 def test_the_boost_divides_by_the_cosine_of_the_tilt_and_ends_upside_down():
-    assert boosted(0.364, cos(radians(25.0))) * cos(radians(25.0)) == pytest.approx(0.364)
-    assert boosted(0.364, 0.0) == boosted(0.364, -0.5) == 0.0
+    assert angle_boosted(0.364, cos(radians(25.0))) * cos(radians(25.0)) == pytest.approx(0.364)
+    assert angle_boosted(0.364, 0.0) == angle_boosted(0.364, -0.5) == 0.0
 
 
 def test_a_climb_gathers_speed_no_faster_than_its_limit():
-    climb = Climb()
+    climb = ClimbProfile()
     climb.begin(3.0, -0.5)
     for _ in range(100):
         climb.step(2.0, 1.0, 0.01)
@@ -71,6 +71,6 @@ def test_a_climb_gathers_speed_no_faster_than_its_limit():
 
 
 def test_an_approach_can_still_stop():
-    assert approach(2.0, 1.0, 10.0) ** 2 / 2.0 == pytest.approx(2.0)
-    assert approach(100.0, 1.0, 2.5) == 2.5
-    assert approach(-1.0, 1.0, 2.5) == 0.0
+    assert approach_speed(2.0, 1.0, 10.0) ** 2 / 2.0 == pytest.approx(2.0)
+    assert approach_speed(100.0, 1.0, 2.5) == 2.5
+    assert approach_speed(-1.0, 1.0, 2.5) == 0.0

@@ -124,7 +124,7 @@ def test_take_off_command_takes_altitude_above_sea_level():
 def test_the_take_off_altitude_counts_at_arming():
     rig = Rig()
     assert rig.mode(4, 2) == ACCEPTED
-    rig.autopilot.parameters.set("MIS_TAKEOFF_ALT", 4.0)
+    rig.simulation.parameters.set("MIS_TAKEOFF_ALT", 4.0)
     assert rig.arm() == ACCEPTED
     assert "Using default takeoff altitude: 4.0 m\t" in rig.texts()
     rig.run_until(lambda: rig.state.mode.name == "LOITER", 15.0)

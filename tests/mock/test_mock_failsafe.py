@@ -54,7 +54,7 @@ def test_with_an_action_arming_needs_a_ground_station():
 def test_low_battery(action, remaining, mode):
     rig = Rig(parameters={"COM_LOW_BAT_ACT": action})
     rig.take_off()
-    rig.autopilot.vehicle.set_battery_remaining(remaining)
+    rig.simulation.vehicle.set_battery_remaining(remaining)
     rig.run(0.2)
     assert rig.state.mode.name == mode
     assert rig.state.failsafe == (mode != "LOITER")
@@ -71,7 +71,7 @@ def test_an_empty_battery_forbids_arming():
 def test_lost_position_lands_where_it_is_needed():
     rig = Rig(parameters={"EKF2_NOAID_TOUT": 1_000_000})
     rig.take_off()
-    rig.autopilot.faults.add(fault("gps_loss"), rig.autopilot.time_us)
+    rig.simulation.faults.add(fault("gps_loss"), rig.simulation.time_us)
     rig.run(0.9)
     assert rig.state.mode.name == "LOITER"
     rig.run(0.3)
@@ -85,7 +85,7 @@ def test_lost_position_lands_where_it_is_needed():
 def test_a_failsafe_is_told_of_once():
     rig = Rig(parameters={"EKF2_NOAID_TOUT": 100_000})
     assert rig.arm() == ACCEPTED
-    rig.autopilot.faults.add(fault("gps_loss"), rig.autopilot.time_us)
+    rig.simulation.faults.add(fault("gps_loss"), rig.simulation.time_us)
     rig.run(2.0)
     assert rig.texts().count("Failsafe activated\t") == 1
 
@@ -93,7 +93,7 @@ def test_a_failsafe_is_told_of_once():
 def test_offboard_by_rates_needs_no_position():
     rig = Rig(parameters={"EKF2_NOAID_TOUT": 1_000_000})
     rig.fly_offboard()
-    rig.autopilot.faults.add(fault("gps_loss"), rig.autopilot.time_us)
+    rig.simulation.faults.add(fault("gps_loss"), rig.simulation.time_us)
     rig.run(2.0)
     assert rig.state.mode.name == "OFFBOARD"
 

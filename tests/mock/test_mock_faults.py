@@ -6,7 +6,7 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pydantic import ValidationError
 
-from sitl_mock.autopilot.fault_schedule import FaultSchedule
+from sitl_mock.autopilot.faults import FaultSchedule
 from sitl_mock.config.faults import fault_adapter
 from sitl_mock.link.pipe import DatagramPipe
 
@@ -115,7 +115,7 @@ def test_faults_that_cannot_be(bad):
 
 
 def strike(rig, kind, **values):
-    rig.autopilot.faults.add(fault(kind, **values), rig.autopilot.time_us)
+    rig.simulation.faults.add(fault(kind, **values), rig.simulation.time_us)
     rig.run(0.004)
 
 
@@ -234,7 +234,7 @@ def test_clear_undoes_what_can_be_undone():
     rig = Rig()
     for kind in ("freeze_clock", "gps_loss", "refuse_arming", "stop_telemetry"):
         strike(rig, kind)
-    rig.autopilot.clear_faults()
+    rig.simulation.clear_faults()
     rig.run(1.0)
     assert rig.state.gps_ok
     assert rig.state.shown_us == rig.state.time_us
@@ -252,10 +252,10 @@ def test_after_offboard_begins_with_the_first_armed_offboard():
 
 def test_a_clock_that_slips_loses_its_time_once():
     rig = Rig()
-    rig.autopilot.faults.add(
-        fault("slip_clock", slip_ms=14.0, duration_s=1.0), rig.autopilot.time_us
+    rig.simulation.faults.add(
+        fault("slip_clock", slip_ms=14.0, duration_s=1.0), rig.simulation.time_us
     )
     rig.run(0.1)
-    assert rig.autopilot.effects.take_slip() == pytest.approx(0.014)
+    assert rig.simulation.effects.take_slip() == pytest.approx(0.014)
     rig.run(2.0)
-    assert rig.autopilot.effects.take_slip() == 0.0
+    assert rig.simulation.effects.take_slip() == 0.0

@@ -198,17 +198,17 @@ IGNORED_SETPOINTS = {
 def test_setpoints_that_count(setpoint):
     rig = Rig()
     rig.rates(**setpoint)
-    assert rig.autopilot.stream.received == 1
+    assert rig.simulation.stream.received == 1
 
 
 @pytest.mark.parametrize("setpoint", IGNORED_SETPOINTS.values(), ids=IGNORED_SETPOINTS)
 def test_setpoints_that_do_not_count_lose_offboard(setpoint):
     rig = Rig()
     rig.fly_offboard()
-    counted = rig.autopilot.stream.received
+    counted = rig.simulation.stream.received
     rig.each_tick = lambda: rig.rates(**setpoint)
     rig.run(1.2)
-    assert rig.autopilot.stream.received == counted
+    assert rig.simulation.stream.received == counted
     assert rig.state.failsafe
 
 
@@ -219,8 +219,8 @@ def test_any_source_and_a_version_1_frame_are_accepted():
         0, 1, 1, 128, [1, 0, 0, 0], 0.0, 0.0, 0.0, 0.0
     )
     for each in decode(bytes(message.pack(mav, force_mavlink1=True))):
-        rig.autopilot.handle(each, rig.autopilot.companion)
-    assert rig.autopilot.stream.received == 1
+        rig.simulation.handle(each, rig.simulation.companion)
+    assert rig.simulation.stream.received == 1
 
 
 @pytest.mark.parametrize("held", [nan, inf, -inf])
@@ -319,7 +319,7 @@ def test_short_nan_quaternion_is_survived():
 def test_without_forwarding_no_setpoint_counts():
     rig = Rig(parameters={"MAV_FWDEXTSP": 0})
     rig.rates()
-    assert rig.autopilot.stream.received == 0
+    assert rig.simulation.stream.received == 0
 
 
 def test_land_command_from_offboard():

@@ -75,10 +75,10 @@ def test_set_answers_with_the_value_in_force_and_acts():
 )
 def test_what_cannot_be_set_is_refused_and_changes_nothing(name, value, kind, error):
     rig = Rig()
-    before = dict(rig.autopilot.parameters._values)
+    before = dict(rig.simulation.parameters._values)
     write(rig, name, value, kind)
     assert rig.messages("PARAM_ERROR")[-1].error == error
-    assert rig.autopilot.parameters._values == before
+    assert rig.simulation.parameters._values == before
 
 
 def test_reading_what_does_not_exist():
@@ -132,7 +132,7 @@ def test_timesync_answers_with_its_nanoseconds_and_asks_too():
     rig = Rig()
     rig.say(dialect.MAVLink_timesync_message(0, 123456789))
     answer = rig.messages("TIMESYNC")[-1]
-    assert (answer.tc1, answer.ts1) == (rig.autopilot.time_us * 1000, 123456789)
+    assert (answer.tc1, answer.ts1) == (rig.simulation.time_us * 1000, 123456789)
     rig.say(dialect.MAVLink_timesync_message(5, 6))
     assert rig.messages("TIMESYNC")[-1] is answer
     rig.run(1.0)
@@ -150,13 +150,13 @@ def test_ping_and_mission_list():
 
 def test_only_mavlink_2_leaves_even_for_a_version_1_client():
     rig = Rig()
-    link = rig.autopilot.companion
+    link = rig.simulation.companion
     request = dialect.MAVLink_param_request_read_message(1, 1, b"MAV_TYPE", -1)
     version_1 = bytes(request.pack(dialect.MAVLink(None, 255, 190), force_mavlink1=True))
     for message in decode(version_1):
-        rig.autopilot.handle(message, link)
+        rig.simulation.handle(message, link)
     for _ in range(25):
-        rig.autopilot.tick()
+        rig.simulation.tick()
     frames = link.take()
     assert len(frames) > 10
     assert {frame[0] for frame in frames} == {0xFD}

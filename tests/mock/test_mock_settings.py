@@ -3,7 +3,7 @@
 import pytest
 
 from sitl_mock.__main__ import main
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.settings import MockSettings, load_settings
 
 MISTAKES = {

@@ -6,8 +6,8 @@ import pytest
 from mock_rig import Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.airframe import SigningConfig
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
+from sitl_mock.config.settings import SigningConfig
 from sitl_mock.link.framing import decode
 from sitl_mock.link.signing import Signing, key_from_passphrase, link_signing
 
@@ -40,8 +40,8 @@ def test_what_it_signs_pymavlink_accepts(tmp_path):
     rig = Rig(boot=False, signing={"passphrase_file": tmp_path / "phrase", "link_id": 5})
     judge = dialect.MAVLink(None)
     judge.signing.secret_key = KEY
-    rig.autopilot.boot()
-    frames = rig.autopilot.companion.take()
+    rig.simulation.boot()
+    frames = rig.simulation.companion.take()
     assert len(frames) > 5
     for frame in frames:
         assert judge.decode(bytearray(frame)).get_link_id() == 5
@@ -51,45 +51,45 @@ def test_what_it_signs_pymavlink_accepts(tmp_path):
 def test_it_admits_each_frame_of_the_right_key_once():
     signing, mav = ours(), signer()
     first, second = packed(mav, 1), packed(mav, 2)
-    assert signing.admits(first)
-    assert signing.admits(second)
-    assert not signing.admits(second)
-    assert not signing.admits(first)
+    assert signing.accepts(first)
+    assert signing.accepts(second)
+    assert not signing.accepts(second)
+    assert not signing.accepts(first)
     assert signing.counts() == {"accepted": 2, "unsigned": 0, "refused": 2}
 
 
 def test_another_key_or_none_is_refused_and_an_old_recording_too():
     signing = ours()
-    assert not signing.admits(packed(signer(bytes(32))))
-    assert not signing.admits(packed(signer(ticks=TICKS - 61 * 100_000)))
+    assert not signing.accepts(packed(signer(bytes(32))))
+    assert not signing.accepts(packed(signer(ticks=TICKS - 61 * 100_000)))
     unsigned = packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
-    assert not signing.admits(unsigned)
+    assert not signing.accepts(unsigned)
     assert signing.counts() == {"accepted": 0, "unsigned": 1, "refused": 2}
 
 
 def test_a_forged_stamp_does_not_silence_the_true_sender():
     signing = ours()
-    assert not signing.admits(packed(signer(bytes(32), ticks=TICKS + 10**9)))
-    assert signing.admits(packed(signer()))
+    assert not signing.accepts(packed(signer(bytes(32), ticks=TICKS + 10**9)))
+    assert signing.accepts(packed(signer()))
 
 
 def test_streams_have_stamps_of_their_own():
     signing = ours()
-    assert signing.admits(packed(signer(ticks=TICKS + 50, link_id=1)))
-    assert signing.admits(packed(signer(ticks=TICKS + 10, link_id=2)))
+    assert signing.accepts(packed(signer(ticks=TICKS + 50, link_id=1)))
+    assert signing.accepts(packed(signer(ticks=TICKS + 10, link_id=2)))
 
 
 def test_unsigned_frames_may_be_asked_for_wrongly_signed_ones_never():
     signing = Signing(KEY, 0, accept_unsigned=True, clock=lambda: NOW)
-    assert signing.admits(packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190)))
-    assert not signing.admits(packed(signer(bytes(32))))
+    assert signing.accepts(packed(dialect.MAVLink(None, srcSystem=255, srcComponent=190)))
+    assert not signing.accepts(packed(signer(bytes(32))))
 
 
 def test_only_what_is_signed_arms_the_vehicle(tmp_path):
     (tmp_path / "phrase").write_text(PASSPHRASE)
     rig = Rig(boot=False, prearm_delay_s=0.2, signing={"passphrase_file": tmp_path / "phrase"})
     rig.run(0.4)
-    clock = rig.autopilot.companion.signing._clock
+    clock = rig.simulation.companion.signing._clock
     ticks = int((clock() - 1420070400) * 100_000)
     for mav, armed in (
         (dialect.MAVLink(None, srcSystem=255, srcComponent=190), False),
@@ -97,7 +97,7 @@ def test_only_what_is_signed_arms_the_vehicle(tmp_path):
         (signer(ticks=ticks), True),
     ):
         [message] = decode(bytes(ARM.pack(mav)))
-        rig.autopilot.handle(message, rig.autopilot.companion)
+        rig.simulation.handle(message, rig.simulation.companion)
         assert rig.state.armed is armed
 
 
@@ -109,7 +109,7 @@ def test_ardupilot_obeys_what_is_unsigned_on_its_first_link_only(tmp_path):
         rig = Rig(boot=False, autopilot="ardupilot", gcs_port=14550, signing=signing)
         unsigned = ARM.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
         [message] = decode(bytes(unsigned))
-        assert [link.signing.admits(message) for link in rig.autopilot.links] == obeyed
+        assert [link.signing.accepts(message) for link in rig.simulation.links] == obeyed
 
 
 def test_a_passphrase_that_cannot_be_used_is_one_clear_error(tmp_path):

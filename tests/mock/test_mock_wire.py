@@ -79,7 +79,7 @@ def test_10000_random_and_mutated_datagrams_change_nothing():
         datagram = mutated(rng, valid)
         for message in decode(datagram):
             passed += 1
-            rig.autopilot.handle(message, rig.autopilot.companion)
+            rig.simulation.handle(message, rig.simulation.companion)
         if number % 100 == 0:
             rig.run(0.004)
             twin.run(0.004)
@@ -88,9 +88,9 @@ def test_10000_random_and_mutated_datagrams_change_nothing():
     assert rig.truth.position_ned == twin.truth.position_ned
     assert rig.state.armed == twin.state.armed
     assert rig.state.mode == twin.state.mode
-    parameters = rig.autopilot.parameters
+    parameters = rig.simulation.parameters
     assert {n: parameters[n] for n in parameters} == {
-        n: twin.autopilot.parameters[n] for n in parameters
+        n: twin.simulation.parameters[n] for n in parameters
     }
 
 
@@ -101,5 +101,5 @@ def test_every_known_message_with_arbitrary_contents_is_survived():
     for _ in range(5):
         for kind in dialect.mavlink_map.values():
             for message in decode(framer.frame(arbitrary(kind, rng))):
-                rig.autopilot.handle(message, rig.autopilot.companion)
+                rig.simulation.handle(message, rig.simulation.companion)
     rig.run(1.0)

@@ -9,7 +9,7 @@ import pytest
 from mock_process import HOST, ask, free_port, is_free, mock_process
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.config.errors import ConfigError
+from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
 from sitl_mock.link.framing import Framer, decode, split
 from sitl_mock.link.serial_endpoint import SerialEndpoint
@@ -133,7 +133,7 @@ def test_a_link_that_cannot_be_made_is_one_clear_error(tmp_path):
 
 @pytest.mark.parametrize("bad", ["tcp://127.0.0.1:1", "tcpin://h", "tcpin://h:70000", "serial://a"])
 def test_an_endpoint_that_is_none_is_one_clear_error(bad):
-    with pytest.raises(ConfigError, match=r"mock\.endpoint: this is no endpoint: write udp"):
+    with pytest.raises(ConfigError, match=r"mock\.endpoint: not an endpoint; write udp"):
         load_settings(None, {"endpoint": bad})
 
 

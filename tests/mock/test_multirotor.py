@@ -4,7 +4,8 @@ from math import nan
 
 import pytest
 
-from sitl_mock.config.airframe import AirframeConfig, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
 
 AIRFRAME = AirframeConfig(drag_n_s_per_m=0.0)

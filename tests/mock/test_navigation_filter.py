@@ -10,7 +10,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from sitl_mock.config.ekf import EKFS
+from sitl_mock.config.sensors import EKFS
 from sitl_mock.physics.navigation_filter import NavigationFilter, Snapshot
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings

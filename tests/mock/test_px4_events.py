@@ -22,7 +22,7 @@ class Listener(Rig):
         super().__init__(gcs=False, **settings)
 
     def _take(self):
-        for frame in self.autopilot.companion.outbox:
+        for frame in self.simulation.companion.outbox:
             self.raw.append((self.time, int.from_bytes(frame[7:10], "little"), frame[10:-2]))
         super()._take()
 
@@ -48,7 +48,7 @@ class Listener(Rig):
         before = len(self.raw)
         payload = struct.pack("<HHBB", first & 0xFFFF, last & 0xFFFF, 1, 1)
         for message in decode(self.framer.frame_raw(412, 33, payload)):
-            self.autopilot.handle(message, self.autopilot.companion)
+            self.simulation.handle(message, self.simulation.companion)
         self._take()
         came = [struct.unpack_from("<H", p.ljust(53, b"\0"), 8)[0]
                 for _, number, p in self.raw[before:] if number == EVENT]  # fmt: skip
@@ -63,7 +63,7 @@ def flown():
     rig = Listener(quick=False, prearm_delay_s=4.5, parameters={"MPC_TKO_SPEED": 3.0})
     rig.run(3.0)
     rig.landmarks = {"ready": rig.time}
-    rig.autopilot.parameters.set("MIS_TAKEOFF_ALT", 3.0)
+    rig.simulation.parameters.set("MIS_TAKEOFF_ALT", 3.0)
     assert rig.mode(4, 2) == ACCEPTED
     rig.landmarks["arm"] = rig.time
     assert rig.arm() == ACCEPTED

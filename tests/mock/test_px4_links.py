@@ -27,7 +27,7 @@ class Piloted(Rig):
 
     def set(self, **parameters):
         for name, value in parameters.items():
-            self.autopilot.parameters.set(name, value)
+            self.simulation.parameters.set(name, value)
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,7 @@ def flying():
     rig = Piloted()
     rig.set(**QUICK)
     rig.take_off(9.0)
-    rig.defaults = {name: rig.autopilot.parameters[name] for name in rig.autopilot.parameters}
+    rig.defaults = {name: rig.simulation.parameters[name] for name in rig.simulation.parameters}
     return rig
 
 

@@ -12,9 +12,10 @@ from scipy.optimize import curve_fit
 from scipy.spatial.transform import Rotation
 
 from sitl_mock.__main__ import main
-from sitl_mock.config.airframe import AirframeConfig, AxisShaping, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
-from sitl_mock.physics.rate_shaping import RateShaping, closing
+from sitl_mock.physics.rate_shaping import RateShaping, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
 
@@ -162,12 +163,16 @@ def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
 
 def test_angles_are_closed_in_proportion_then_as_they_can_be_stopped():
     """ArduPilot's sqrt_controller: the slope goes on steadily, the rate grows with the root."""
-    assert closing(0.1, 4.5, 2.356) == pytest.approx(0.45)
+    assert sqrt_controller(0.1, 4.5, 2.356) == pytest.approx(0.45)
     edge = 2.356 / 4.5**2
-    assert closing(edge + 1e-6, 4.5, 2.356) == pytest.approx(closing(edge, 4.5, 2.356), abs=1e-5)
-    assert closing(-1.0, 4.5, 2.356) == -closing(1.0, 4.5, 2.356)
-    assert closing(1.0, 4.5, 2.356) == pytest.approx(np.sqrt(2.0 * 2.356 * (1.0 - edge / 2.0)))
-    assert closing(1.0, 0.0, 2.356) == 0.0
+    assert sqrt_controller(edge + 1e-6, 4.5, 2.356) == pytest.approx(
+        sqrt_controller(edge, 4.5, 2.356), abs=1e-5
+    )
+    assert sqrt_controller(-1.0, 4.5, 2.356) == -sqrt_controller(1.0, 4.5, 2.356)
+    assert sqrt_controller(1.0, 4.5, 2.356) == pytest.approx(
+        np.sqrt(2.0 * 2.356 * (1.0 - edge / 2.0))
+    )
+    assert sqrt_controller(1.0, 0.0, 2.356) == 0.0
 
 
 RECORDED = Path(__file__).parent / "recordings" / "ardupilot-attitude-target.npz"

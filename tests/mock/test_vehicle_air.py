@@ -7,7 +7,7 @@ import pytest
 
 from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.physics.battery import Battery
-from sitl_mock.physics.wind import Wind
+from sitl_mock.physics.environment import Wind
 
 STEP = 0.01
 HOVER_N = 9.80665

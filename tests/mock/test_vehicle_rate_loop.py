@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from sitl_mock.config.airframe import AirframeConfig, AxisGains, RateLoopConfig, SensorConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
+from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.rate_loop import AT_REST, RateLoop, axis_law, axis_step
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 

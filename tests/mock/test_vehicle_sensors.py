@@ -7,7 +7,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
-from sitl_mock.config import airframe as config
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
+from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.quaternion import yaw
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
@@ -24,7 +26,7 @@ TURNING = ActuatorCommand(True, 0.6, -0.4, 0.5, 0.62)
 
 
 def sensing(**changes):
-    return config.SensorConfig(**(PERFECT | changes))
+    return SensorConfig(**(PERFECT | changes))
 
 
 def airborne(sensors=None, seed=0, **options):
@@ -69,7 +71,7 @@ def test_delays_show_the_past():
 
 
 def test_noise_has_the_configured_spread():
-    sensors = config.SensorConfig(
+    sensors = SensorConfig(
         attitude_noise_deg=0.5,
         rate_noise_rad_s=0.03,
         position_noise_m=0.2,
@@ -112,7 +114,7 @@ def test_an_estimator_reset_moves_the_estimate_and_not_the_vehicle():
 
 
 def test_a_flight_is_a_function_of_the_seed():
-    gusty = {"wind": config.WindConfig(gust_m_s=1.0)}
+    gusty = {"wind": WindConfig(gust_m_s=1.0)}
     first, again, other = (airborne(seed=seed, **gusty) for seed in (7, 7, 8))
     assert first.truth == again.truth
     assert first.estimate() == again.estimate()
@@ -120,7 +122,7 @@ def test_a_flight_is_a_function_of_the_seed():
 
 
 def test_estimating_draws_sensor_noise_and_nothing_else():
-    gusty = {"wind": config.WindConfig(gust_m_s=1.0)}
+    gusty = {"wind": WindConfig(gust_m_s=1.0)}
     asked, quiet = airborne(**gusty), airborne(**gusty)
     assert asked.estimate() != asked.estimate()
     quiet.estimate()
@@ -135,7 +137,7 @@ def test_estimating_draws_sensor_noise_and_nothing_else():
 
 @pytest.mark.parametrize("rate_hz", [1000, 2500])
 def test_time_is_the_count_of_steps(rate_hz):
-    vehicle = Vehicle(config.AirframeConfig(physics_rate_hz=rate_hz), seed=0)
+    vehicle = Vehicle(AirframeConfig(physics_rate_hz=rate_hz), seed=0)
     for step in range(1, 701):
         vehicle.step(ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0))
         assert vehicle.time == step / rate_hz
@@ -144,7 +146,7 @@ def test_time_is_the_count_of_steps(rate_hz):
 
 def test_the_step_does_not_change_the_flight():
     coarse, fine = (
-        Vehicle(config.AirframeConfig(physics_rate_hz=rate), sensors=sensing(), seed=0)
+        Vehicle(AirframeConfig(physics_rate_hz=rate), sensors=sensing(), seed=0)
         for rate in (1000, 4000)
     )
     for vehicle in (coarse, fine):
@@ -158,14 +160,14 @@ def test_the_step_does_not_change_the_flight():
 @pytest.mark.parametrize(
     ("section", "values"),
     [
-        (config.AirframeConfig, {"mass": 1.0}),
-        (config.AirframeConfig, {"mass_kg": 0.0}),
-        (config.AirframeConfig, {"physics_rate_hz": 500}),
-        (config.AirframeConfig, {"inertia_kg_m2": (0.1, float("nan"), 0.1)}),
-        (config.WindConfig, {"gust_m_s": -1.0}),
-        (config.BatteryConfig, {"initial_remaining": 1.5}),
-        (config.SensorConfig, {"attitude_delay_ms": float("inf")}),
-        (config.RateLoopConfig, {"roll": {"proportional": 1.0}}),
+        (AirframeConfig, {"mass": 1.0}),
+        (AirframeConfig, {"mass_kg": 0.0}),
+        (AirframeConfig, {"physics_rate_hz": 500}),
+        (AirframeConfig, {"inertia_kg_m2": (0.1, float("nan"), 0.1)}),
+        (WindConfig, {"gust_m_s": -1.0}),
+        (BatteryConfig, {"initial_remaining": 1.5}),
+        (SensorConfig, {"attitude_delay_ms": float("inf")}),
+        (RateLoopConfig, {"roll": {"proportional": 1.0}}),
     ],
 )
 def test_impossible_configuration_is_refused(section, values):

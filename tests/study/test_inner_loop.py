@@ -17,7 +17,8 @@ from companion.attitude import (
     make_planner,
 )
 from companion.study.inner_loop import InnerLoop
-from sitl_mock.config.airframe import AirframeConfig, AxisGains, RateLoopConfig
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from tests.attitude.independent import coefficients_of
 from tests.attitude.simulate import fly as fly_ideally
 from tests.attitude.simulate import rotation

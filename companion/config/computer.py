@@ -1,0 +1,79 @@
+"""The companion computer: its link to the autopilot, its scheduler, its disk."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, StrictBool, model_validator
+
+from companion.files.yaml_file import PathKey, Section
+
+
+class LinkConfig(Section):
+    """How to reach the autopilot."""
+
+    backend: Literal["direct", "mavsdk"] = "direct"
+    """direct: our own connection. mavsdk: MAVSDK holds the connection and carries our frames (extra
+    `mavsdk`)."""
+    endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
+    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD; udpin and
+    tcpin also take ?peer=HOST[:PORT], to hear no other."""
+    target_system: Annotated[int, Field(ge=1, le=255)] = 1
+    """System id of the autopilot; every other system is ignored."""
+    target_component: Annotated[int, Field(ge=1, le=255)] = 1
+    """Component id of the autopilot."""
+    source_system: Annotated[int, Field(ge=1, le=255)] = 1
+    """Our own system id; a companion computer shares its vehicle's."""
+    source_component: Annotated[int, Field(ge=1, le=255)] = 191
+    """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
+    signing_key_file: PathKey | None = None
+    """File whose first line is the signing passphrase. With it we sign every message and refuse
+    unsigned ones."""
+    lockstep: StrictBool = False
+    """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
+    attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
+    """Rate requested for ATTITUDE_QUATERNION. The loop runs at the rate that arrives."""
+    min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
+    """Refuse to fly if less than this arrives."""
+    position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
+    """Rate requested for LOCAL_POSITION_NED."""
+    min_position_rate_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 10.0
+    """Refuse to fly if less than this arrives."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "LinkConfig":
+        if self.min_attitude_rate_hz > self.attitude_rate_hz:
+            raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
+        if self.min_position_rate_hz > self.position_rate_hz:
+            raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
+        if self.backend == "mavsdk" and (self.lockstep or self.signing_key_file is not None):
+            raise ValueError("backend: mavsdk can neither fly in lockstep nor sign; use direct")
+        ours, theirs = self.source_component, self.target_component
+        if (self.source_system, ours) == (self.target_system, theirs):
+            raise ValueError("source_system and source_component are the autopilot's own")
+        return self
+
+
+class RealtimeConfig(Section):
+    """Real-time settings that the system grants or refuses; the flight reports which."""
+
+    scheduler: Literal["other", "fifo"] = "other"
+    """other: the normal scheduler. fifo: SCHED_FIFO, which runs before all normal programs."""
+    priority: Annotated[int, Field(ge=1, le=90)] = 50
+    """Priority of fifo. The kernel's interrupt threads have 50, its watchdogs more than 90."""
+    cpu_affinity: Annotated[
+        tuple[Annotated[int, Field(ge=0, le=1023)], ...], Field(max_length=1024)
+    ] = ()
+    """Processors to run on, numbered from 0. Empty: any."""
+    lock_memory: StrictBool = False
+    """Lock the program's memory in RAM, so that a step never waits for the disk."""
+    freeze_gc: StrictBool = False
+    """Switch the garbage collector off in flight. Its work is done after the flight."""
+    required: StrictBool = False
+    """Refuse to fly unless every requested setting is granted."""
+
+
+class RecordingConfig(Section):
+    """Recording of flights."""
+
+    directory: PathKey = Path("flights")
+    """Folder in which each flight makes its own folder."""

@@ -1,0 +1,82 @@
+"""The attitude law, and the guidance above it."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from companion.attitude import PLANNER_NAMES
+from companion.config.units import Si
+from companion.drag import Drag
+from companion.files.yaml_file import Section
+
+AUTO = "auto"
+
+
+class PlannerConfig(Section):
+    """The attitude law."""
+
+    name: Annotated[
+        str, Field(max_length=50, json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})
+    ] = AUTO
+    """auto: model-following where `vehicle` tells how the rate loop answers, else first-order.
+    first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
+    error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
+    needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
+    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
+    """p: the acceleration approaches its target with time constant 1/p."""
+    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
+    """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
+    use gain_per_s for it."""
+
+    @model_validator(mode="after")
+    def _known_name(self) -> "PlannerConfig":
+        if self.name not in (AUTO, *PLANNER_NAMES):
+            known = ", ".join((AUTO, *PLANNER_NAMES))
+            raise ValueError(f"unknown planner {self.name!r}; known: {known}")
+        return self
+
+
+class GuidanceConfig(Section):
+    """Guidance: turns a reference into attitude targets, without lag."""
+
+    kind: Literal["linear", "nmpc"] = "linear"
+    """linear, or nmpc: nonlinear model predictive control follows trajectories, in a process of
+    its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
+    rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
+    """Rate at which guidance computes a new target."""
+    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
+    """Weight of the horizontal position error against the acceleration spent on it; a larger one
+    makes a stiffer hold. The gains follow from it (LQR). null: 2/T⁴ where dead time and
+    half the lag are 65 ms at most, 1/T⁴ from 80 ms on or where they are not known; T is the
+    delay of the attitude by planner.gain_per_s, `vehicle` (0.12 s where it is not known) and
+    half a period of guidance."""
+    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
+    """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
+    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
+    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
+    null: 1.5/T."""
+    position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
+    that is set wrong. Measure it against an independent position."""
+    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0)] = 6.0
+    """Largest acceleration by wind that the observer estimates."""
+    lead: bool = True
+    """Lead the targets by the known attitude response, so that the vehicle does not lag."""
+    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 1.5
+    """Vertical speed commanded per metre of height error."""
+    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 3.5
+    """Vertical acceleration commanded per m/s of vertical speed error."""
+    drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
+    """Linear drag per mass, for feedforward. null: unknown. The flight estimates it, and the
+    vehicle's next flight begins with the estimate."""
+    quadratic_drag_per_m: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Quadratic drag per mass, used with drag_per_s: the drag decelerates the vehicle by
+    (drag_per_s + quadratic_drag_per_m·speed)·speed."""
+
+    position_lateness = Si("position_lateness_ms")
+
+    @property
+    def drag(self) -> Drag | None:
+        """The drag as far as it is told."""
+        told = self.drag_per_s
+        return None if told is None else Drag(told, self.quadratic_drag_per_m)

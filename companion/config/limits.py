@@ -1,0 +1,87 @@
+"""Limits of what is asked of the vehicle, and of how old data may be."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from companion.config.units import Si
+from companion.files.yaml_file import Section
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class LimitsConfig(Section):
+    """Limits of what the program commands, and the fence."""
+
+    max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 35.0
+    """Largest tilt of a target. A larger target keeps its direction and is shortened."""
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 90.0
+    """Largest combined roll and pitch rate: √(roll² + pitch²)."""
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 60.0
+    """Largest yaw rate."""
+    rate_limit: Literal["tight", "paper"] = "tight"
+    """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
+    recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
+    """Beyond this tilt the planner first rotates the thrust axis upright, the shortest way (not
+    quaternion, so3 and euler)."""
+    min_thrust: Share = 0.1
+    """Smallest normalised thrust commanded in flight."""
+    max_thrust: Share = 0.9
+    """Largest normalised thrust commanded."""
+    max_climb_m_s: Annotated[float, Field(ge=0.1, le=20.0)] = 2.0
+    """Largest climb rate that height hold commands."""
+    max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    """Largest descent rate that height hold commands."""
+    fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
+    """Fence: largest distance from where control began. Beyond it the vehicle lands."""
+    fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
+    """Fence: largest height above where control began."""
+    fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
+    """Fence: smallest height above home. Below it the vehicle lands."""
+    min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
+    """Below this battery charge the program does not arm, and lands in flight."""
+
+    max_tilt = Si("max_tilt_deg")
+    max_tilt_rate = Si("max_tilt_rate_deg_s")
+    max_yaw_rate = Si("max_yaw_rate_deg_s")
+    recovery_angle = Si("recovery_angle_deg")
+    min_battery = Si("min_battery_percent")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "LimitsConfig":
+        if self.max_tilt_deg > self.recovery_angle_deg:
+            raise ValueError("max_tilt_deg must not exceed recovery_angle_deg")
+        if self.min_thrust >= self.max_thrust:
+            raise ValueError("min_thrust must be below max_thrust")
+        return self
+
+
+class DeadmanConfig(Section):
+    """How old data may be. A setpoint leaves only in answer to fresh data."""
+
+    telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
+    """Largest age of an attitude sample that is answered. Without TIMESYNC the age counts from the
+    quickest sample."""
+    target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
+    """Largest age of the guidance target. With an older one no sample is answered."""
+    position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
+    """Largest age of the position, by its arrival and by its time stamp. With an older one guidance
+    stops, and so do the setpoints."""
+    silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
+    """After this long without a setpoint the program hands back. Keep it below the autopilot's own
+    limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
+    deadline_ms: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
+    """Longest time from the arrival of a sample to its setpoint (over TCP and serial: from reading
+    it). A later setpoint counts as a missed deadline."""
+
+    telemetry_stale = Si("telemetry_stale_ms")
+    target_stale = Si("target_stale_ms")
+    position_stale = Si("position_stale_ms")
+    silence_limit = Si("silence_limit_ms")
+    deadline = Si("deadline_ms")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "DeadmanConfig":
+        if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
+            raise ValueError("silence_limit_ms must be at least as long as the stale limits")
+        return self

@@ -1,0 +1,144 @@
+"""The vehicle: how its rate loop answers, and which thrust it hovers at."""
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, StrictBool
+
+from companion.config.limits import Share
+from companion.config.units import DEG, MS, scaled
+from companion.files.yaml_file import Section
+
+Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
+Damping = Annotated[float, Field(ge=0.3, le=10.0)]
+AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
+
+
+class AxisKeys(NamedTuple):
+    """How one axis of the rate loop answers; None: not known, or no limit, or of first order."""
+
+    lag_ms: float | None
+    dead_time_ms: float | None
+    acceleration_limit_deg_s2: float | None
+    damping: float | None
+
+    @property
+    def lag(self) -> float | None:
+        """Time constant, s."""
+        return scaled(self.lag_ms, MS)
+
+    @property
+    def dead_time(self) -> float | None:
+        """Dead time, s."""
+        return scaled(self.dead_time_ms, MS)
+
+    @property
+    def acceleration_limit(self) -> float | None:
+        """Slew limit of the rate, rad/s²."""
+        return scaled(self.acceleration_limit_deg_s2, DEG)
+
+    def but(self, *keys: float | None) -> "AxisKeys":
+        """These, but for the `keys` that are not None; an axis with a lag has its own damping."""
+        mine = self if keys[0] is None else self._replace(damping=None)
+        return AxisKeys(*(a if b is None else b for a, b in zip(mine, keys, strict=True)))
+
+
+class VehicleConfig(Section):
+    """Response of the vehicle's rate loop, which `model-following` plans with."""
+
+    lag_ms: Milliseconds | None = None
+    """Time constant of the roll rate after its dead time. For a second-order response it is
+    2·damping/frequency."""
+    dead_time_ms: Milliseconds | None = None
+    """Time from an attitude sample to the first effect of its setpoint on the roll rate."""
+    acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """Slew limit of the autopilot's roll rate target (ArduPilot). null: none (PX4)."""
+    damping: Damping | None = None
+    """Damping ratio of a second-order roll rate response. null: first order."""
+    pitch_lag_ms: Milliseconds | None = None
+    """As lag_ms, for pitch. null: as roll."""
+    pitch_dead_time_ms: Milliseconds | None = None
+    """As dead_time_ms, for pitch. null: as roll."""
+    pitch_acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """As acceleration_limit_deg_s2, for pitch. null: as roll."""
+    pitch_damping: Damping | None = None
+    """As damping, for pitch. null: as roll where pitch_lag_ms is null, else first order."""
+    yaw_lag_ms: Milliseconds | None = None
+    """As lag_ms, for yaw. null: as roll."""
+    yaw_dead_time_ms: Milliseconds | None = None
+    """As dead_time_ms, for yaw. null: as roll."""
+    yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
+    """As acceleration_limit_deg_s2, for yaw. null: as roll."""
+    yaw_frame_lead_ms: Milliseconds | None = None
+    """Time by which the axes of the commanded rates lead the body in yaw. ArduPilot applies rates
+    along its attitude target, which leads the body. Used only while ATTITUDE_TARGET is missing.
+    null: derived from the times above if there is a slew limit (ArduPilot), else 0 (PX4)."""
+
+    @property
+    def known(self) -> bool:
+        """Whether `model-following` can plan with it."""
+        return self.lag_ms is not None and self.dead_time_ms is not None
+
+    @property
+    def axes(self) -> "dict[str, AxisKeys]":
+        """What is known of roll, pitch and yaw, by name; what is null of the last two is roll's."""
+        roll = AxisKeys(
+            self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
+        )
+        pitch = (
+            self.pitch_lag_ms,
+            self.pitch_dead_time_ms,
+            self.pitch_acceleration_limit_deg_s2,
+            self.pitch_damping,
+        )
+        yaw = self.yaw_lag_ms, self.yaw_dead_time_ms, self.yaw_acceleration_limit_deg_s2, None
+        first_order = roll._replace(damping=None)
+        return {"roll": roll, "pitch": roll.but(*pitch), "yaw": first_order.but(*yaw)}
+
+    @property
+    def response(self) -> dict[str, float]:
+        """The options of `make_planner`, in SI units; keys that are null are left out."""
+        options = {
+            "lag": scaled(self.lag_ms, MS),
+            "dead_time": scaled(self.dead_time_ms, MS),
+            "acceleration": scaled(self.acceleration_limit_deg_s2, DEG),
+            "damping": self.damping,
+            "pitch_lag": scaled(self.pitch_lag_ms, MS),
+            "pitch_dead_time": scaled(self.pitch_dead_time_ms, MS),
+            "pitch_acceleration": scaled(self.pitch_acceleration_limit_deg_s2, DEG),
+            "pitch_damping": self.pitch_damping,
+            "yaw_lag": scaled(self.yaw_lag_ms, MS),
+            "yaw_dead_time": scaled(self.yaw_dead_time_ms, MS),
+            "yaw_acceleration": scaled(self.yaw_acceleration_limit_deg_s2, DEG),
+            "frame_lead": scaled(self.yaw_frame_lead_ms, MS),
+        }
+        return {name: value for name, value in options.items() if value is not None}
+
+
+class ThrustConfig(Section):
+    """Conversion of specific thrust in m/s² to the normalised thrust 0..1 of MAVLink."""
+
+    hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
+    """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER, ArduPilot:
+    MOT_THST_HOVER)."""
+    correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
+    """Largest correction of hover_thrust in flight: with 0.8 up to 1.8 times, down to 1/1.8."""
+    correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
+    """Time constant with which the correction follows a slow change. An initial error is
+    corrected at
+    once."""
+    curve_factor: Share = 0.0
+    """f in thrust = f·u² + (1 − f)·u. 0 where the autopilot linearises the thrust itself (PX4:
+    THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
+    battery_exponent: Annotated[float, Field(ge=0.0, le=3.0)] = 2.0
+    """Thrust is proportional to the battery voltage to this power. 0: the autopilot compensates the
+    voltage, or does not measure it."""
+    lag_ms: Milliseconds | None = None
+    """Time constant of the rotors' thrust, which guidance compensates. null: unknown."""
+    autopilot_compensates_tilt: StrictBool = False
+    """Whether the autopilot divides thrust by cos(tilt) itself (ArduPilot: ATC_ANGLE_BOOST). PX4
+    does not."""
+
+    @property
+    def lag(self) -> float:
+        """Time constant of the rotors' thrust, s; 0 where it is not known."""
+        return scaled(self.lag_ms, MS) or 0.0

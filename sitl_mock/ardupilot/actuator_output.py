@@ -1,0 +1,95 @@
+"""From attitude or rates, with thrust, to the command of the rate loop and the rotors."""
+
+from collections.abc import Callable
+from math import cos, radians
+
+from sitl_mock.ardupilot.guided import Guided, Task
+from sitl_mock.ardupilot.hold import PositionHold
+from sitl_mock.ardupilot.thrust import specific_thrust
+from sitl_mock.autopilot.attitude_control import AttitudeGains, attitude_rates, body_z
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.position_control import PositionOutput
+from sitl_mock.autopilot.state import Mode, State
+from sitl_mock.physics.quaternion import Quaternion, Vector
+from sitl_mock.physics.vehicle import ActuatorCommand
+
+LEARNING_S = 10.0
+"""MOT_THST_HOVER follows the thrust of a quiet hover with this time constant."""
+
+
+# The rate loop shapes rates; ArduPilot shapes the attitude that its own modes ask. Yaw's answer is
+# slow to begin, so that more than this would swing.
+_GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
+
+
+class ActuatorOutput:
+    """Commands the rate loop and the rotors, and learns the hover thrust.
+
+    Args:
+        state: the autopilot's state; the echo of the attitude target is written here.
+        parameters: MOT_THST_HOVER is learned.
+        guided: during its take-off the rotors turn on the ground.
+        hold: its climb rate tells whether the vehicle hovers.
+        throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        guided: Guided,
+        hold: PositionHold,
+        throttle: Callable[[float], float],
+    ) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._guided = guided
+        self._hold = hold
+        self._throttle = throttle
+        self.thrust = 0.0
+        """Commanded latest, 0..1, without the angle boost."""
+
+    @property
+    def taking_off(self) -> bool:
+        """Whether GUIDED takes off."""
+        return self._state.mode is Mode.GUIDED and self._guided.task is Task.TAKE_OFF
+
+    @property
+    def cos_tilt(self) -> float:
+        """Cosine of the angle between the body's down axis and the vertical."""
+        return body_z(self._state.estimate.q)[2]
+
+    def hover_throttle(self) -> float:
+        """Return the rotors' throttle at MOT_THST_HOVER."""
+        return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
+
+    def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
+        """Return the command for what the position controller asked in the last ``dt`` s."""
+        self.thrust = output.thrust
+        self._learn_hover(output, dt)
+        return self.attitude(output.q, output.thrust)
+
+    def _learn_hover(self, output: PositionOutput, dt: float) -> None:
+        """Follow the thrust of a quiet, level hover, as MOT_HOVER_LEARN asks."""
+        state, parameters = self._state, self._parameters
+        quiet = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
+        if parameters["MOT_HOVER_LEARN"] and quiet and self.cos_tilt > cos(radians(5.0)):
+            hover = float(parameters["MOT_THST_HOVER"])
+            change = dt / LEARNING_S * (output.thrust - hover)
+            parameters.set("MOT_THST_HOVER", hover + change)
+
+    def attitude(self, target: Quaternion, thrust: float) -> ActuatorCommand:
+        """Return the command that turns to an attitude, with ArduPilot's normalised thrust."""
+        self._state.attitude_target.q = target
+        self._state.attitude_target.thrust = self.thrust
+        return self.rates(self.rates_towards(target), thrust)
+
+    def rates_towards(self, target: Quaternion) -> Vector:
+        """Return the body rates that turn to an attitude, rad/s."""
+        return attitude_rates(self._state.estimate.q, target, 0.0, _GAINS)
+
+    def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
+        """Return the command for rates (rad/s) and ArduPilot's normalised thrust; 0 idles."""
+        flying = not self._state.landed or self.taking_off
+        throttle = self._throttle(specific_thrust(thrust)) if flying else 0.0
+        return ActuatorCommand(True, *rates, throttle)

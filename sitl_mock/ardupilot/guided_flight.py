@@ -1,0 +1,140 @@
+"""How ArduCopter flies in GUIDED: take-off, setpoints of attitude or position, hold."""
+
+from math import isnan
+
+from sitl_mock.ardupilot.actuator_output import ActuatorOutput
+from sitl_mock.ardupilot.guided import Guided, Task
+from sitl_mock.ardupilot.hold import PositionHold, approach_speed
+from sitl_mock.ardupilot.thrust import angle_boosted, climb_rate_of_setpoint, thrust_of_setpoint
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.position_control import PositionDemand
+from sitl_mock.autopilot.setpoints import AttitudeSetpoint
+from sitl_mock.autopilot.state import State
+from sitl_mock.physics.quaternion import along_heading, from_yaw
+from sitl_mock.physics.vehicle import ActuatorCommand
+
+THRUST_IS_THRUST = 8
+"""Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
+SPOOL_UP_US = 2_000_000
+"""From NAV_TAKEOFF to the rotors' being ready to lift (recorded: it lifts off after 2.3 s)."""
+ARRIVAL_ACCELERATION = 0.55
+"""A take-off slows down by this, m/s^2 (recorded)."""
+ARRIVED_M = 0.1
+_SLOWEST_ARRIVAL = 0.1
+
+
+class GuidedFlight:
+    """Flies the task of GUIDED.
+
+    Args:
+        state: the autopilot's state.
+        parameters: speeds and options.
+        guided: the task.
+        hold: holds a point, a heading and a height.
+        output: commands the rate loop and the rotors.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        guided: Guided,
+        hold: PositionHold,
+        output: ActuatorOutput,
+    ) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._guided = guided
+        self._hold = hold
+        self._output = output
+        self._spooling_since_us = 0
+        self._silent = False
+
+    def command(self, dt: float) -> ActuatorCommand:
+        """Return the command for the next ``dt`` s."""
+        guided = self._guided
+        began, guided.changed = guided.changed, False
+        if began:
+            self._hold.begin()
+            self._spooling_since_us = self._state.time_us
+        if guided.task is Task.TAKE_OFF:
+            return self._take_off(dt)
+        if guided.task is Task.ANGLE and guided.angle is not None:
+            return self._follow_angle(guided.angle, dt, began=began)
+        if guided.task is Task.POSITION:
+            return self._follow_position(dt)
+        return self._output.follow(self._hold.step(0.0, dt), dt)
+
+    def _take_off(self, dt: float) -> ActuatorCommand:
+        state, guided = self._state, self._guided
+        if state.landed and state.time_us - self._spooling_since_us < SPOOL_UP_US:
+            self._hold.begin()
+            return self._output.rates((0.0, 0.0, 0.0), 0.0)
+        left = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
+        fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
+        speed = max(_SLOWEST_ARRIVAL, approach_speed(left, ARRIVAL_ACCELERATION, fastest))
+        if left < ARRIVED_M:
+            guided.arrive()
+        return self._output.follow(self._hold.step(speed, dt), dt)
+
+    def _follow_angle(self, asked: AttitudeSetpoint, dt: float, *, began: bool) -> ActuatorCommand:
+        """Fly rates or an attitude; once they are silent, level and without climbing."""
+        state, parameters = self._state, self._parameters
+        state.position_controlled = False
+        was_silent = self._silent and not began
+        self._silent = self._guided.silent(state.time_us, parameters["GUID_TIMEOUT"])
+        as_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_IS_THRUST)
+        climbs = self._silent or not as_thrust
+        state.height_controlled = climbs
+        if self._silent and not was_silent:
+            self._hold.begin()
+        if climbs:
+            up = 0.01 * parameters["WPNAV_SPEED_UP"]
+            down = 0.01 * parameters["WPNAV_SPEED_DN"]
+            climb = 0.0 if self._silent else climb_rate_of_setpoint(asked.thrust, up, down)
+            thrust = self._hold.step(climb, dt, level=True).thrust
+            state.position_target.active = False
+        else:
+            thrust = thrust_of_setpoint(asked.thrust)
+        self._output.thrust = state.attitude_target.thrust = thrust
+        # What a climb needs is boosted in any case; what was asked as thrust, if it is so set.
+        if climbs or parameters["ATC_ANGLE_BOOST"]:
+            thrust = angle_boosted(thrust, self._output.cos_tilt)
+        if self._silent:
+            return self._output.attitude(from_yaw(self._hold.yaw), thrust)
+        rates = asked.rates or (0.0, 0.0, 0.0)
+        if asked.q is None:
+            state.attitude_target.q = state.estimate.q
+            return self._output.rates(rates, thrust)
+        p, q, r = self._output.rates_towards(asked.q)
+        state.attitude_target.q = asked.q
+        return self._output.rates((p + rates[0], q + rates[1], r + rates[2]), thrust)
+
+    def _follow_position(self, dt: float) -> ActuatorCommand:
+        guided, parameters = self._guided, self._parameters
+        asked = guided.position
+        moves = asked is not None and isnan(asked.position[0])
+        if asked is None or (
+            moves and guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
+        ):
+            guided.hold()
+            return self._output.follow(self._hold.step(0.0, dt), dt)
+        hold = self._hold
+        if not isnan(asked.yaw):
+            hold.yaw = asked.yaw
+        elif not isnan(asked.yaw_rate):
+            hold.yaw += asked.yaw_rate * dt
+        velocity, acceleration = asked.velocity, asked.acceleration
+        if asked.in_body_heading:
+            q = self._state.estimate.q
+            velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
+        demand = PositionDemand(
+            asked.position,
+            velocity,
+            acceleration,
+            hold.yaw,
+            0.01 * parameters["WPNAV_SPEED"],
+            0.01 * parameters["WPNAV_SPEED_UP"],
+            0.01 * parameters["WPNAV_SPEED_DN"],
+        )
+        return self._output.follow(hold.follow(demand, dt), dt)

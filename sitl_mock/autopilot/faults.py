@@ -1,0 +1,214 @@
+"""Which faults are active, and what they do to the vehicle."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan, radians
+
+from pymavlink.dialects.v20 import ardupilotmega
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.autopilot.commander import Commander, ModeControl
+from sitl_mock.autopilot.state import Mode, State
+from sitl_mock.config.faults import (
+    EstimatorReset,
+    FreezeClock,
+    GpsLoss,
+    LinkFault,
+    LowBattery,
+    NanField,
+    PilotTakeover,
+    RefuseArming,
+    SlipClock,
+    StopTelemetry,
+    VehicleFault,
+)
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link
+from sitl_mock.physics.vehicle import Vehicle
+
+
+@dataclass
+class _Entry:
+    fault: LinkFault | VehicleFault
+    given_us: int
+    active: bool = False
+    over: bool = False
+
+
+class FaultSchedule:
+    """The faults asked so far, and those active now.
+
+    Args:
+        faults: known from the start.
+    """
+
+    def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
+        self._entries = [_Entry(fault, 0) for fault in faults]
+        self.link: tuple[LinkFault, ...] = ()
+
+    def add(self, fault: LinkFault | VehicleFault, now_us: int) -> None:
+        """Ask for a fault; without a start condition it begins at the next update."""
+        self._entries.append(_Entry(fault, now_us))
+
+    def clear(self) -> list[VehicleFault]:
+        """Forget all faults, and return the vehicle's that were active."""
+        active = [e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)]
+        self._entries = []
+        self.link = ()
+        return active
+
+    def update(
+        self, now_us: int, offboard_us: int | None
+    ) -> tuple[list[VehicleFault], list[VehicleFault]]:
+        """Move on to a time, and return the vehicle's faults that began and that ended.
+
+        Args:
+            now_us: vehicle time.
+            offboard_us: when OFFBOARD was first entered armed, None if not yet.
+        """
+        began: list[VehicleFault] = []
+        ended: list[VehicleFault] = []
+        changed = False
+        for entry in self._entries:
+            active = self._is_active(entry, now_us, offboard_us)
+            if active == entry.active:
+                continue
+            changed = True
+            entry.active = active
+            entry.over = not active
+            if not isinstance(entry.fault, LinkFault):
+                (began if active else ended).append(entry.fault)
+        if changed:
+            self._entries = [entry for entry in self._entries if not entry.over]
+            self.link = tuple(
+                e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
+            )
+        return began, ended
+
+    @staticmethod
+    def _is_active(entry: _Entry, now_us: int, offboard_us: int | None) -> bool:
+        fault = entry.fault
+        if fault.after_offboard_s is not None:
+            if offboard_us is None:
+                return False
+            start = max(offboard_us + fault.after_offboard_s * 1e6, entry.given_us)
+        elif fault.at_s is not None:
+            start = max(fault.at_s * 1e6, entry.given_us)
+        else:
+            start = entry.given_us
+        if now_us < start:
+            return False
+        return fault.duration_s is None or now_us < start + fault.duration_s * 1e6
+
+
+class FaultEffects:
+    """Applies faults of the vehicle (those of the link are the server's).
+
+    Args:
+        state: the autopilot's state.
+        vehicle: whose estimate and battery are spoilt.
+        commander: which refuses, or whose mode the pilot changes.
+        control: whose held position and heading follow an estimator reset.
+        links: whose messages are spoilt.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        vehicle: Vehicle,
+        commander: Commander,
+        control: ModeControl,
+        links: list[Link],
+    ) -> None:
+        self.offboard_us: int | None = None
+        """When OFFBOARD was first entered armed, vehicle time."""
+        self.clock_frozen = False
+        self._state = state
+        self._vehicle = vehicle
+        self._commander = commander
+        self._control = control
+        self._links = links
+        self._stopped: list[StopTelemetry] = []
+        self._nan: list[NanField] = []
+        self._gps_lost_us = 0
+        self._slipped_s = 0.0
+
+    def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
+        """Let faults take effect, and undo those that ended."""
+        for fault in began:
+            self._begin(fault)
+        for fault in ended:
+            self._end(fault)
+
+    def take_slip(self) -> float:
+        """Wall time by which the vehicle's clock fell behind since this was asked, s."""
+        slipped, self._slipped_s = self._slipped_s, 0.0
+        return slipped
+
+    def silenced(self, message_id: int) -> bool:
+        """Whether a message is not streamed at present."""
+        if not self._stopped:
+            return False
+        kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
+        name = kind.msgname
+        return any(not fault.messages or name in fault.messages for fault in self._stopped)
+
+    def watch_position(self, converged_us: float, timeout_us: float) -> None:
+        """Call the position valid from ``converged_us`` until ``timeout_us`` after GPS was lost."""
+        state = self._state
+        lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
+        state.position_valid = state.time_us >= converged_us and not lost
+
+    def _begin(self, fault: VehicleFault) -> None:
+        match fault:
+            case StopTelemetry():
+                self._stopped.append(fault)
+            case FreezeClock():
+                self.clock_frozen = True
+            case SlipClock():
+                self._slipped_s += fault.slip_ms * 1e-3
+            case NanField():
+                self._nan.append(fault)
+                self._hook_links()
+            case PilotTakeover():
+                self._commander.take_over(Mode[fault.mode])
+            case EstimatorReset():
+                step = radians(fault.yaw_deg)
+                self._vehicle.shift_estimate(yaw=step, position_ned=fault.position_ned_m)
+                self._control.shift(step, fault.position_ned_m)
+            case RefuseArming():
+                self._commander.refusal = fault.reason
+            case LowBattery():
+                self._vehicle.set_battery_remaining(fault.remaining)
+            case GpsLoss():
+                self._state.gps_ok = False
+                self._gps_lost_us = self._state.time_us
+
+    def _end(self, fault: VehicleFault) -> None:
+        match fault:
+            case StopTelemetry():
+                self._stopped.remove(fault)
+            case FreezeClock():
+                self.clock_frozen = False
+            case NanField():
+                self._nan.remove(fault)
+                self._hook_links()
+            case PilotTakeover():
+                self._commander.pilot = False
+            case RefuseArming():
+                self._commander.refusal = None
+            case GpsLoss():
+                self._state.gps_ok = True
+            case EstimatorReset() | LowBattery() | SlipClock():
+                pass  # a jump, an empty battery and lost time stay
+
+    def _hook_links(self) -> None:
+        for link in self._links:
+            link.tamper = self._tamper if self._nan else None
+
+    def _tamper(self, message: Message) -> None:
+        for fault in self._nan:
+            if message.get_type() == fault.message:
+                value = getattr(message, fault.field)
+                spoilt = [nan] * len(value) if isinstance(value, Sequence) else nan
+                setattr(message, fault.field, spoilt)

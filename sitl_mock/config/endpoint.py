@@ -1,0 +1,71 @@
+"""The companion endpoint as the configuration writes it: udp, tcpin or serial."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+_TCP = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
+_HELP = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
+
+
+@dataclass(frozen=True)
+class Udp:
+    """UDP; ``port`` sets the ports."""
+
+
+@dataclass(frozen=True)
+class TcpIn:
+    """A TCP port that serves one client."""
+
+    host: str
+    port: int
+
+
+@dataclass(frozen=True)
+class SerialLine:
+    """A pseudo-terminal, with a symbolic link at ``path``; None = no link."""
+
+    path: Path | None
+
+
+EndpointAddress = Udp | TcpIn | SerialLine
+
+
+def parse_endpoint(text: str) -> EndpointAddress:
+    """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
+
+    Raises:
+        ValueError: the text is none of these.
+    """
+    if text == "udp":
+        return Udp()
+    if text.startswith("serial://"):
+        path = text.removeprefix("serial://")
+        if not path or path.startswith("/"):
+            return SerialLine(Path(path) if path else None)
+    found = _TCP.fullmatch(text)
+    if found is not None and _is_host(found[1]) and 1 <= int(found[2]) <= 65535:
+        return TcpIn(found[1] or "127.0.0.1", int(found[2]))
+    raise ValueError(f"not an endpoint; {_HELP}")
+
+
+def _is_host(text: str) -> bool:
+    """Whether the resolver accepts this name: no label is empty or longer than 63 characters."""
+    try:
+        text.encode("idna")
+    except UnicodeError:
+        return False
+    return text.isprintable() and len(text) <= 253
+
+
+def for_vehicle(text: str, index: int) -> str:
+    """Return the endpoint of the vehicle with this index: the next port, a path with its number."""
+    if index == 0:
+        return text
+    match parse_endpoint(text):
+        case TcpIn(host, port):
+            return f"tcpin://{host}:{port + index}"
+        case SerialLine(Path() as path):
+            return f"serial://{path}-{index + 1}"
+        case _:
+            return text

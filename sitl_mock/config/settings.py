@@ -1,0 +1,110 @@
+"""All keys of the ``mock:`` section, apart from the checks that depend on the autopilot."""
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator
+
+from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
+from sitl_mock.config.endpoint import for_vehicle, parse_endpoint
+from sitl_mock.config.faults import Fault
+from sitl_mock.config.rate_loop import RateLoopConfig
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section
+from sitl_mock.config.sensors import SensorConfig
+
+PORT_OFFSET = 40
+"""The vehicle binds ``port`` plus this for the companion link, as PX4's simulation does."""
+GCS_PORT_OFFSET = 4020
+"""The vehicle binds ``gcs_port`` plus this for the ground station link (18570 for 14550)."""
+Port = Annotated[int, Field(ge=0, le=65535)]
+
+
+class HomeConfig(Section):
+    """Position and heading at boot."""
+
+    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
+    altitude_m: Finite = 489.4
+    """Above mean sea level."""
+    heading_deg: Finite = 0.0
+
+
+class LockstepConfig(Section):
+    """Lockstep: the vehicle waits for an answer to each step."""
+
+    enabled: bool = False
+    period_ms: Annotated[int, Field(ge=1, le=100)] = 4
+    bundle: bool = True
+    """Send the frames of a step in one datagram, as PX4 does not. The beacon is separate."""
+    patience_s: Positive = 2.0
+    """After this wall time without an answer the vehicle continues in real time."""
+
+
+class SigningConfig(Section):
+    """MAVLink 2 signing on every link of the vehicle."""
+
+    passphrase_file: Path
+    """The first line is the passphrase. The key is its SHA-256, as in ground stations."""
+    accept_unsigned: bool | None = None
+    """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
+    autopilot does. ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link."""
+    link_id: Annotated[int, Field(ge=0, le=254)] = 0
+    """Link id of the companion link in signatures; the ground station link has the next."""
+
+
+class VehicleSettings(Section):
+    """Every key of one vehicle, with the defaults that do not depend on the autopilot."""
+
+    autopilot: Literal["px4", "ardupilot"] = "px4"
+    """The autopilot simulated. It sets the default of ``sensors.ekf``; ArduPilot also sets those of
+    airframe, battery and rate loop."""
+    port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
+    endpoint: str = "udp"
+    """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
+    client connects; serial:///PATH, a pseudo-terminal with a symbolic link at PATH."""
+    gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
+    """0 = no ground station link."""
+    control_port: Port = 0
+    """JSON control channel on 127.0.0.1; 0 = none."""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
+    """Vehicle seconds per wall second; lockstep ignores it."""
+    inner_loop_hz: Literal[250, 800] = 250
+    """Limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE instead."""
+    exact_rates: bool | None = None
+    """Send at every slot; PX4's loop skips some at the full rate. Null: only in lockstep."""
+    burst_ms: NonNegative = 0.0
+    """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
+    simulator does (its default is 5.6); 0 = no bursts."""
+    prearm_delay_s: NonNegative = 4.5
+    """Arming is refused before this time. Measured: PX4 4.3 to 6.5 s; ArduPilot 41.6 s."""
+    lockstep: LockstepConfig = LockstepConfig()
+    signing: SigningConfig | None = None
+    """Null: frames are not signed, and signatures are not checked."""
+    home: HomeConfig = HomeConfig()
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    """Autopilot parameters that differ from their defaults."""
+    airframe: AirframeConfig = AirframeConfig()
+    rate_loop: RateLoopConfig = RateLoopConfig()
+    wind: WindConfig = WindConfig()
+    battery: BatteryConfig = BatteryConfig()
+    sensors: SensorConfig = SensorConfig()
+    faults: tuple[Fault, ...] = ()
+
+    @field_validator("endpoint")
+    @classmethod
+    def _known_endpoint(cls, endpoint: str) -> str:
+        parse_endpoint(endpoint)
+        return endpoint
+
+    def for_vehicle(self, index: int) -> Self:
+        """Return the settings of the vehicle with this index: its own ports and its own seed."""
+        return self.model_copy(
+            update={
+                "port": self.port + index,
+                "endpoint": for_vehicle(self.endpoint, index),
+                "gcs_port": self.gcs_port + index if self.gcs_port else 0,
+                "control_port": self.control_port + index if self.control_port else 0,
+                "seed": self.seed + index,
+            }
+        )

@@ -1,0 +1,70 @@
+"""What surrounds the vehicle: wind, and flat ground at the height of home."""
+
+from math import cos, exp, radians, sin, sqrt
+from random import Random
+
+from sitl_mock.config.airframe import AirframeConfig, WindConfig
+from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
+
+
+class Wind:
+    """The air's velocity at the vehicle, NED, m/s; `step` moves it on by the fixed `dt` seconds."""
+
+    __slots__ = ("_calm", "_decay", "_gust", "_kick", "_kick_down", "_mean", "_random", "velocity")
+
+    def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
+        direction = radians(config.from_deg)
+        self._mean = (-config.speed_m_s * cos(direction), -config.speed_m_s * sin(direction))
+        self._decay = exp(-dt / config.gust_time_s)
+        self._kick = config.gust_m_s * sqrt(1.0 - self._decay**2)
+        self._kick_down = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
+        self._calm = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
+        # A text seed is hashed by SHA-512: the same everywhere, and apart from the other noises.
+        self._random = Random(f"{seed}/wind")
+        # Begun in the stationary distribution, so that no flight starts in a lull.
+        gauss = self._random.gauss
+        self._gust: Vector = (
+            gauss(0.0, config.gust_m_s),
+            gauss(0.0, config.gust_m_s),
+            gauss(0.0, config.vertical_gust_m_s),
+        )
+        self.velocity: Vector = self._blend()
+
+    def _blend(self) -> Vector:
+        north, east, down = self._gust
+        return (self._mean[0] + north, self._mean[1] + east, down)
+
+    def step(self) -> None:
+        """Move the gusts on by one `dt`."""
+        if self._calm:
+            return
+        gauss, decay = self._random.gauss, self._decay
+        north, east, down = self._gust
+        self._gust = (
+            decay * north + self._kick * gauss(0.0, 1.0),
+            decay * east + self._kick * gauss(0.0, 1.0),
+            decay * down + self._kick_down * gauss(0.0, 1.0),
+        )
+        self.velocity = self._blend()
+
+
+class Ground:
+    """The landing gear's rules: it neither sinks nor slides, and it stands the vehicle up."""
+
+    __slots__ = ("_crash_cosine", "_crash_speed", "_levelling")
+
+    def __init__(self, airframe: AirframeConfig, dt: float) -> None:
+        self._crash_cosine = cos(radians(airframe.crash_tilt_deg))
+        self._crash_speed = airframe.crash_speed_m_s
+        self._levelling = exp(-dt * 1e3 / airframe.ground_levelling_ms)
+
+    def survives(self, q: Quaternion, sink_speed: float) -> bool:
+        """Whether touching down like this (m/s, down) leaves the vehicle upright and whole."""
+        _, x, y, _ = q
+        upright = 1.0 - 2.0 * (x * x + y * y) >= self._crash_cosine
+        return upright and sink_speed <= self._crash_speed
+
+    def level(self, q: Quaternion) -> Quaternion:
+        """One step of the standing vehicle towards level; the heading stays."""
+        w, x, y, z = q
+        return normalise((w, x * self._levelling, y * self._levelling, z))

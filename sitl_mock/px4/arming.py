@@ -1,0 +1,114 @@
+"""Whether PX4 may be armed, and when it disarms by itself on the ground."""
+
+from sitl_mock.autopilot.events import EventKind
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.setpoints import OffboardStream
+from sitl_mock.autopilot.state import BatteryWarning, Mode, State
+from sitl_mock.px4.health import HealthReport
+from sitl_mock.px4.modes import PILOTED
+
+NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND})
+"""PX4 cannot be armed in these modes, and does not return to them when it disarms."""
+PREFLIGHT_MARGIN_US = 1_000_000
+"""Armed but not flown, PX4 disarms this long after COM_DISARM_PRFLT (measured: 11 s for 10 s)."""
+
+
+class ArmingChecks:
+    """Finds what forbids arming, and reports it.
+
+    Args:
+        state: the autopilot's state; the problem found is written here.
+        parameters: NAV_DLL_ACT and COM_OF_LOSS_T.
+        stream: the offboard setpoints.
+        health: sends the failing checks as events.
+        ready_us: vehicle time at which the estimator is ready.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        parameters: ParameterTable,
+        stream: OffboardStream,
+        health: HealthReport,
+        ready_us: int,
+    ) -> None:
+        self.crashed = False
+        self._state = state
+        self._parameters = parameters
+        self._stream = stream
+        self._health = health
+        self._ready_us = ready_us
+
+    @property
+    def offboard_alive(self) -> bool:
+        """Whether the latest setpoint is younger than COM_OF_LOSS_T."""
+        return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
+
+    def problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
+        """Return why arming is refused now, None if it is not, and note it in the state.
+
+        Args:
+            gcs_alive: whether a ground station is connected.
+            pilot: whether a pilot holds the sticks.
+            refusal: the reason that a fault gives, None without such a fault.
+        """
+        state = self._state
+        problems = (
+            (state.time_us < self._ready_us, "no heading reference"),
+            (refusal is not None, refusal),
+            (self.crashed, "vehicle has crashed"),
+            (not state.position_valid, "no valid position estimate"),
+            (state.battery_warning >= BatteryWarning.CRITICAL, "battery too low"),
+            (self._gcs_required and not gcs_alive, "no connection to the ground station"),
+            (state.mode is Mode.OFFBOARD and not self.offboard_alive, "no offboard signal"),
+            (state.mode in PILOTED and not pilot, "no manual control input"),
+            (state.mode in NOT_ARMABLE, "mode is not suitable for arming"),
+        )
+        found = next((problem for present, problem in problems if present), None)
+        state.prearm_problem = found
+        return found
+
+    def report(self, *, gcs_alive: bool, pilot: bool) -> None:
+        """Send the health report if it changed and is due."""
+        self._health.step(
+            offboard_alive=self.offboard_alive,
+            pilot=pilot,
+            gcs_alive=gcs_alive,
+            gcs_required=self._gcs_required,
+        )
+
+    @property
+    def _gcs_required(self) -> bool:
+        return self._parameters["NAV_DLL_ACT"] > 0
+
+
+class AutoDisarm:
+    """Decides when an armed vehicle on the ground disarms.
+
+    Args:
+        state: the autopilot's state.
+        parameters: COM_DISARM_LAND and COM_DISARM_PRFLT, s; 0 or less means never.
+    """
+
+    def __init__(self, state: State, parameters: ParameterTable) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._landed_since_us = 0
+
+    def begin(self) -> None:
+        """Start the time on the ground: the vehicle was armed."""
+        self._landed_since_us = self._state.time_us
+
+    def due(self) -> EventKind | None:
+        """Return why the vehicle disarms now, None if it does not."""
+        state, parameters = self._state, self._parameters
+        if not state.landed:
+            self._landed_since_us = state.time_us
+            return None
+        waited = state.time_us - self._landed_since_us
+        if state.flown:
+            limit = parameters["COM_DISARM_LAND"]
+            return EventKind.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
+        limit = parameters["COM_DISARM_PRFLT"]
+        late = waited >= limit * 1e6 + PREFLIGHT_MARGIN_US
+        return EventKind.DISARMED_ON_GROUND if limit > 0 and late else None

@@ -1,0 +1,186 @@
+"""What PX4's modes ask of the position controller; PX4 calls these flight tasks."""
+
+from math import hypot, isnan, radians, tan
+
+from sitl_mock.autopilot.parameters import ParameterTable
+from sitl_mock.autopilot.position_control import GRAVITY, PositionDemand
+from sitl_mock.autopilot.setpoints import PositionSetpoint
+from sitl_mock.autopilot.state import NAN, NAN_VECTOR, Mode, State
+from sitl_mock.physics.quaternion import Vector, along_heading, yaw
+
+CRAWL_HEIGHT_M = 0.65
+"""Below this height LAND goes at MPC_LAND_CRWL (recorded with a distance sensor)."""
+BRAKING_S = 0.7
+"""Entering a hold, the point to hold lies this many seconds of velocity ahead."""
+LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
+
+
+class FlightTasks:
+    """Turns the mode, or an offboard position setpoint, into a demand on the position controller.
+
+    Args:
+        state: the autopilot's state.
+        parameters: speeds, heights and times.
+    """
+
+    def __init__(self, state: State, parameters: ParameterTable) -> None:
+        self._state = state
+        self._parameters = parameters
+        self._hold: Vector = (0.0, 0.0, 0.0)
+        self.yaw = 0.0
+        """Heading to hold, rad."""
+        self._takeoff_z = 0.0
+        self._entered_us = 0
+        self._descending = False
+
+    def enter(
+        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
+    ) -> None:
+        """Begin a mode at the present estimate.
+
+        Args:
+            mode: the mode entered.
+            takeoff_z: where TAKEOFF ends, m down.
+            hold: where LOITER goes, NED; None = stop here.
+        """
+        estimate = self._state.estimate
+        self._entered_us = self._state.time_us
+        self.yaw = yaw(estimate.q)
+        x, y, z = estimate.position_ned
+        vx, vy, vz = estimate.velocity_ned
+        self._hold = hold or (x + BRAKING_S * vx, y + BRAKING_S * vy, z + BRAKING_S * vz)
+        if mode in (Mode.TAKEOFF, Mode.LAND):
+            self._hold = (x, y, z)
+        if takeoff_z is not None:
+            self._takeoff_z = takeoff_z
+        if mode is Mode.RTL:
+            self._begin_return()
+
+    def shift(self, yaw_step: float, position_step: Vector) -> None:
+        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        x, y, z = self._hold
+        dx, dy, dz = position_step
+        self._hold = (x + dx, y + dy, z + dz)
+        self._takeoff_z += dz
+        self.yaw += yaw_step
+
+    @property
+    def takeoff_reached(self) -> bool:
+        """Whether TAKEOFF is as good as at its height."""
+        return self._state.estimate.position_ned[2] - self._takeoff_z < 0.3
+
+    @property
+    def landing(self) -> bool:
+        """Whether the vehicle descends to land."""
+        mode = self._state.mode
+        return mode is Mode.LAND or (mode is Mode.RTL and self._descending)
+
+    def demand(self) -> PositionDemand:
+        """Return what the present mode asks."""
+        mode = self._state.mode
+        if mode is Mode.TAKEOFF:
+            return self._takeoff()
+        if mode is Mode.LAND:
+            return self._land()
+        if mode is Mode.RTL:
+            return self._return()
+        if mode is Mode.ALTCTL:
+            level = (NAN, NAN, self._hold[2])
+            return PositionDemand(level, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
+        parameters = self._parameters
+        return PositionDemand(
+            self._hold,
+            NAN_VECTOR,
+            yaw=self.yaw,
+            speed=parameters["MPC_XY_CRUISE"],
+            up_speed=parameters["MPC_Z_V_AUTO_UP"],
+            down_speed=parameters["MPC_Z_V_AUTO_DN"],
+        )
+
+    def _takeoff(self) -> PositionDemand:
+        parameters, state = self._parameters, self._state
+        speed = parameters["MPC_TKO_SPEED"]
+        x, y, _ = self._hold
+        if not state.contact:
+            target = (x, y, self._takeoff_z)
+            return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, up_speed=speed)
+        # On the ground the climb rate asked grows from where it means no thrust at all.
+        began = max(self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6)
+        ramp = (state.time_us - began) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
+        lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
+        climb = lowest + (speed - lowest) * max(0.0, min(1.0, ramp))
+        return PositionDemand(
+            NAN_VECTOR, (NAN, NAN, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, down_speed=3.0
+        )
+
+    def _land(self) -> PositionDemand:
+        x, y, _ = self._hold
+        velocity = (NAN, NAN, self._descent_speed())
+        if not self._state.position_valid:
+            return PositionDemand(NAN_VECTOR, velocity, LEVEL_DEMAND_ACCELERATION, self.yaw)
+        return PositionDemand((x, y, NAN), velocity, yaw=self.yaw, down_speed=10.0)
+
+    def _descent_speed(self) -> float:
+        parameters = self._parameters
+        height = self._state.home_ned[2] - self._state.estimate.position_ned[2]
+        slow, fast = parameters["MPC_LAND_SPEED"], parameters["MPC_Z_V_AUTO_DN"]
+        low, high = parameters["MPC_LAND_ALT2"], parameters["MPC_LAND_ALT1"]
+        if height < CRAWL_HEIGHT_M:
+            return min(slow, parameters["MPC_LAND_CRWL"])
+        share = max(0.0, min(1.0, (height - low) / max(high - low, 0.1)))
+        return slow + (fast - slow) * share
+
+    def _begin_return(self) -> None:
+        """Choose the height of the way home: the cone about home, at most RTL_RETURN_ALT."""
+        parameters, state = self._parameters, self._state
+        home = state.home_ned
+        x, y, z = state.estimate.position_ned
+        distance = hypot(x - home[0], y - home[1])
+        near = parameters["NAV_ACC_RAD"]
+        height = home[2] - z
+        if distance > near:
+            cone = radians(max(1.0, min(89.0, parameters["RTL_CONE_ANG"])))
+            wanted = min(max(distance / tan(cone), 2.0 * near), parameters["RTL_RETURN_ALT"])
+            height = max(height, wanted)
+        self._hold = (x, y, home[2] - height)
+        self._descending = distance <= near
+
+    def _return(self) -> PositionDemand:
+        parameters, state = self._parameters, self._state
+        home = state.home_ned
+        x, y, z = state.estimate.position_ned
+        if not self._descending:
+            if z - self._hold[2] < 0.5:
+                self._hold = (home[0], home[1], self._hold[2])
+            self._descending = hypot(x - home[0], y - home[1]) < parameters["NAV_ACC_RAD"] / 2.0
+        if self._descending:
+            self._hold = (home[0], home[1], NAN)
+            return self._land()
+        return PositionDemand(
+            self._hold,
+            NAN_VECTOR,
+            yaw=self.yaw,
+            speed=parameters["MPC_XY_CRUISE"],
+            up_speed=parameters["MPC_Z_V_AUTO_UP"],
+        )
+
+    def offboard_demand(self, setpoint: PositionSetpoint, dt: float) -> PositionDemand:
+        """Return what an offboard setpoint asks; its yaw rate turns the heading to hold."""
+        parameters = self._parameters
+        if not isnan(setpoint.yaw):
+            self.yaw = setpoint.yaw
+        elif not isnan(setpoint.yaw_rate):
+            self.yaw += setpoint.yaw_rate * dt
+        velocity, acceleration = setpoint.velocity, setpoint.acceleration
+        if setpoint.in_body_heading:
+            q = self._state.estimate.q
+            velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
+        return PositionDemand(
+            setpoint.position,
+            velocity,
+            acceleration,
+            self.yaw,
+            parameters["MPC_XY_VEL_MAX"],
+            parameters["MPC_Z_VEL_MAX_UP"],
+            parameters["MPC_Z_VEL_MAX_DN"],
+        )
