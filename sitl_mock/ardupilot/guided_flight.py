@@ -1,4 +1,4 @@
-"""How ArduCopter flies in GUIDED: take-off, setpoints of attitude or position, hold."""
+"""The control in GUIDED: take-off, setpoints of attitude or position, hold."""
 
 from math import isnan
 
@@ -16,15 +16,15 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 THRUST_IS_THRUST = 8
 """Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
 SPOOL_UP_US = 2_000_000
-"""From NAV_TAKEOFF to the rotors' being ready to lift (recorded: it lifts off after 2.3 s)."""
+"""Spool-up of the rotors after NAV_TAKEOFF (recorded: it lifts off after 2.3 s)."""
 ARRIVAL_ACCELERATION = 0.55
-"""A take-off slows down by this, m/s^2 (recorded)."""
+"""Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVED_M = 0.1
 _SLOWEST_ARRIVAL = 0.1
 
 
 class GuidedFlight:
-    """Flies the task of GUIDED.
+    """Executes the task of GUIDED.
 
     Args:
         state: the autopilot's state.
@@ -78,7 +78,7 @@ class GuidedFlight:
         return self._output.follow(self._hold.step(speed, dt), dt)
 
     def _follow_angle(self, asked: AttitudeSetpoint, dt: float, *, began: bool) -> ActuatorCommand:
-        """Fly rates or an attitude; once they are silent, level and without climbing."""
+        """Follow rates or an attitude; after GUID_TIMEOUT level the vehicle and hold its height."""
         state, parameters = self._state, self._parameters
         state.position_controlled = False
         was_silent = self._silent and not began
@@ -97,7 +97,7 @@ class GuidedFlight:
         else:
             thrust = thrust_of_setpoint(asked.thrust)
         self._output.thrust = state.attitude_target.thrust = thrust
-        # What a climb needs is boosted in any case; what was asked as thrust, if it is so set.
+        # The angle boost always applies to a climb rate; to a thrust only if it is enabled.
         if climbs or parameters["ATC_ANGLE_BOOST"]:
             thrust = angle_boosted(thrust, self._output.cos_tilt)
         if self._silent:

@@ -1,4 +1,4 @@
-"""The position controller of the autopilot's own modes: P and PI to attitude and thrust."""
+"""Position controller of the autopilot's own modes: P on position, PI on velocity."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,14 +10,14 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 GRAVITY = 9.80665
 _STEEPEST = radians(80.0)
-"""No limit on the tilt lets it grow beyond this."""
+"""Upper bound of the tilt limit."""
 
 
 class PositionDemand(NamedTuple):
-    """What to follow: position, velocity and acceleration (NED, SI; NaN = free) and yaw (rad).
+    """Setpoint: position, velocity, acceleration (NED, SI; NaN = not controlled) and yaw (rad).
 
-    ``speed`` bounds the horizontal velocity asked by the position loop, ``down_speed`` and
-    ``up_speed`` the vertical one, m/s.
+    ``speed`` limits the horizontal velocity setpoint, ``down_speed`` and ``up_speed`` the vertical
+    one, m/s.
     """
 
     position: Vector
@@ -30,7 +30,7 @@ class PositionDemand(NamedTuple):
 
 
 class PositionOutput(NamedTuple):
-    """Attitude to hold, collective thrust 0..1, and the velocity and acceleration asked (NED)."""
+    """Attitude, collective thrust 0..1, and the setpoints of velocity and acceleration (NED)."""
 
     q: Quaternion
     thrust: float
@@ -41,7 +41,7 @@ class PositionOutput(NamedTuple):
 class PositionGains(NamedTuple):
     """Gains and limits: velocity per position error (1/s), acceleration per velocity error.
 
-    Thrusts are normalised: at a hover, the least and the most.
+    Thrusts are normalised: hover, minimum and maximum.
     """
 
     horizontal: float
@@ -58,17 +58,17 @@ class PositionGains(NamedTuple):
 
 @dataclass
 class PositionController:
-    """A multicopter's position control in its plain form: P on position, PI on velocity.
+    """P on position, PI on velocity, then attitude and thrust.
 
     Args:
-        gains: asked at every step, so that a PARAM_SET acts at once.
+        gains: called at every step, so a PARAM_SET takes effect at once.
     """
 
     gains: Callable[[], PositionGains]
     _integral: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def reset(self) -> None:
-        """Forget the integrals."""
+        """Reset the integrals."""
         self._integral = [0.0, 0.0, 0.0]
 
     def step(
@@ -78,7 +78,7 @@ class PositionController:
         velocity: Vector,
         dt: float,
     ) -> PositionOutput:
-        """Return attitude and thrust for one period of ``dt`` s from the estimated state."""
+        """Return attitude and thrust of one period of ``dt`` s for the estimated motion."""
         gains = self.gains()
         asked_velocity = _velocity(gains, demand, position)
         acceleration = self._acceleration(gains, demand, asked_velocity, velocity, dt)
@@ -109,7 +109,7 @@ class PositionController:
 
 
 def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
-    """Return the velocity asked, NED; NaN = none."""
+    """Return the velocity setpoint, NED; NaN = none."""
     factors = (gains.horizontal, gains.horizontal, gains.vertical)
     asked = []
     for axis in range(3):
