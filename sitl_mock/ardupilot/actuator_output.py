@@ -62,13 +62,13 @@ class ActuatorOutput:
         return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
-        """Return the command for what the position controller asked in the last ``dt`` s."""
+        """Return the command for what the position controller computed for the last ``dt`` s."""
         self.thrust = output.thrust
         self._learn_hover(output, dt)
         return self.attitude(output.q, output.thrust)
 
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
-        """Follow the thrust of a quiet, level hover, as MOT_HOVER_LEARN asks."""
+        """Follow the thrust of a steady, level hover, if MOT_HOVER_LEARN is set."""
         state, parameters = self._state, self._parameters
         quiet = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
         if parameters["MOT_HOVER_LEARN"] and quiet and self.cos_tilt > cos(radians(5.0)):

@@ -145,25 +145,25 @@ class ArduPilotCommander:
         if message.get_type() == "SET_ATTITUDE_TARGET":
             self._attitude_setpoint(message)
             return
-        asked = position_setpoint(message)
-        if asked is not None:
-            self._stream.accept(asked, state.time_us)
-            self._guided.follow_position(asked, state.time_us)
+        setpoint = position_setpoint(message)
+        if setpoint is not None:
+            self._stream.accept(setpoint, state.time_us)
+            self._guided.follow_position(setpoint, state.time_us)
 
     def _attitude_setpoint(self, message: Message) -> None:
         state = self._state
         try:
-            asked = attitude_setpoint(message)
+            setpoint = attitude_setpoint(message)
         except FatalSetpointError:
             state.aborted = True
             return
-        if asked is None:
+        if setpoint is None:
             self._guided.hold()
             return
-        if asked.rates is not None and any(map(isnan, asked.rates)):
+        if setpoint.rates is not None and any(map(isnan, setpoint.rates)):
             self._announce_internal_error()
-        self._stream.accept(asked, state.time_us)
-        self._guided.follow_angle(asked, state.time_us)
+        self._stream.accept(setpoint, state.time_us)
+        self._guided.follow_angle(setpoint, state.time_us)
 
     def _announce_internal_error(self) -> None:
         if not self._internal_error:

@@ -76,8 +76,8 @@ class ArduPilotCommands(Commands):
 
     def data_stream(self, message: Message, link: Link) -> None:
         """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 means all."""
-        asked = message.req_stream_id
-        groups = _GROUPS.values() if asked == 0 else [_GROUPS.get(asked, ())]
+        requested = message.req_stream_id
+        groups = _GROUPS.values() if requested == 0 else [_GROUPS.get(requested, ())]
         rate = message.req_message_rate
         interval = 1e6 / rate if message.start_stop and rate else -1.0
         for group in groups:

@@ -12,6 +12,13 @@ from sitl_mock.autopilot.position_control import (
 from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
+STOPPING_S = 0.65
+"""A hold begins at the position plus the velocity times this (recorded on entering LAND)."""
+_HEIGHT_INTEGRAL = 1.0
+"""Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
+_STEEP_CLIMB = 10.0
+"""Limit of the height loop, m/s; the climb rate itself is limited before."""
+
 
 class ClimbProfile:
     """Setpoints of height, climb rate and (limited) acceleration; SI, up positive."""
@@ -39,14 +46,6 @@ class ClimbProfile:
 def approach_speed(distance: float, deceleration: float, fastest: float) -> float:
     """Return the largest speed that can stop within the distance, at most ``fastest``, m/s."""
     return min(fastest, sqrt(2.0 * deceleration * max(0.0, distance)))
-
-
-STOPPING_S = 0.65
-"""A hold begins at the position plus the velocity times this (recorded on entering LAND)."""
-_HEIGHT_INTEGRAL = 1.0
-"""Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
-_STEEP_CLIMB = 10.0
-"""Limit of the height loop, m/s; the climb rate itself is limited before."""
 
 
 class PositionHold:

@@ -80,15 +80,15 @@ class PositionController:
     ) -> PositionOutput:
         """Return attitude and thrust of one period of ``dt`` s for the estimated motion."""
         gains = self.gains()
-        asked_velocity = _velocity(gains, demand, position)
-        acceleration = self._acceleration(gains, demand, asked_velocity, velocity, dt)
-        return _thrust_vector(gains, acceleration, asked_velocity, demand.yaw)
+        velocity_setpoint = _velocity(gains, demand, position)
+        acceleration = self._acceleration(gains, demand, velocity_setpoint, velocity, dt)
+        return _thrust_vector(gains, acceleration, velocity_setpoint, demand.yaw)
 
     def _acceleration(
         self,
         gains: PositionGains,
         demand: PositionDemand,
-        asked: Vector,
+        velocity_setpoint: Vector,
         velocity: Vector,
         dt: float,
     ) -> Vector:
@@ -98,7 +98,7 @@ class PositionController:
         for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
             total = 0.0 if isnan(feed_forward) else feed_forward
-            error = asked[axis] - velocity[axis]
+            error = velocity_setpoint[axis] - velocity[axis]
             if not isnan(error):
                 grown = self._integral[axis] + integral * error * dt
                 self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, grown))
@@ -111,15 +111,17 @@ class PositionController:
 def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
     """Return the velocity setpoint, NED; NaN = none."""
     factors = (gains.horizontal, gains.horizontal, gains.vertical)
-    asked = []
+    velocity_setpoint = []
     for axis in range(3):
         error = demand.position[axis] - position[axis]
-        wanted = demand.velocity[axis]
+        feed_forward = demand.velocity[axis]
         if isnan(error):
-            asked.append(wanted)
+            velocity_setpoint.append(feed_forward)
         else:
-            asked.append(factors[axis] * error + (0.0 if isnan(wanted) else wanted))
-    north, east, down = asked
+            velocity_setpoint.append(
+                factors[axis] * error + (0.0 if isnan(feed_forward) else feed_forward)
+            )
+    north, east, down = velocity_setpoint
     speed = hypot(north, east)
     if speed > demand.speed:
         north, east = north * demand.speed / speed, east * demand.speed / speed
@@ -129,7 +131,7 @@ def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) ->
 
 
 def _thrust_vector(
-    gains: PositionGains, acceleration: Vector, asked: Vector, yaw: float
+    gains: PositionGains, acceleration: Vector, velocity_setpoint: Vector, yaw: float
 ) -> PositionOutput:
     """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw."""
     north, east, down = acceleration
@@ -143,7 +145,7 @@ def _thrust_vector(
     thrust = gains.hover_thrust * max(GRAVITY - down, 0.0) / GRAVITY
     thrust *= specific / lift
     thrust = max(gains.min_thrust, min(gains.max_thrust, thrust))
-    return PositionOutput(q, thrust, asked, (north, east, down))
+    return PositionOutput(q, thrust, velocity_setpoint, (north, east, down))
 
 
 def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:

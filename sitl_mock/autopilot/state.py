@@ -6,6 +6,9 @@ from enum import Enum, IntEnum, auto
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
 
+NAN = float("nan")
+NAN_VECTOR = (NAN, NAN, NAN)
+
 
 class Mode(Enum):
     """A flight mode: PX4's names down to OFFBOARD, then those of ArduCopter alone."""
@@ -23,10 +26,6 @@ class Mode(Enum):
     ALT_HOLD = auto()
     GUIDED = auto()
     BRAKE = auto()
-
-
-NAN = float("nan")
-NAN_VECTOR = (NAN, NAN, NAN)
 
 
 class Landed(IntEnum):

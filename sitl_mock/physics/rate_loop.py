@@ -7,6 +7,10 @@ from typing import NamedTuple
 from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.physics.quaternion import Vector
 
+AxisState = tuple[float, float]
+"""State of one axis, N m: its integral, and its filtered torque, which is the output."""
+AT_REST: AxisState = (0.0, 0.0)
+
 
 class AxisLaw(NamedTuple):
     """Constants of the control law of one axis."""
@@ -17,11 +21,6 @@ class AxisLaw(NamedTuple):
     damping: float  # N m per rad/s^2
     integral_limit: float  # N m
     filter_decay: float  # of the torque filter per step, 0 = no filter
-
-
-AxisState = tuple[float, float]
-"""State of one axis, N m: its integral, and its filtered torque, which is the output."""
-AT_REST: AxisState = (0.0, 0.0)
 
 
 def axis_law(gains: AxisGains, dt: float) -> AxisLaw:

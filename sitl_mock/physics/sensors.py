@@ -9,6 +9,8 @@ from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_filter import NavigationError, NavigationFilter, Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
 
+_NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
 
 class Estimate(NamedTuple):
     """The autopilot's estimate. SI; world NED (origin: home on the ground), body FRD."""
@@ -19,9 +21,6 @@ class Estimate(NamedTuple):
     velocity_ned: Vector  # m/s
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
     gyro: Vector  # rad/s, what the (bias-free) gyro measures
-
-
-_NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Estimator:

@@ -12,7 +12,7 @@ from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.px4.arming import NOT_ARMABLE, ArmingChecks, AutoDisarm
 from sitl_mock.px4.failsafe import Failsafe
-from sitl_mock.px4.failsafe_actions import Announce
+from sitl_mock.px4.failsafe_actions import AnnounceEvent
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 from sitl_mock.px4.setpoints import decode_setpoint
@@ -40,7 +40,7 @@ class Px4Commander:
         parameters: ParameterTable,
         control: Px4ModeControl,
         stream: OffboardStream,
-        announce: Announce,
+        announce: AnnounceEvent,
         checks: ArmingChecks,
     ) -> None:
         self.refusal: str | None = None
@@ -148,7 +148,7 @@ class Px4Commander:
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
     def announce_problem(self) -> None:
-        """Announce what forbids arming now, if anything does."""
+        """AnnounceEvent what forbids arming now, if anything does."""
         problem = self._problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)

@@ -5,7 +5,7 @@ Source: the MAVLink events interface; intervals and flags as recorded.
 
 from collections import deque
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -28,6 +28,7 @@ _RESET = 1
 """MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; sent before the first event."""
 _UNAVAILABLE = 0
 """MAV_EVENT_ERROR_REASON."""
+_CHUNK = 50
 
 
 class _Sent(NamedTuple):
@@ -78,7 +79,7 @@ class EventLog:
         if self._state.time_us - self._sequence_sent_us >= _SEQUENCE_PERIOD_US:
             self._send_sequence(0 if self._sent else _RESET)
 
-    def requested(self, request: Message, link: Link) -> None:
+    def answer_request(self, request: Message, link: Link) -> None:
         """Answer a REQUEST_EVENT: resend each event, or send the reason why not.
 
         If the range is longer than the log, one refusal covers all older events.
@@ -115,18 +116,6 @@ def _send(link: Link, layout: Layout, payload: bytes) -> None:
     link.send_raw(layout.message_id, layout.crc_extra, payload)
 
 
-_CHUNK = 50
-
-
-class EventSender(Protocol):
-    """Sends numbered events; see `px4_event_log.EventLog`."""
-
-    def send(
-        self, event_id: int, severity: int, internal: int | None = None, arguments: bytes = b""
-    ) -> None:
-        """Send a new event."""
-
-
 class Announcer:
     """Announces events on all links.
 
@@ -136,16 +125,14 @@ class Announcer:
         events: sends the events.
     """
 
-    def __init__(
-        self, personality: Personality, links: Iterable[Link], events: EventSender | None = None
-    ) -> None:
+    def __init__(self, personality: Personality, links: Iterable[Link], events: EventLog) -> None:
         self._personality = personality
         self._links = list(links)
         self._events = events
         self._text_id = 0
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
-        """Announce an event.
+        """AnnounceEvent an event.
 
         Args:
             kind: what happened.
@@ -153,7 +140,7 @@ class Announcer:
             arguments: packed, instead of the constant ones of the event.
         """
         event = self._personality.events[kind]
-        if event.event_id and self._events is not None:
+        if event.event_id:
             self._events.send(
                 event.event_id, event.severity, event.internal, arguments or event.arguments
             )

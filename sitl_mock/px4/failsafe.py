@@ -13,7 +13,7 @@ from sitl_mock.px4.failsafe_actions import (
     OFFBOARD_ACTIONS,
     POSITION,
     RETURN,
-    Announce,
+    AnnounceEvent,
     Cause,
     EnterMode,
     FailsafeActions,
@@ -55,7 +55,7 @@ class Failsafe:
         state: State,
         parameters: ParameterTable,
         stream: OffboardStream,
-        announce: Announce,
+        announce: AnnounceEvent,
         enter: EnterMode,
         stop: Callable[[EventKind], None],
     ) -> None:

@@ -67,11 +67,11 @@ class Cause(Enum):
 _DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 
 
-class Announce(Protocol):
+class AnnounceEvent(Protocol):
     """Sends texts and events."""
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
-        """Announce an event, with a detail for its text and packed arguments."""
+        """AnnounceEvent an event, with a detail for its text and packed arguments."""
 
 
 class EnterMode(Protocol):
@@ -96,7 +96,7 @@ class FailsafeActions:
         self,
         state: State,
         parameters: ParameterTable,
-        announce: Announce,
+        announce: AnnounceEvent,
         enter: EnterMode,
         stop: Callable[[EventKind], None],
     ) -> None:

@@ -155,7 +155,7 @@ class Px4:
             builders,
             handlers={
                 "MANUAL_CONTROL": commander.manual_control,
-                "REQUEST_EVENT": events.requested,
+                "REQUEST_EVENT": events.answer_request,
             },
             converged_us=CONVERGED_SHARE * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
