@@ -13,7 +13,7 @@ from companion.flight.judgement import Preflight
 from companion.flight.same_vehicle import SameVehicle
 from companion.flight.snapshot_builder import SnapshotBuilder
 from companion.guidance import ManeuverSequence
-from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
+from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition

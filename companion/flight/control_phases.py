@@ -8,7 +8,7 @@ from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.mode_roles import in_role, in_roles, require_role
 from companion.flight.orders import change_mode, command_if_ours
 from companion.safety.ending import FlightEnded, internal
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Role
 
 _SELF_DISARM = 8.0
 """How long the autopilot may take to disarm itself after landing, s."""
@@ -22,14 +22,14 @@ _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 async def maneuvers(context: FlightContext) -> None:
     """Fly the maneuver to its end, or until it is given up."""
     now = asyncio.get_running_loop().time
-    began, sent = now(), context.loop.setpoints
+    began, sent = now(), context.loop.record.setpoints
     thrust = _ThrustForTilt(context)
     thrust.look()
     context.guidance_loop.follow(context.maneuvers)
 
     def over() -> bool:
         elapsed = now() - began
-        context.rate_hz = (context.loop.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         if context.guidance_loop.given_up is not None:
             raise FlightEnded(context.guidance_loop.given_up)
         thrust.look()
@@ -75,7 +75,7 @@ async def hand_back(context: FlightContext) -> None:
     context.detail = "the autopilot to hold"
     ours = in_roles(context.link, _OURS)
     await change_mode(
-        context, context.link.family.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+        context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
     )
     context.release()
 
@@ -89,7 +89,7 @@ async def land(context: FlightContext) -> None:
         return in_role(context.link, Role.LAND) or not context.armed()
 
     await change_mode(
-        context, context.link.family.land(), in_roles(context.link, _OURS | {Role.LAND}), landing
+        context, context.link.autopilot.land(), in_roles(context.link, _OURS | {Role.LAND}), landing
     )
     context.release()
 
@@ -116,7 +116,7 @@ async def disarm(context: FlightContext) -> None:
     except TimeoutError:
         context.detail = "the autopilot to accept disarming"
         await command_if_ours(
-            context, context.link.family.disarm(), in_roles(context.link, {Role.LAND}), disarmed
+            context, context.link.autopilot.disarm(), in_roles(context.link, {Role.LAND}), disarmed
         )
         await context.until(disarmed)
     await context.fresh_heartbeat()
@@ -136,7 +136,7 @@ def _stop_moving(context: FlightContext) -> None:
     if not context.loop.offboard_active:
         return
     try:
-        context.loop.plan_anew()  # the estimator may have jumped
+        context.loop.planner.restart()  # the estimator may have jumped
         context.guidance_loop.hold_here()
     except Exception as error:  # whatever is wrong with guidance, the autopilot must be asked
         context.note(internal(error))

@@ -150,7 +150,7 @@ class Flight:
         yield from self._ground
         context = self._context
         yield from flight_phases(
-            context.config.flight, context.maneuvers.duration, context.link.family
+            context.config.flight, context.maneuvers.duration, context.link.autopilot
         )
 
     async def _fly(self, phase: Phase) -> None:

@@ -12,24 +12,26 @@ from companion.flight.mode_roles import in_role, require_role, roles_of
 from companion.flight.orders import change_mode
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.safety.ending import Exit, FlightEnded
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Role
 
 _OFFBOARD = frozenset({Role.OFFBOARD})
 
 
-async def leave_offboard(context: FlightContext, unready_in: frozenset[Role] = _OFFBOARD) -> None:
+async def leave_offboard(
+    context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD
+) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, and wait until it does.
 
     Nothing is asked of a vehicle that is armed or in any other mode.
 
     Args:
         context: of the flight.
-        unready_in: what the modes are to a flight that are to be left.
+        cannot_arm_in: what the modes are to a flight that are to be left.
 
     Raises:
         FlightEnded: Somebody else changed its mode meanwhile, or it does not want to hold.
     """
-    if context.armed() or not roles_of(context.link) & unready_in:
+    if context.armed() or not roles_of(context.link) & cannot_arm_in:
         return
     mode = context.link.state.mode
     context.note(
@@ -40,11 +42,11 @@ async def leave_offboard(context: FlightContext, unready_in: frozenset[Role] = _
     def ours() -> None:
         if context.armed():
             raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
-        require_role(context.link, unready_in)
+        require_role(context.link, cannot_arm_in)
 
     try:
         await change_mode(
-            context, context.link.family.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+            context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
         )
     except (CommandRefused, CommandTimeout) as error:
         raise FlightEnded(

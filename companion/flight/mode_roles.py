@@ -3,14 +3,14 @@
 from collections.abc import Callable, Set
 
 from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
-from companion.vehicle.roles import Role
 
 
 def roles_of(link: Link) -> frozenset[Role]:
     """What the present mode is to a flight; empty for one that is not ours, or not known yet."""
     mode = link.state.mode
-    return frozenset() if mode is None else link.family.roles(mode)
+    return frozenset() if mode is None else link.autopilot.roles(mode)
 
 
 def in_role(link: Link, role: Role) -> bool:

@@ -4,8 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from companion.flight.context import FlightContext
-from companion.mavlink.command import Command
-from companion.mavlink.commands import command_name
+from companion.mavlink.commands import Command, command_name
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.safety.ending import Exit, FlightEnded
 

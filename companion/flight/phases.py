@@ -8,8 +8,7 @@ from companion.config.flight import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff
 from companion.flight.context import FlightContext
 from companion.safety.ending import Exit
-from companion.vehicle.autopilot import AutopilotFamily
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
@@ -56,12 +55,12 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def flight_phases(
-    config: FlightConfig, maneuver_duration: float, family: AutopilotFamily
+    config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
-    """The phases from there on, in the family's order; `maneuver_duration` in s."""
+    """The phases from there on, in the autopilot's order; `maneuver_duration` in s."""
     stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _SHORT)
     return (
-        *(() if family.take_over() is None else (stream,)),
+        *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),
         Phase(
             "arm", "the vehicle to arm", preflight_phases.arm, config.arming_timeout_s, Exit.DISARM
         ),

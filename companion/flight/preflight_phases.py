@@ -11,8 +11,8 @@ from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Stage
 from companion.preflight.finding import Finding
 from companion.safety.ending import Exit, FlightEnded
+from companion.vehicle.autopilot import Role
 from companion.vehicle.parameter_rules import Values, Verdict
-from companion.vehicle.roles import Role
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -31,7 +31,7 @@ async def checks(context: FlightContext) -> None:
     context.detail = "asking for telemetry"
     await context.preflight.ask_for_telemetry()
     if context.config.flight.arm:  # else the pilot, who may have chosen the mode by a switch
-        await leave_offboard(context, context.link.family.unready_in)
+        await leave_offboard(context, context.link.autopilot.cannot_arm_in)
     else:
         await leave_offboard(context)
     await context.until(lambda: _ready(context))
@@ -50,8 +50,8 @@ async def checks(context: FlightContext) -> None:
 async def stream(context: FlightContext) -> None:
     """Begin to answer samples, idle, and see that setpoints really flow."""
     context.loop.on = True
-    enough = context.loop.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.setpoints >= enough, "setpoints to flow")
+    enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:
@@ -59,7 +59,7 @@ async def arm(context: FlightContext) -> None:
     if context.config.flight.arm:
         await _arm(context)
         return
-    ready = context.link.family.ready_mode
+    ready = context.link.autopilot.ready_mode
     if context.link.state.mode == ready:
         context.note(f"the vehicle is in {ready} already: arming it starts the flight")
     await context.until(
@@ -80,7 +80,9 @@ async def undo_arming(context: FlightContext) -> None:
     context.detail = "the autopilot to accept disarming"
     # The heartbeat may be older than our arming, so it is not asked whether this is needed.
     ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
-    await command_if_ours(context, context.link.family.disarm(), ours, lambda: not context.armed())
+    await command_if_ours(
+        context, context.link.autopilot.disarm(), ours, lambda: not context.armed()
+    )
     await context.fresh_heartbeat()
     await context.until(lambda: not context.armed())
 
@@ -90,7 +92,7 @@ async def _arm(context: FlightContext) -> None:
     state = context.link.state
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     context.detail = "the autopilot to accept arming"
-    *before, command = context.link.family.arm()
+    *before, command = context.link.autopilot.arm()
     for each in before:
         await command_if_ours(
             context, each, lambda: _untouched(context), lambda: in_role(context.link, Role.READY)
@@ -140,7 +142,7 @@ def _ready(context: FlightContext) -> bool:
     state = context.link.state
     _refuse(vehicle_checks.armed(state))
     _check_battery(context)
-    missing = context.link.family.not_ready(state.readiness)
+    missing = context.link.autopilot.not_ready(state.readiness)
     context.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 
@@ -156,12 +158,12 @@ def _refuse(finding: Finding) -> None:
 
 def _tell_dead_man(context: FlightContext, values: Values) -> None:
     """Tell what the autopilot would do without our setpoints."""
-    family = context.link.family
-    offboard_loss_failsafe = family.offboard_loss_failsafe
+    autopilot = context.link.autopilot
+    offboard_loss_failsafe = autopilot.offboard_loss_failsafe
     seconds = values.get(offboard_loss_failsafe.parameter)
     how_long = "a time that is not known" if seconds is None else f"{seconds:g} s"
     context.note(
-        f"should our setpoints stop, {family.name} holds the last rates for {how_long} "
+        f"should our setpoints stop, {autopilot.name} holds the last rates for {how_long} "
         f"({offboard_loss_failsafe.parameter}); then {offboard_loss_failsafe.then}"
     )
 
@@ -171,4 +173,4 @@ def _handed_over(context: FlightContext) -> bool:
         raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
     if not context.link.state.landed:
         raise FlightEnded("the pilot took off", Exit.RELEASE)
-    return context.link.state.mode == context.link.family.ready_mode
+    return context.link.state.mode == context.link.autopilot.ready_mode

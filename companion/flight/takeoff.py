@@ -7,7 +7,7 @@ from companion.flight.mode_roles import in_role, in_roles, require_role
 from companion.flight.orders import change_mode, command_if_ours
 from companion.preflight.evidence import Stage
 from companion.safety.ending import Exit, FlightEnded
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import ControlEntry, Role
 
 _SETTLING = 1.0
 """Hold in offboard before the maneuver begins, s: the take-over is not part of it."""
@@ -32,7 +32,7 @@ async def takeoff(context: FlightContext) -> None:
     _require_ground(context)
     context.detail = "the autopilot to accept the take-off"
     height = context.config.flight.takeoff_height_m
-    command = context.link.family.take_off(height, _home_altitude(context))
+    command = context.link.autopilot.take_off(height, _home_altitude(context))
     context.ground.command_takeoff()
     context.loop.command = None  # an idle one, which nothing may send from here on
     context.guidance_loop.step()
@@ -109,8 +109,8 @@ async def _take_over(context: FlightContext) -> None:
     await context.until(lambda: _commands_flight(context), "a target from guidance")
     context.detail = "the autopilot to obey our rates"
     context.loop.taking_over = True
-    command = context.link.family.take_over()
-    if command is None:
+    autopilot = context.link.autopilot
+    if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
         # The mode we know may be a second old; never take the vehicle from a pilot who took it.
         await context.fresh_heartbeat()
         require_role(context.link, {Role.READY})
@@ -118,6 +118,7 @@ async def _take_over(context: FlightContext) -> None:
         await context.until(lambda: in_role(context.link, Role.OFFBOARD))
         return
     ours = in_roles(context.link, {Role.READY})
+    command = autopilot.set_mode(autopilot.offboard_mode)
     await change_mode(context, command, ours, lambda: in_role(context.link, Role.OFFBOARD))
 
 

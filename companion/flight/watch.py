@@ -11,8 +11,8 @@ from companion.flight.phases import Phase
 from companion.safety import Action, SafetyLadder
 from companion.safety.ending import Exit, FlightEnded
 from companion.safety.monitor import EXITS
+from companion.vehicle.autopilot import Role
 from companion.vehicle.records import outdated
-from companion.vehicle.roles import Role
 
 _STATUS_PERIOD = 0.45
 """PX4 sends CURRENT_MODE every 0.5 s while nothing changes; one that comes sooner is news."""

@@ -1,43 +1,27 @@
-"""Messages to payloads and back. pymavlink knows the messages; the hot two are done by struct.
+"""The two messages of the control loop, by struct: attitude in, body rates out; and lockstep's.
 
-The dialect is ArduPilot's: all of MAVLink common, and the state of its estimator besides; and
-CURRENT_MODE, by which PX4 tells of a mode at once.
-
-The hot pair is worth its own code: pymavlink takes some 40 us for one of them with its checksum
-in Python, this here 2 us. Tests hold it byte for byte against pymavlink in both directions.
+pymavlink takes about 40 us for one of them with its checksum in Python, this code 2 us. Tests
+compare it byte for byte with pymavlink in both directions.
 """
 
 import struct
 from math import isfinite
-from typing import Any
 
 from fastcrc import crc16
-from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.attitude.types import BodyRates, Quaternion
-from companion.mavlink.current_mode import CURRENT_MODE, CurrentModeMessage
-from companion.mavlink.errors import InvalidSetpoint, NonFiniteSetpoint, UnknownMessage
+from companion.mavlink.errors import InvalidSetpoint, NonFiniteSetpoint
 from companion.mavlink.framing import SIGNED, V2
-
-Message = Any
-"""A decoded pymavlink message: fields as attributes, name by `get_type()`."""
+from companion.mavlink.messages import CRC_EXTRA
 
 ATTITUDE_QUATERNION = 31
 SYSTEM_TIME = 2
 SET_ATTITUDE_TARGET = 82
 
-_KINDS: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
-"""Message classes by number."""
-CRC_EXTRA: dict[int, bytes] = {number: bytes([kind.crc_extra]) for number, kind in _KINDS.items()}
-MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in _KINDS.items()}
-
-UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
-"""Messages of MAVLink common that pymavlink's dialects lack: only their payloads can be had."""
-CRC_EXTRA |= {410: bytes([160]), 411: bytes([106])}
-
 IGNORE_ATTITUDE = 128
-"""ATTITUDE_TARGET_TYPEMASK: obey all three rates and the thrust, ignore the quaternion. The only
-mask this program ever sends: any other leaves some field to the autopilot's fancy."""
+"""ATTITUDE_TARGET_TYPEMASK: obey all three rates and the thrust, ignore the quaternion.
+
+This program sends no other mask: with any other the autopilot chooses some field itself."""
 
 _FLOAT32_MAX = 3.4028234663852886e38
 _ATTITUDE = struct.Struct("<I7f")
@@ -45,46 +29,6 @@ _ATTITUDE_BYTES = _ATTITUDE.size
 _SETPOINT = struct.Struct("<BBBBBBBHB I4f3ff BBB")
 _SETPOINT_PAYLOAD_BYTES = 39
 _SETPOINT_EXTRA = CRC_EXTRA[SET_ATTITUDE_TARGET]
-
-
-def message_id(name: str) -> int:
-    """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
-
-    Raises:
-        UnknownMessage: The dialect has no such message.
-    """
-    try:
-        return MESSAGE_IDS[name]
-    except KeyError:
-        raise UnknownMessage(
-            f"MAVLink has no message {name!r}; names are in capitals, as in HEARTBEAT"
-        ) from None
-
-
-def decode(number: int, payload: bytes) -> Message:
-    """Build pymavlink's message object from a frame's payload (checksum already checked)."""
-    kind = _KINDS[number]
-    size = kind.unpacker.size
-    flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
-    wire: list[Any] = []
-    at = 0
-    for length in kind.lengths:
-        field = flat[at]
-        if isinstance(field, bytes):
-            wire.append(field.rstrip(b"\0"))
-        else:
-            wire.append(field if length == 1 else list(flat[at : at + length]))
-        at += length
-    return kind(*(wire[order] for order in kind.orders))
-
-
-def encode(message: Message) -> bytes:
-    """Payload of a pymavlink message."""
-    message.pack(_PACKER)
-    return bytes(message.get_payload())
-
-
-_PACKER = dialect.MAVLink(None)
 
 
 def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:

@@ -1,16 +1,36 @@
 """COMMAND_LONG with its COMMAND_ACK. Source: the MAVLink command protocol."""
 
 import asyncio
+from typing import NamedTuple
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from companion.mavlink.codec import Message
 from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.texts import TextAssembler
+
+MAV_CMD_NAV_RETURN_TO_LAUNCH = 20
+MAV_CMD_NAV_LAND = 21
+MAV_CMD_NAV_TAKEOFF = 22
+MAV_CMD_DO_SET_MODE = 176
+MAV_CMD_COMPONENT_ARM_DISARM = 400
+MAV_CMD_REQUEST_MESSAGE = 512
+
+
+class Command(NamedTuple):
+    """A MAV_CMD with its parameters, ready for `Link.command(*command)`."""
+
+    command: int
+    p1: float = 0.0
+    p2: float = 0.0
+    p3: float = 0.0
+    p4: float = 0.0
+    p5: float = 0.0
+    p6: float = 0.0
+    p7: float = 0.0
+
 
 _ACCEPTED = 0
 _IN_PROGRESS = 5

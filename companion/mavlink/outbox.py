@@ -4,15 +4,9 @@ import asyncio
 from math import inf
 
 from companion.attitude.types import BodyRates
-from companion.mavlink.codec import (
-    CRC_EXTRA,
-    SYSTEM_TIME,
-    Message,
-    SetpointEncoder,
-    encode,
-    encode_system_time,
-)
+from companion.mavlink.codec import SYSTEM_TIME, SetpointEncoder, encode_system_time
 from companion.mavlink.framing import build_frame
+from companion.mavlink.messages import CRC_EXTRA, Message, encode
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport import Tap, Transport

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
-from companion.mavlink.codec import MESSAGE_IDS, Message
 from companion.mavlink.errors import ParameterRefused, UnansweredParameter, UnknownParameter
+from companion.mavlink.messages import MESSAGE_IDS, Message
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending, PendingRegistry
 from companion.mavlink.router import Router

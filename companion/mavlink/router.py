@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable
 from typing import TypeVar
 
-from companion.mavlink.codec import UNDECODED, Message, decode, message_id
+from companion.mavlink.messages import UNDECODED, Message, decode, message_id
 from companion.mavlink.stats import LinkStats
 
 _LOG = logging.getLogger(__name__)

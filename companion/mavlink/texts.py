@@ -3,7 +3,7 @@
 from collections import deque
 from typing import NamedTuple
 
-from companion.mavlink.codec import Message
+from companion.mavlink.messages import Message
 
 _CHUNK_CHARACTERS = 50
 _KEPT = 100

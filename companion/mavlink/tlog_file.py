@@ -7,9 +7,9 @@ the wire.
 from collections.abc import Iterator, Set
 from pathlib import Path
 
-from companion.mavlink.codec import CRC_EXTRA, MESSAGE_IDS, Message, decode
 from companion.mavlink.errors import LogError
 from companion.mavlink.framing import V1, V2, Frame, FrameScanner
+from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
 _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13

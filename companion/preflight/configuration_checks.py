@@ -12,7 +12,7 @@ from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.recording.dead_time import AxisDeadTime, DeadTimes
 from companion.vehicle.parameter_rules import Verdict
-from companion.vehicle.registry import FAMILIES
+from companion.vehicle.registry import AUTOPILOTS
 
 SAFE, INEFFECTIVE = Verdict.SAFE, Verdict.INEFFECTIVE
 
@@ -67,9 +67,11 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
 
 def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether each exception names something that can be found at all."""
-    streams = {f"{Key.STREAMS}.{name}" for family in FAMILIES for name in family.wanted_rates}
+    streams = {
+        f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates
+    }
     limits = {"link.min_attitude_rate_hz", "link.min_position_rate_hz"}
-    parameters = {rule.name for family in FAMILIES for rule in family.parameters}
+    parameters = {rule.name for autopilot in AUTOPILOTS for rule in autopilot.parameters}
     for name in config.flight.accept:
         if name not in {*Key, *streams, *limits, *parameters}:
             yield Finding(

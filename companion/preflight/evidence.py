@@ -8,7 +8,7 @@ from typing import NamedTuple
 from companion.guidance import ManeuverSequence
 from companion.mavlink.stats import share_lost
 from companion.preflight.parameter_survey import Survey
-from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.state import VehicleState
 from companion.vehicle.streams import StreamRate
 
@@ -135,7 +135,7 @@ class Evidence:
         maneuvers: What is to be flown; `None` where nothing is.
     """
 
-    family: AutopilotFamily
+    autopilot: Autopilot
     state: VehicleState
     survey: Survey
     streams: Mapping[str, StreamRate]
@@ -155,7 +155,7 @@ class Evidence:
         """Whether the vehicle has no position yet, so that nothing about it can be told."""
         readiness = self.state.readiness
         estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
-        return not readiness.position or self.family.not_ready(estimator_only) is not None
+        return not readiness.position or self.autopilot.not_ready(estimator_only) is not None
 
     @property
     def booting(self) -> bool:

@@ -5,11 +5,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from companion.config import Config
-from companion.mavlink.codec import message_id
 from companion.mavlink.errors import CommandRefused, LinkTimeout
+from companion.mavlink.messages import dialect, message_id
 from companion.mavlink.stats import LinkStats
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, Stage
 from companion.preflight.link_listener import LinkListener
@@ -27,7 +25,7 @@ _RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
 def wanted_rates(config: Config, link: Link) -> dict[str, float]:
     """The telemetry a flight asks for, in Hz by message."""
     return {
-        **link.family.wanted_rates,
+        **link.autopilot.wanted_rates,
         "ATTITUDE_QUATERNION": config.link.attitude_rate_hz,
         "LOCAL_POSITION_NED": config.link.position_rate_hz,
     }
@@ -61,13 +59,13 @@ async def gather(
     before, began = replace(link.stats), loop.time()
     with LinkListener(link, loop.time) as ear:
         read, achieved, identity = await asyncio.gather(
-            survey(link, link.family.parameters, before=known),
+            survey(link, link.autopilot.parameters, before=known),
             link.measure_rates(granted, seconds),
             _identity_and_words(link) if thorough else identify(link),
         )
     counts = link.stats.by_message
     return Evidence(
-        family=link.family,
+        autopilot=link.autopilot,
         state=link.state,
         survey=read,
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},

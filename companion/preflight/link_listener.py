@@ -5,11 +5,9 @@ from math import isfinite
 from statistics import median
 from types import TracebackType
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from companion.attitude.representation import is_unit
-from companion.mavlink.codec import Message
 from companion.mavlink.framing import Frame
+from companion.mavlink.messages import Message, dialect
 from companion.preflight.evidence import OtherNodes, SampleTimes
 from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link

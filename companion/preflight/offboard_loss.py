@@ -43,14 +43,14 @@ class Worst(NamedTuple):
 
 def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints end at the worst moment of the flight."""
-    offboard_loss_failsafe, maneuvers = evidence.family.offboard_loss_failsafe, evidence.maneuvers
-    held = evidence.survey.values.get(offboard_loss_failsafe.parameter)
+    failsafe, maneuvers = evidence.autopilot.offboard_loss_failsafe, evidence.maneuvers
+    held = evidence.survey.values.get(failsafe.parameter)
     if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
         return  # an unknown or longer time is unsafe, whatever is flown
-    worst = worst_reach(config, maneuvers, held, brakes=offboard_loss_failsafe.brakes)
+    worst = worst_reach(config, maneuvers, held, brakes=failsafe.brakes)
     carried = (
         f"should our setpoints end, the last rates are held for {held:g} s "
-        f"({offboard_loss_failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
+        f"({failsafe.parameter}), and can carry the vehicle {worst.away:.0f} m away, "
         f"{worst.up:.0f} m up and {worst.down:.0f} m down"
     )
     source = "worst case of docs/exits.md"
@@ -58,7 +58,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(Key.OFFBOARD_LOSS, Verdict.SAFE, carried, source=source)
         return
     shortest = shortest_hold(config.deadman.silence_limit)
-    shorter = f"set {offboard_loss_failsafe.parameter} to {shortest:g}, " if held > shortest else ""
+    shorter = f"set {failsafe.parameter} to {shortest:g}, " if held > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,
         Verdict.INEFFECTIVE,

@@ -13,7 +13,7 @@ from companion.vehicle.parameter_rules import ParameterFinding, ParameterRule, V
 
 def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """What the parameters that were read say, and what it means that one was not."""
-    rules, survey = evidence.family.parameters, evidence.survey
+    rules, survey = evidence.autopilot.parameters, evidence.survey
     if not survey.values:
         yield Finding(
             Key.PARAMETERS,
@@ -26,19 +26,19 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
         return
     for rule in rules:
         if rule.vital and rule.name not in survey.values:
-            yield _missing(rule, evidence.family.name)
+            yield _missing(rule, evidence.autopilot.name)
     yield from _untold(evidence)
     for found in judge(rules, survey.values, autopilot_setup(config)):
         yield _finding(found, survey.names[found.rule.name])
 
 
-def _missing(rule: ParameterRule, family: str) -> Finding:
+def _missing(rule: ParameterRule, autopilot: str) -> Finding:
     return Finding(
         rule.name,
         Verdict.UNSAFE,
         f"the autopilot has no parameter {rule.name}, or did not tell it",
         f"it cannot be known {rule.meaning}",
-        f"mend the link; where it has none, this needs a newer version of {family}",
+        f"mend the link; where it has none, this needs a newer version of {autopilot}",
         rule.source,
     )
 
@@ -47,7 +47,7 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
     """What may have been lost on the way; on a good link it is what this version has not."""
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > SOME_LOST
-    rules = [rule for rule in evidence.family.parameters if not rule.vital]
+    rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
     hidden = [rule for rule in rules if rule.universal and _hidden(rule, survey)]
     unread = [rule.name for rule in hidden]
     if lossy:

@@ -78,7 +78,7 @@ class Patient:
 
     def _waits(self) -> bool:
         state = self.link.state
-        return not state.armed and self.link.family.not_ready(state.readiness) is not None
+        return not state.armed and self.link.autopilot.not_ready(state.readiness) is not None
 
 
 @asynccontextmanager

@@ -35,7 +35,7 @@ class Undo(Section):
         """Whether this is the vehicle whose parameters were changed."""
         same_hardware = None in (self.uid, identity.uid) or self.uid == identity.uid
         told = self.autopilot, self.system
-        return same_hardware and told == (link.family.name, link.settings.target_system)
+        return same_hardware and told == (link.autopilot.name, link.settings.target_system)
 
 
 class UndoFile:
@@ -51,7 +51,7 @@ class UndoFile:
         began = datetime.now(UTC)
         self.path = _unused(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
         self._undo = Undo(
-            autopilot=link.family.name,
+            autopilot=link.autopilot.name,
             system=link.settings.target_system,
             uid=identity.uid,
             time=began.isoformat(timespec="seconds"),

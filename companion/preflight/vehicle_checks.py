@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
 from companion.config import Config
 from companion.guidance.fence import Place, inside, local_polygon
+from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_rules import Verdict
@@ -99,7 +98,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     ready = state.readiness
     if stage is Stage.AIRBORNE:  # its checks before arming are over
         ready = ready._replace(prearm_good=True)
-    missing = evidence.family.not_ready(ready)
+    missing = evidence.autopilot.not_ready(ready)
     said = "; ".join(dict.fromkeys(evidence.words))
     if missing is not None:
         silent = evidence.awaited
@@ -222,7 +221,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """What autopilot it is."""
-    identity, name = evidence.identity, evidence.family.name
+    identity, name = evidence.identity, evidence.autopilot.name
     if identity.version is None or identity.capabilities is None:
         yield Finding(
             Key.VERSION,

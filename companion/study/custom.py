@@ -57,8 +57,8 @@ def _run(case: Case, tick: Tick) -> Outcome:
         conditions=_conditions(case),
         figure=_figure(case, flown),
         caption=(
-            f"Every method at {case.rates_hz[0]:g} Hz, at the heading where it leaves the straight"
-            f" line most. The reference is {_reference_words(case)}."
+            f"Every method at {case.rates_hz[0]:g} Hz, at the heading with its largest cross-track."
+            f" The reference is {_reference_words(case)}."
         ),
         tables=(
             Table(
@@ -91,7 +91,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
         series=(
             Table(
                 "custom-response",
-                "Every sample of every response; rates are held from one sample to the next.",
+                "Every sample of every response; rates are held until the next sample.",
                 ("method", "rate, Hz", "heading, °", "time, s", "a_N", "a_E", "ω_x", "ω_y", "ω_z"),
                 tuple(
                     row for key, response in flown.items() for row in _samples(case, *key, response)
@@ -104,7 +104,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
 def _samples(
     case: Case, method: Method, hz: float, response: Response
 ) -> Iterator[tuple[Cell, ...]]:
-    """Rows of one response: coefficients at a sample, and the body rates (rad/s) it answered."""
+    """Rows of one response: coefficients at a sample, and the body rates commanded there."""
     time = response.step.time
     for k, heading in enumerate(case.headings_deg):
         paths, rates = response.at(k), response.rates[:, :, k]
@@ -128,7 +128,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 
 
 def _reference(case: Case, rate_hz: float) -> Floats:
-    """First order, with the limit of equation 33 where the case asks for it."""
+    """First order, with the limit of equation 33 if the case says so."""
     model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
 
@@ -142,7 +142,7 @@ def _conditions(case: Case) -> str:
     loop = "body rates follow at once"
     if case.inner_loop:
         loop = (
-            f"complete inner loop, {case.quickness} times as quick as measured,"
+            f"complete inner loop, {case.quickness} times as fast as measured,"
             f" after {case.transport_delay_ms} ms of transport delay"
         )
     bounds = ", ".join(

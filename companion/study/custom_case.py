@@ -1,4 +1,4 @@
-"""A case of one's own for `companion study custom`, as it stands in a YAML file."""
+"""The YAML file of `companion study custom`: a step, the methods that fly it, and how."""
 
 from math import hypot, radians, sin
 from typing import Annotated, Literal
@@ -13,7 +13,7 @@ Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
 
 MOST_STEPS = 5e6
-"""Of the planner, or of the inner loop's physics: half a gigabyte, some minutes."""
+"""Steps of the planners or of the physics that need half a gigabyte and some minutes."""
 
 
 class CaseLimits(Section):
@@ -30,7 +30,7 @@ class CaseLimits(Section):
 
 
 class Case(Section):
-    """A step of the coefficients, and who shall fly it how."""
+    """A step of the coefficients, and how it is flown."""
 
     start: Pair
     """Acceleration coefficients [north, east] at the start; their length is sin(tilt)."""
@@ -40,7 +40,7 @@ class Case(Section):
         tuple[Annotated[float, Field(ge=-360.0, le=360.0)], ...],
         Field(min_length=1, max_length=360),
     ] = (0.0,)
-    """Tilt-yaw headings at which it is flown."""
+    """Tilt-yaw headings; the step is flown at each."""
     methods: Annotated[
         tuple[Annotated[str, Field(max_length=50)], ...],
         Field(min_length=1, max_length=len(LAW_NAMES)),
@@ -56,15 +56,15 @@ class Case(Section):
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=50.0)] = 2.0
     """Heading gain of first-order and exact; the others use gain_per_s, as in the paper."""
     seconds: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
-    """How long it is watched."""
+    """Length of the response."""
     limits: CaseLimits = CaseLimits()
     """Limits of the planners."""
     inner_loop: StrictBool = False
-    """Fly the bundled vehicle's rate loop, rotors and rigid body instead of ideal kinematics."""
+    """Fly with the bundled vehicle's rate loop, rotors and rigid body, not ideal kinematics."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
-    """Divides every time of the inner loop; 1 answers as a PX4 was measured to."""
+    """Divides every time of the inner loop; 1 responds as measured on a PX4."""
     transport_delay_ms: Annotated[int, Field(ge=0, le=500)] = 0
-    """Delay of the setpoints on their way, with the inner loop only."""
+    """Transport delay of the setpoints, with the inner loop only."""
 
     @model_validator(mode="after")
     def _step_makes_sense(self) -> "Case":
@@ -107,7 +107,7 @@ class Case(Section):
 
     @property
     def steps_to_fly(self) -> float:
-        """Steps of the planners, or with the inner loop of its physics, over the whole case."""
+        """Steps of the planners, or of the physics with the inner loop, of the whole case."""
         flown_s = len(self.headings_deg) * len(self.methods) * self.seconds
         if self.inner_loop:
             return flown_s * len(self.rates_hz) * 1000.0 * self.quickness

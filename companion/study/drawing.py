@@ -1,4 +1,4 @@
-"""What all figures share: their size, their axes, the lines of a method."""
+"""Shared by all figures: size, axes, and the lines of a method."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,7 +11,7 @@ from companion.study.methods import REFERENCE, Line, Method
 from companion.study.step import Floats
 
 _MOST_POINTS = 400
-"""A line is drawn with no more; a page of full ones would weigh megabytes."""
+"""Of a line. With all points a page would have megabytes."""
 
 STYLE: Any = {  # matplotlib types the keys as a literal of three hundred
     "font.size": 9.0,
@@ -35,7 +35,7 @@ def new_figure(
 
 
 def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
-    """A line, thinned to what can be seen."""
+    """Draw a line with at most about `_MOST_POINTS` points."""
     stride = max(1, len(x) // _MOST_POINTS)
     keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
     axes.plot(x[keep], y[keep], **line, label=label or None)
@@ -44,7 +44,7 @@ def draw(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
 def draw_response(
     north: Axes, east: Axes, time: Floats, curves: Iterable[tuple[Method, str, Floats]]
 ) -> None:
-    """Both coefficients over time; `curves` are (method, label, (n, 2) coefficients)."""
+    """Draw both coefficients over time; `curves` are (method, label, (n, 2) coefficients)."""
     for method, label, c in curves:
         for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
             draw(axes, time, values, method.line, label)
@@ -65,13 +65,13 @@ def label_tilt_rate(axes: Axes, title: str) -> None:
 def draw_reference(
     north: Axes, east: Axes, time: Floats, reference: Floats, label: str = "first-order reference"
 ) -> None:
-    """A reference model, over the curves that should follow it."""
+    """Draw a reference model over the curves."""
     draw(north, time, reference[:, 0], REFERENCE, label)
     draw(east, time, reference[:, 1], REFERENCE, label)
 
 
 def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
-    """Paths in the plane of the coefficients; `ends` are (2, 2): start and target."""
+    """Draw paths in the plane of the coefficients; `ends` are (2, 2): start and target."""
     for method, label, c in curves:
         draw(axes, c[:, 1], c[:, 0], method.line, label)
     axes.plot(ends[:, 1], ends[:, 0], **REFERENCE)

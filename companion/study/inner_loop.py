@@ -1,8 +1,8 @@
-"""A planner flown with the complete inner loop (the paper's figure 5), in the judge's own physics.
+"""A planner flown with the complete inner loop (the paper's figure 5), in the physics of the mock.
 
-The mock's multirotor is what the planner commands: rate loop with PI, feed-forward and saturation,
-rotor lag, aerodynamic damping, and a rigid body with its gyroscopic torque. There are no sensors:
-the planner sees the true attitude, so that what differs from the ideal is the inner loop's doing.
+The planner commands the mock's multirotor: a PI rate loop with feed-forward and saturation, rotor
+lag, aerodynamic damping, and a rigid body with gyroscopic torque. There are no sensors; the planner
+sees the true attitude, so every deviation from the ideal response comes from the inner loop.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ from sitl_mock.physics.multirotor import Multirotor
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
-"""Step of the setpoint that measures the rate loop, rad/s; it tilts by 57° in its 2 s."""
+"""Setpoint step that measures the rate loop, rad/s. In 2 s it tilts the vehicle by 57°."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +32,10 @@ class InnerLoopFlight:
     Attributes:
         time: (n+1,), s from the start.
         q: (n+1, 4), attitude (w, x, y, z), body → world (NED).
-        body_rates: (n+1, 3), how the vehicle really turns.
-        commanded: (n, 3), the rates asked at each sample, before any delay.
-        tilt_saturated: (n,), whether the rotors fell short of the roll and pitch torque asked of
-            them, at any physics step of the sample.
+        body_rates: (n+1, 3), true rates of the vehicle.
+        commanded: (n, 3), rates commanded at each sample, before any delay.
+        tilt_saturated: (n,), whether the rotors could not give the commanded roll and pitch torque
+            at some physics step of the sample.
         yaw_saturated: (n,), the same for the yaw torque.
     """
 
@@ -49,11 +49,11 @@ class InnerLoopFlight:
 
 @dataclass(frozen=True)
 class InnerLoop:
-    """What lies between the body rates a planner asks for and the attitude it sees.
+    """Rate loop, rotors and rigid body between commanded body rates and attitude.
 
     Attributes:
         airframe: body and rotors; by default those of PX4's simulated quadrotor.
-        rate_loop: the body-rate controller; by default tuned to PX4's measured response.
+        rate_loop: the body-rate controller; by default tuned to the measured response of PX4.
         transport_delay: of every setpoint (rates and thrust) on top of the rate loop's own delay,
             s, to the nearest physics step.
 
@@ -74,16 +74,15 @@ class InnerLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> InnerLoopFlight:
-        """Fly one target from rest, the planner's rates held from one of its samples to the next.
+        """Fly one target from rest; the rates are held from one planner sample to the next.
 
-        The collective holds height at the tilt of each sample, by the flight's own
-        `specific_thrust`. The coefficients do not depend on it, but the torque the rotors can give
-        before they saturate does, and in a tilt a hover thrust would misjudge it.
+        The thrust holds height at the tilt of each sample (`specific_thrust`, as in flight). It
+        has no effect on the coefficients, but decides at which torque the rotors saturate.
 
         Args:
             planner: any of `companion.attitude`; it is not reset.
             start: attitude at the start, at rest, the rotors turning steadily.
-            target: held throughout.
+            target: held for the whole flight.
             seconds: length of the flight, to the nearest sample.
             rate_hz: samples of the planner per second; must divide the physics rate.
 
@@ -98,7 +97,7 @@ class InnerLoop:
             raise ValueError(f"seconds must hold one sample at least, not {seconds}")
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust(q))
-        setpoints = self._awaiting_mode(multirotor.throttle(_thrust(q)))
+        setpoints = self._setpoint_queue(multirotor.throttle(_thrust(q)))
         attitudes, turning, commanded, saturated = [q], [multirotor.body_rates], [], []
         for _ in range(samples):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
@@ -123,12 +122,12 @@ class InnerLoop:
         )
 
     def rate_step_63(self) -> float:
-        """Seconds until the roll rate has made 1 − 1/e (63 %) of a step of its setpoint, in hover.
+        """Seconds until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint, in hover.
 
-        It counts every delay, and so is the time to hold against the 1/p of a planner.
+        It includes every delay; compare it with 1/p of a planner.
 
         Raises:
-            ValueError: the roll rate does not get there in 2 s.
+            ValueError: the roll rate does not reach it in 2 s.
         """
         flight = self.fly(
             _Constant(ROLL_STEP),
@@ -158,17 +157,17 @@ class InnerLoop:
             )
         return steps
 
-    def _awaiting_mode(self, throttle: float) -> deque[tuple[BodyRates, float]]:
-        """The setpoints under way, newest last: at the start no rates and this throttle."""
+    def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
+        """Setpoints within the transport delay, newest last; at the start zero rates."""
         length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
 
 
 def quickened(factor: int) -> InnerLoop:
-    """The default inner loop with every one of its times divided by `factor`, nothing else changed.
+    """The default inner loop with all of its times divided by `factor`.
 
-    A smaller vehicle: inertia and rotor lag shrink, the torques stay, and so the response in the
-    scaled time is the same. Its physics run `factor` times as often.
+    Inertia and rotor lag shrink, the torques stay: the response is the same in scaled time. The
+    physics run `factor` times as often.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
     shrunk = {
@@ -191,7 +190,7 @@ def quickened(factor: int) -> InnerLoop:
 
 
 class _Constant:
-    """A planner that asks for the same rates, whatever the attitude."""
+    """A planner that always commands the same rates."""
 
     def __init__(self, rates: BodyRates) -> None:
         self._rates = rates
@@ -203,7 +202,7 @@ class _Constant:
         return self._rates
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Whatever the axes."""
+        """Not used."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Nothing to forget."""

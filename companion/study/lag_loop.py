@@ -1,4 +1,4 @@
-"""A rate loop in two numbers: dead time and first-order lag, the same on every axis."""
+"""A rate loop as dead time and first-order lag, the same on every axis."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -41,16 +41,16 @@ class LagBody:
         self.q = q
         self.rates = BodyRates(0.0, 0.0, 0.0)
         self._kept = exp(-1e3 / (STEP_HZ * lag_ms))
-        self._mean = 1e-3 * lag_ms * (1.0 - self._kept) * STEP_HZ  # of what is kept, over the step
-        self._under_way = deque([self.rates] * (dead_time_ms + 1))
+        self._mean = 1e-3 * lag_ms * (1.0 - self._kept) * STEP_HZ  # of the decay over a step
+        self._delayed = deque([self.rates] * (dead_time_ms + 1))
 
     def turn(self, commanded: BodyRates, steps: int) -> None:
-        """Hold a command for so many steps."""
+        """Hold a command for this number of steps."""
         kept, mean, (roll, pitch, yaw) = self._kept, self._mean, self.rates
         for _ in range(steps):
-            self._under_way.append(commanded)
-            self._under_way.popleft()
-            p, r, y = self._under_way[0]
+            self._delayed.append(commanded)
+            self._delayed.popleft()
+            p, r, y = self._delayed[0]
             roll, pitch, yaw = roll - p, pitch - r, yaw - y
             rates = (p + mean * roll, r + mean * pitch, y + mean * yaw)
             self.q = turned(self.q, rates, 1.0 / STEP_HZ)
@@ -73,7 +73,7 @@ class LagLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> LagFlight:
-        """Fly one target from rest, the planner's rates held from one of its samples to the next.
+        """Fly one target from rest; the rates are held from one planner sample to the next.
 
         Raises:
             ValueError: a sample is not a whole number of steps.

@@ -1,4 +1,4 @@
-"""The methods that are compared: one name and one look each, in every figure and table."""
+"""The methods that are compared, with the same label and line style in every figure and table."""
 
 from typing import Any, NamedTuple, cast
 
@@ -6,14 +6,14 @@ from companion.attitude import Limits, make_planner
 from companion.attitude.planner import LawPlanner
 
 Line = dict[str, Any]
-"""How matplotlib draws a line: its keywords."""
+"""Keywords of a line in matplotlib."""
 
 
 class Method(NamedTuple):
-    """A planner under the name and the look that it has throughout.
+    """A planner with its label and line style.
 
-    The colours are Okabe and Ito's, which the colour-blind tell apart; the dashes and widths keep
-    the methods apart in black and white, and let a curve be seen below another that is narrower.
+    The colours are Okabe and Ito's, made for colour-blind readers. Dashes tell the methods apart in
+    black and white; widths keep a curve visible below a narrower one.
     """
 
     planner: str
@@ -30,9 +30,9 @@ class Method(NamedTuple):
 
 
 LIMIT: Line = {"color": "#666666", "linestyle": "-", "linewidth": 0.8}
-"""The look of a limit."""
+"""Line style of a limit."""
 REFERENCE: Line = {"color": "black", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
-"""The look of every reference model."""
+"""Line style of a reference model."""
 
 QUATERNION = Method("quaternion", "quaternion", "#E69F00", width=3.4)
 SO3 = Method("so3", "so3", "#009E73", (5, 2), 2.4)
@@ -43,9 +43,9 @@ FOLLOWING = Method("model-following", "model-following", "#332288", width=2.2)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPERS = (QUATERNION, SO3, EULER, PROPOSED)
-"""The methods of the paper's comparison, in drawing order: the broad lines come first."""
+"""The methods of the paper's comparison, in drawing order: broad lines first."""
 BY_PLANNER = {method.planner: method for method in (*PAPERS, EXACT)}
-"""The look of every planner, in the same order."""
+"""The method of every planner, in the same order."""
 
 
 def planner_of(
@@ -54,5 +54,5 @@ def planner_of(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     yaw_gain: float = 2.0,
 ) -> LawPlanner:
-    """The planner of a method, the very one that flies."""
+    """The planner of a method: the same code that flies a vehicle."""
     return cast(LawPlanner, make_planner(method.planner, gain, yaw_gain, limits))

@@ -1,4 +1,4 @@
-"""One page with everything: opens offline, in any browser, from one file."""
+"""Writes the files of a study, and one page that opens offline in any browser."""
 
 import base64
 import io
@@ -27,10 +27,10 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
 
 
 def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write the page, beside the figures that `write_outcome` wrote.
+    """Write the page; the figures of `write_outcome` must be in its folder.
 
     Raises:
-        OSError: it cannot be written, or a figure is not there.
+        OSError: it cannot be written, or a figure is missing.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("companion.study", "."),
@@ -53,7 +53,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
 
 
 def _image(figure: Figure, ending: str) -> bytes:
-    """The file of a figure; the same figure gives the same bytes."""
+    """The content of a figure's file; the same figure gives the same bytes."""
     buffer = io.BytesIO()
     metadata = {"Date": None} if ending == "svg" else {"Software": None}
     figure.savefig(buffer, format=ending, dpi=130, metadata=metadata)
@@ -61,7 +61,7 @@ def _image(figure: Figure, ending: str) -> bytes:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all: an older one stays until the new one is there."""
+    """Replace a file in one step, so that an interruption leaves the old one or the new one."""
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(content)

@@ -1,4 +1,4 @@
-"""A step of the wanted coefficients, and what a planner makes of it."""
+"""A step of the target coefficients, and the response of a planner to it."""
 
 from dataclasses import dataclass
 from math import pi
@@ -26,9 +26,9 @@ class Step:
     Attributes:
         start, target: acceleration coefficients.
         gain: p of the planners and of the first-order reference, 1/s.
-        rate_hz: of the planner.
-        seconds: how long it is watched.
-        headings: tilt-yaw headings, rad; each is kept during the step.
+        rate_hz: sample rate of the planner.
+        seconds: length of the response.
+        headings: tilt-yaw headings, rad; each is held during the step.
     """
 
     start: Coefficients
@@ -40,12 +40,12 @@ class Step:
 
     @property
     def samples(self) -> int:
-        """How many samples the planner answers."""
+        """Number of samples of the planner."""
         return round(self.seconds * self.rate_hz)
 
     @property
     def time(self) -> Floats:
-        """(samples + 1,) s, from the step on."""
+        """(samples + 1,) s after the step."""
         return np.arange(self.samples + 1) / self.rate_hz
 
     def reference(self, model: FirstOrderReference | None = None) -> Floats:
@@ -57,12 +57,12 @@ class Step:
 FIGURE_2 = Step(Coefficients(-0.4, -0.5), Coefficients(0.4, -0.5))
 """The step of the paper's figures 2, 3 and 5."""
 FIGURE_4 = Step(Coefficients(-0.5, 0.0), Coefficients(0.0, 0.5))
-"""The step of the paper's figure 4, which the rate limit shapes."""
+"""The step of the paper's figure 4, where the rate limit is active."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """What one planner made of a step, sample by sample.
+    """The response of one planner to a step, sample by sample.
 
     Attributes:
         step: the step that was flown.
@@ -85,7 +85,7 @@ class Response:
 
 
 class Flown(Protocol):
-    """What a loop hands over: q (samples + 1, 4), commanded body rates (samples, 3) in rad/s."""
+    """A flight: q (samples + 1, 4), commanded body rates (samples, 3) in rad/s."""
 
     @property
     def q(self) -> Floats:
@@ -99,7 +99,7 @@ class Flown(Protocol):
 
 
 class Loop(Protocol):
-    """What lies between the body rates a planner asks for and the attitude it sees."""
+    """A model between commanded body rates and attitude."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
@@ -109,7 +109,7 @@ class Loop(Protocol):
 
 
 def fly(planner: LawPlanner, step: Step) -> Response:
-    """Fly a step with body rates that follow at once, as the paper's section 4 assumes."""
+    """Fly a step with body rates that follow at once (the assumption of section 4)."""
     starts = [attitude(step.start, heading) for heading in step.headings]
     targets = [(*step.target, heading, 0.0) for heading in step.headings]
     history = batch.simulate(

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
-from companion.mavlink.codec import Message, message_id
-from companion.mavlink.command import MAV_CMD_REQUEST_MESSAGE
-from companion.mavlink.commands import CommandClient
+from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE, CommandClient
 from companion.mavlink.errors import LinkTimeout, NotConnected
+from companion.mavlink.messages import Message, message_id
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import Pending, PendingRegistry
@@ -13,7 +12,7 @@ from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
-from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.registry import read_events
 from companion.vehicle.state import VehicleState
@@ -54,15 +53,15 @@ class VehicleClient:
         read_events(router, texts, clock)
         self._commands = CommandClient(settings, outbox, router, self._registry, texts)
         self._parameters = ParameterClient(
-            settings, outbox, router, self._registry, lambda: self.family.bytewise_parameters
+            settings, outbox, router, self._registry, lambda: self.autopilot.bytewise_parameters
         )
 
     @property
-    def family(self) -> AutopilotFamily:
+    def autopilot(self) -> Autopilot:
         """How to speak to this autopilot. Raises `NotConnected` before its first heartbeat."""
-        if self.state.family is None:
+        if self.state.autopilot is None:
             raise NotConnected("no heartbeat yet; wait_connected() comes first")
-        return self.state.family
+        return self.state.autopilot
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
         """Call `callback` with each message of that name; call the result to end it.
@@ -149,7 +148,7 @@ class VehicleClient:
             CommandTimeout: The autopilot did not answer a request.
             LinkLost: The connection dropped meanwhile.
         """
-        step_us = self.family.interval_step_us
+        step_us = self.autopilot.interval_step_us
         return await set_rates(self._commands, self.stats, rates, window_s, step_us)
 
     async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:

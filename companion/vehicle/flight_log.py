@@ -4,16 +4,16 @@ from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from companion.mavlink.codec import IGNORE_ATTITUDE, Message
+from companion.mavlink.codec import IGNORE_ATTITUDE
 from companion.mavlink.errors import LogError
+from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
-from companion.vehicle.autopilot import AutopilotFamily
-from companion.vehicle.registry import FAMILIES, FAMILY_NAMES
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Autopilot, Role
+from companion.vehicle.registry import AUTOPILOT_NAMES, AUTOPILOTS
 
 Row = tuple[float, ...]
 
-_FAMILIES = {family.autopilot: family for family in FAMILIES}
+_AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
 _ARMED = 128
 _WHAT_COUNTS = IGNORE_ATTITUDE | 0b1100111
 """Of a type mask: quaternion, three rates, throttle, and the body thrust that may replace it."""
@@ -63,7 +63,7 @@ def read_flight_log(path: Path) -> FlightLog:
     for frame, message in messages(path, _NAMES):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
-        raise LogError(f"{path}: holds no heartbeat of {FAMILY_NAMES}")
+        raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
     if not reader.offboard_active:
         raise LogError(
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
@@ -94,7 +94,7 @@ class _Reader:
     quaternion: list[Row] = field(default_factory=list)
     euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
-    _family: AutopilotFamily | None = None
+    _family: Autopilot | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)
     _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -110,8 +110,8 @@ class _Reader:
             self._telemetry(kind, message)
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
-        if self.vehicle is None and heartbeat.autopilot in _FAMILIES:
-            self.vehicle, self._family = source, _FAMILIES[heartbeat.autopilot]
+        if self.vehicle is None and heartbeat.autopilot in _AUTOPILOTS:
+            self.vehicle, self._family = source, _AUTOPILOTS[heartbeat.autopilot]
         if source != self.vehicle or self._family is None:
             return
         mode = self._family.mode_name(heartbeat.base_mode, heartbeat.custom_mode)

@@ -9,13 +9,13 @@ from fastcrc import crc16
 from companion.attitude.types import BodyRates, Quaternion
 from companion.mavlink.codec import (
     ATTITUDE_QUATERNION,
-    CRC_EXTRA,
     SYSTEM_TIME,
     decode_attitude,
     decode_beacon,
 )
 from companion.mavlink.framing import V2, Frame, FrameScanner
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings

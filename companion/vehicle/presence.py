@@ -2,8 +2,7 @@
 
 import asyncio
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
+from companion.mavlink.messages import dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.settings import LinkSettings
 from companion.vehicle.clock import VehicleClock

@@ -6,21 +6,23 @@ from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.router import Router
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.ardupilot.autopilot import ArduPilot
-from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.px4.autopilot import Px4
 from companion.vehicle.px4.events import EventReader
 
-FAMILIES: tuple[AutopilotFamily, ...] = (Px4(), ArduPilot())
+AUTOPILOTS: tuple[Autopilot, ...] = (Px4(), ArduPilot())
 
-FAMILY_NAMES = " or ".join(f"{family.name} ({family.autopilot})" for family in FAMILIES)
+AUTOPILOT_NAMES = " or ".join(
+    f"{autopilot.name} ({autopilot.mav_autopilot})" for autopilot in AUTOPILOTS
+)
 """For people, with their MAV_AUTOPILOT numbers."""
 
 MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 """MAV_TYPE of four, two coaxial, six, eight, three, twelve and ten rotors."""
 
 
-def family_for(autopilot: int, vehicle_type: int) -> AutopilotFamily:
-    """The family of a heartbeat's `autopilot` and `type`.
+def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
+    """The family of a heartbeat's `autopilot` (`mav_autopilot` here) and `type`.
 
     Raises:
         UnsupportedAutopilot: None of ours, or no multirotor: the same mode numbers mean something
@@ -30,12 +32,12 @@ def family_for(autopilot: int, vehicle_type: int) -> AutopilotFamily:
         raise UnsupportedAutopilot(
             f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor, and only those are flown"
         )
-    for family in FAMILIES:
-        if family.autopilot == autopilot:
-            return family
+    for autopilot in AUTOPILOTS:
+        if autopilot.mav_autopilot == mav_autopilot:
+            return autopilot
     raise UnsupportedAutopilot(
-        f"the vehicle's autopilot (MAV_AUTOPILOT {autopilot}) is not supported; this version "
-        f"flies {FAMILY_NAMES}"
+        f"the vehicle's autopilot (MAV_AUTOPILOT {mav_autopilot}) is not supported; this version "
+        f"flies {AUTOPILOT_NAMES}"
     )
 
 

@@ -5,14 +5,13 @@ from dataclasses import dataclass, fields
 from math import inf, isfinite
 
 from companion.attitude import Quaternion, is_unit
-from companion.mavlink.codec import Message
 from companion.mavlink.errors import UnsupportedAutopilot
+from companion.mavlink.messages import Message
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
-from companion.vehicle.autopilot import AutopilotFamily
+from companion.vehicle.autopilot import Autopilot, Readiness
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.readiness import Readiness
 from companion.vehicle.records import (
     GPS_FIX_3D,
     AttitudeTarget,
@@ -31,7 +30,7 @@ from companion.vehicle.records import (
     gps_fault,
     outdated,
 )
-from companion.vehicle.registry import MULTIROTORS, family_for
+from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
 GROUND_HEIGHT = 1.5
 """Height above home that may be read on the ground, m: the estimate drifts."""
@@ -104,7 +103,7 @@ class VehicleState(_Values):
         self.texts = texts.texts
         self.heartbeat_is_newest = True
         self._base_mode = 0
-        self.family: AutopilotFamily | None = None
+        self.autopilot: Autopilot | None = None
         self.unsupported: UnsupportedAutopilot | None = None
         for name, callback in {
             "HEARTBEAT": self._on_heartbeat,
@@ -220,18 +219,21 @@ class VehicleState(_Values):
         if message.autopilot == _AUTOPILOT_INVALID:
             return  # some other part of the vehicle, under the autopilot's own id
         kind = message.autopilot, message.type in MULTIROTORS
-        if self.family is not None and kind != (self.family.autopilot, True):
+        if self.autopilot is not None and kind != (self.autopilot.mav_autopilot, True):
             return  # an autopilot does not change its kind; this is some other part of the vehicle
-        if self.family is None:
+        if self.autopilot is None:
             try:
-                self.family, self.unsupported = family_for(message.autopilot, message.type), None
+                self.autopilot, self.unsupported = (
+                    autopilot_for(message.autopilot, message.type),
+                    None,
+                )
             except UnsupportedAutopilot as error:
-                self.family, self.unsupported = None, error
+                self.autopilot, self.unsupported = None, error
         armed = bool(message.base_mode & _ARMED)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)
-        if self.family is not None:
-            mode = self.family.mode_name(message.base_mode, message.custom_mode)
+        if self.autopilot is not None:
+            mode = self.autopilot.mode_name(message.base_mode, message.custom_mode)
         self.heartbeat = Heartbeat(
             self._clock(),
             message.autopilot,
@@ -245,10 +247,10 @@ class VehicleState(_Values):
         self.heartbeat_is_newest = True
 
     def _on_current_mode(self, message: Message) -> None:
-        if self.family is None:
+        if self.autopilot is None:
             return  # what the number means is not known yet
         mode, intended = (
-            self.family.mode_name(self._base_mode, number)
+            self.autopilot.mode_name(self._base_mode, number)
             for number in (message.custom_mode, message.intended_custom_mode)
         )
         self.current_mode = CurrentMode(self._clock(), mode, intended)
@@ -307,8 +309,8 @@ class VehicleState(_Values):
             self.attitude_target_thrust = AttitudeTargetThrust(self._clock(), message.thrust)
         elif not isfinite(message.thrust):
             self._stats.non_finite += 1
-        family = self.family
-        if family is not None and family.rates_along_target:
+        autopilot = self.autopilot
+        if autopilot is not None and autopilot.rates_along_target:
             self._take_attitude_target(message.time_boot_ms, tuple(message.q))
 
     def _take_attitude_target(self, time_boot_ms: int, q: Quaternion) -> None:

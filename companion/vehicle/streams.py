@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 from math import floor
 from typing import NamedTuple
 
-from companion.mavlink.codec import message_id
 from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused
+from companion.mavlink.messages import message_id
 from companion.mavlink.stats import LinkStats
 
 MAV_CMD_SET_MESSAGE_INTERVAL = 511

@@ -4,9 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from companion.mavlink.codec import Message
+from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.router import Router
 from companion.vehicle.clock import VehicleClock

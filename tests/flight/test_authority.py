@@ -10,13 +10,13 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
 from companion.flight.observer import Silent
 from companion.mavlink import lockstep
-from companion.mavlink.command import (
+from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
     MAV_CMD_REQUEST_MESSAGE,
     Command,
+    CommandClient,
 )
-from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused
 from companion.safety.ending import Exit
 from companion.vehicle.link import Link
@@ -201,7 +201,7 @@ def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
 
 def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
     """As if a pilot's switch came between our command and the next heartbeat."""
-    monkeypatch.setattr(Px4, "take_over", Px4.hold)
+    monkeypatch.setattr(Px4, "offboard_mode", "AUTO.LOITER")
     with mock_vehicle(tmp_path) as mock:
         summary = fly(mock, tmp_path / "log")
         assert mock.state()["mode"] == "LOITER"

@@ -8,7 +8,7 @@ import pytest
 
 from companion.flight.phases import Phase
 from companion.flight.watch import Watch
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When, station
 
@@ -124,13 +124,13 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         resume=lambda: resumed.append(1),
     )
     state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False)
-    family = SimpleNamespace(roles=lambda mode: frozenset({mode}))
+    autopilot = SimpleNamespace(roles=lambda mode: frozenset({mode}))
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(look=lambda: None),
         same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
         loop=loop,
-        link=SimpleNamespace(state=state, family=family),
+        link=SimpleNamespace(state=state, autopilot=autopilot),
         fresh_heartbeat=answer.wait,
     )
 

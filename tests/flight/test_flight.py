@@ -29,7 +29,7 @@ class Bench:
         self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),
             maneuvers=SimpleNamespace(duration=1.0),
-            link=SimpleNamespace(family=None, state=SimpleNamespace(forget=lambda: None)),
+            link=SimpleNamespace(autopilot=None, state=SimpleNamespace(forget=lambda: None)),
             guidance_loop=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
             ground=SimpleNamespace(standing=False),
             same_vehicle=SimpleNamespace(begin=self.begin),

@@ -11,8 +11,8 @@ from companion.flight.left_in_offboard import leave_offboard
 from companion.mavlink.errors import CommandRefused
 from companion.safety.ending import Exit, FlightEnded
 from companion.vehicle.ardupilot.autopilot import ArduPilot
+from companion.vehicle.autopilot import Role
 from companion.vehicle.px4.autopilot import Px4
-from companion.vehicle.roles import Role
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
@@ -38,7 +38,7 @@ class Vehicle:
     def __init__(self, mode, *, armed=False, meanwhile=lambda _: None, refuses=False):
         self.mode, self.is_armed, self.meanwhile, self.refuses = mode, armed, meanwhile, refuses
         self.sent, self.notes, self.mode_by_failsafe, self.detail = 0, [], False, ""
-        self.link = self.family = self.state = self
+        self.link = self.autopilot = self.state = self
         self.note = self.notes.append
         self.same_vehicle = SimpleNamespace(require=lambda: None)
 
@@ -86,9 +86,9 @@ def test_nothing_is_asked_of_any_other_vehicle(vehicle):
 def test_a_vehicle_that_was_told_to_land_on_the_ground_is_asked_to_hold_before_a_flight():
     """A real PX4 stays in AUTO.LAND then, and its pre-arm checks fail until another mode."""
     vehicle = Vehicle(Role.LAND)
-    asyncio.run(leave_offboard(vehicle, Px4.unready_in))
+    asyncio.run(leave_offboard(vehicle, Px4.cannot_arm_in))
     assert (vehicle.mode, vehicle.sent, len(vehicle.notes)) == (Role.HOLD, 1, 1)
-    assert not ArduPilot.unready_in  # it is armed in GUIDED, wherever it stood
+    assert not ArduPilot.cannot_arm_in  # it is armed in GUIDED, wherever it stood
 
 
 @pytest.mark.parametrize("change", [{"mode": Role.READY}, {"is_armed": True}])

@@ -9,10 +9,10 @@ import pytest
 
 from companion.flight.mode_roles import in_roles
 from companion.flight.orders import change_mode, command_if_ours
-from companion.mavlink.command import Command
+from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout
 from companion.safety.ending import Exit, FlightEnded
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Role
 
 LAND = Command(21)
 LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
@@ -41,7 +41,7 @@ class Vehicle:
     def __init__(self, *answers):
         self.answers = list(answers)
         self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
-        self.link = self.family = self.state = self
+        self.link = self.autopilot = self.state = self
         self.now = 0.0
         self.same_vehicle = SimpleNamespace(require=lambda: None)
 

@@ -6,25 +6,25 @@ from companion.config.flight import FlightConfig
 from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import exit_phases, flight_phases, ground_phases
 from companion.safety.ending import Exit, FlightEnded
-from companion.vehicle.registry import FAMILIES, family_for
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import Role
+from companion.vehicle.registry import AUTOPILOTS, autopilot_for
 
 QUADROTOR = 2
-PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, QUADROTOR)
+PX4, ARDUPILOT = autopilot_for(12, QUADROTOR), autopilot_for(3, QUADROTOR)
 FROM_ARMING = ["arm", "takeoff", "offboard", "maneuvers", "hand back", "land", "disarm"]
 
 
 class Vehicle:
     """As much of a link as tells a mode."""
 
-    def __init__(self, family, base_mode, custom_mode):
-        self.family, self.state = family, self
-        self.mode = family.mode_name(base_mode, custom_mode)
+    def __init__(self, autopilot, base_mode, custom_mode):
+        self.autopilot, self.state = autopilot, self
+        self.mode = autopilot.mode_name(base_mode, custom_mode)
         self.mode_by_failsafe = False
 
 
-def phases(family):
-    return {phase.name: phase for phase in flight_phases(FlightConfig(), 10.0, family)}
+def phases(autopilot):
+    return {phase.name: phase for phase in flight_phases(FlightConfig(), 10.0, autopilot)}
 
 
 def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
@@ -35,7 +35,7 @@ def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
 
 
 @pytest.mark.parametrize(
-    ("family", "phase", "base_mode", "custom_mode", "ours"),
+    ("autopilot", "phase", "base_mode", "custom_mode", "ours"),
     [
         (PX4, "maneuvers", 129, 0x00060000, True),
         (PX4, "maneuvers", 157, 0x00030000, False),
@@ -58,10 +58,10 @@ def test_setpoints_stream_before_arming_only_where_a_command_takes_over():
     ],
 )
 def test_a_mode_that_is_not_the_phases_own_lets_the_vehicle_go(
-    family, phase, base_mode, custom_mode, ours
+    autopilot, phase, base_mode, custom_mode, ours
 ):
-    vehicle = Vehicle(family, base_mode, custom_mode)
-    allowed = phases(family)[phase].modes
+    vehicle = Vehicle(autopilot, base_mode, custom_mode)
+    allowed = phases(autopilot)[phase].modes
     if ours:
         require_role(vehicle, allowed)
         return
@@ -70,13 +70,13 @@ def test_a_mode_that_is_not_the_phases_own_lets_the_vehicle_go(
     assert ended.value.exit is Exit.RELEASE
 
 
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
-def test_every_role_is_played_by_a_mode_that_the_family_enters(family):
+@pytest.mark.parametrize("autopilot", AUTOPILOTS, ids=lambda autopilot: autopilot.name)
+def test_every_role_is_played_by_a_mode_that_the_family_enters(autopilot):
     played = {
         role
         for base_mode in (128, 128 | 8)
-        for number in family.modes.values()
-        for role in family.roles(family.mode_name(base_mode, number))
+        for number in autopilot.modes.values()
+        for role in autopilot.roles(autopilot.mode_name(base_mode, number))
     }
     assert played == set(Role)
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from companion.mavlink.codec import CRC_EXTRA
+from companion.mavlink.messages import CRC_EXTRA
 
 BRAKE = 17
 TOLD_AT_ONCE = 436 in CRC_EXTRA

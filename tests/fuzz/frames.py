@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 from pymavlink.generator.mavcrc import x25crc
 
-from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import Frame, FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing
 from companion.vehicle.link import Link

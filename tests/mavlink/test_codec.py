@@ -11,17 +11,13 @@ from pymavlink.dialects.v20 import development
 
 from companion.attitude import BodyRates
 from companion.mavlink.codec import (
-    CRC_EXTRA,
-    MESSAGE_IDS,
     SetpointEncoder,
-    decode,
     decode_attitude,
     decode_beacon,
-    encode,
     encode_system_time,
-    message_id,
 )
 from companion.mavlink.errors import InvalidSetpoint, NonFiniteSetpoint, UnknownMessage
+from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, decode, encode, message_id
 from tests.mavlink.fakes import attitude
 
 float32 = st.floats(width=32, allow_nan=False, allow_infinity=False)

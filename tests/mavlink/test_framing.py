@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner, build_frame
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.stats import LinkStats, SequenceTracker
 from tests.mavlink.fakes import attitude, frames_of, heartbeat
 

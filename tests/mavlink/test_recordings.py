@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.mavlink.codec import CRC_EXTRA, MESSAGE_IDS
+from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS
 from tests.mavlink.recordings.cut import WHOLE_S
 from tests.mavlink.replay import payload, replay
 

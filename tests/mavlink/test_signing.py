@@ -7,9 +7,9 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, Verdict, key_from_hex, key_from_passphrase_file
 from companion.vehicle.link import Link

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner, build_frame
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, Verdict
 from companion.mavlink.stamp_file import StampFile

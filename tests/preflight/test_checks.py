@@ -15,16 +15,16 @@ from companion.preflight.examination import examine, forbidding, result
 from companion.preflight.finding import Key
 from companion.preflight.parameter_findings import parameters
 from companion.preflight.parameter_survey import Survey
+from companion.vehicle.autopilot import Readiness
 from companion.vehicle.parameter_rules import Verdict
-from companion.vehicle.readiness import Readiness
 from companion.vehicle.records import Battery, GlobalPosition
-from companion.vehicle.registry import family_for
+from companion.vehicle.registry import autopilot_for
 from companion.vehicle.streams import StreamRate
 from tests.preflight.patients import amiss
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
 NOT_READY = Verdict.NOT_READY
-PX4, ARDUPILOT = family_for(12, 2), family_for(3, 2)
+PX4, ARDUPILOT = autopilot_for(12, 2), autopilot_for(3, 2)
 QUALITY = LinkQuality(1000, 0, 0, 0, 0, 0.004, 0.001)
 READY = Readiness(prearm_good=True, estimator_flags=0x3FF, position=True, home=True)
 ATTITUDE_TARGET_CAPABILITY = 64
@@ -49,7 +49,7 @@ def state(**changes):
 
 
 GOOD = Evidence(
-    family=PX4,
+    autopilot=PX4,
     state=state(),
     survey=Survey({"COM_OF_LOSS_T": 1.0}, {"COM_OF_LOSS_T": "COM_OF_LOSS_T"}),
     streams={
@@ -308,7 +308,7 @@ def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
     silent = replace(GOOD, survey=Survey({}, {}))
     assert found(parameters, silent) == {Key.PARAMETERS: UNSAFE}
     old = Survey({"GUID_TIMEOUT": 1.0}, {"GUID_TIMEOUT": "GUID_TIMEOUT"})
-    without = found(parameters, replace(GOOD, family=ARDUPILOT, survey=old))
+    without = found(parameters, replace(GOOD, autopilot=ARDUPILOT, survey=old))
     assert without == {"GUID_OPTIONS": UNSAFE, "ATC_ANGLE_BOOST": UNSAFE}
 
 
@@ -316,9 +316,9 @@ LOSSY_LINK = {"link": QUALITY._replace(lost=30)}
 LOSSY_SURVEY = {"survey": GOOD.survey._replace(lossy=True)}
 
 
-def untold(*names, family=PX4, values=GOOD.survey.values, **link):
+def untold(*names, autopilot=PX4, values=GOOD.survey.values, **link):
     """What is found where the link lost what it was told of these."""
-    evidence = replace(GOOD, family=family, **link)
+    evidence = replace(GOOD, autopilot=autopilot, **link)
     read = evidence.survey._replace(values=values, names={name: name for name in values})
     return found(parameters, replace(evidence, survey=read._replace(untold=frozenset(names))))
 
@@ -342,7 +342,7 @@ def test_on_a_good_link_what_every_version_has_is_named_and_nothing_else():
 def test_what_other_versions_have_in_its_place_stands_for_it():
     vital = {"GUID_OPTIONS": 8.0, "ATC_ANGLE_BOOST": 0.0, "GUID_TIMEOUT": 1.0}
     old, new = {**vital, "ARMING_CHECK": 1.0}, {**vital, "ARMING_SKIPCHK": 0.0}
-    rest = {"family": ARDUPILOT, **LOSSY_LINK}
+    rest = {"autopilot": ARDUPILOT, **LOSSY_LINK}
     named = {Key.PARAMETERS: INEFFECTIVE}
     assert untold("ARMING_SKIPCHK", values=old, **rest) == named
     assert untold("ARMING_CHECK", values=new, **rest) == named
@@ -362,7 +362,7 @@ def test_a_parameter_that_is_no_number_is_told_and_nothing_is_proposed():
 def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
     old = Survey({"MAV_GCS_SYSID": 1.0, "FS_GCS_ENABLE": 1.0}, {"MAV_GCS_SYSID": "SYSID_MYGCS"})
     old = old._replace(names={**old.names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
-    evidence = replace(GOOD, family=ARDUPILOT, survey=old)
+    evidence = replace(GOOD, autopilot=ARDUPILOT, survey=old)
     (finding,) = (f for f in parameters(CONFIG, evidence) if f.key == "MAV_GCS_SYSID")
     assert finding.change[:3] == ("SYSID_MYGCS", 1.0, 255.0)
     assert "set SYSID_MYGCS to 255" in finding.sentence()

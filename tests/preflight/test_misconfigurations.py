@@ -125,7 +125,7 @@ async def _visit(folder, mock):
         for name, value, _ in PARAMETERS[mock.autopilot]:
             before = await link.read_parameter(name)
             await link.write_parameter(name, value)
-            seeded = replace(evidence, survey=await survey(link, link.family.parameters))
+            seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
             found[name, value] = amiss(examine(config, seeded))
             await link.write_parameter(name, before)
         found["lossy"] = await _on_a_lossy_link(mock, config, link, evidence)
@@ -161,7 +161,7 @@ async def _on_a_lossy_link(mock, config, link, evidence):
         await link.write_parameter(name, value)
     assert mock.ask({"fault": {"kind": "drop", "probability": 0.5}}) == {"ok": True}
     await asyncio.sleep(0.25)
-    seeded = replace(evidence, survey=await survey(link, link.family.parameters))
+    seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
     mock.ask({"clear": True})
     await asyncio.sleep(0.25)
     for name, value in before.items():

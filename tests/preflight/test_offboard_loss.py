@@ -28,13 +28,13 @@ CIRCLE = {
 }
 
 
-def judged(config, held=1.0, family=GOOD.family):
-    name = family.offboard_loss_failsafe.parameter
+def judged(config, held=1.0, autopilot=GOOD.autopilot):
+    name = autopilot.offboard_loss_failsafe.parameter
     flown = configured_maneuvers(
         changed(config, WIDE, "test")
     )  # which refuses what comes near by itself
     evidence = replace(
-        GOOD, family=family, survey=Survey({name: held}, {name: name}), maneuvers=flown
+        GOOD, autopilot=autopilot, survey=Survey({name: held}, {name: name}), maneuvers=flown
     )
     (finding,) = offboard_loss(config, evidence)
     assert finding.key == Key.OFFBOARD_LOSS
@@ -96,7 +96,7 @@ def test_doublets_of_body_rates_are_weighed_too():
 
 def test_an_autopilot_that_does_not_hold_drifts_farther():
     assert judged(flying(NARROW)).verdict is SAFE
-    finding = judged(flying({"guidance": {"drag_per_s": 0.36}, **NARROW}), family=ARDUPILOT)
+    finding = judged(flying({"guidance": {"drag_per_s": 0.36}, **NARROW}), autopilot=ARDUPILOT)
     assert finding.verdict is INEFFECTIVE
     assert "beyond limits.fence_radius_m" in finding.because
 
@@ -124,8 +124,8 @@ def test_nothing_is_said_of_what_is_not_known():
 @pytest.mark.parametrize("name", ["px4", "ardupilot", "mock-px4", "mock-ardupilot"])
 def test_the_shipped_configurations_are_clean(name):
     """The bundled vehicles hold the last rates for 0.75 s, as advised; real ones for 1 s."""
-    family = ARDUPILOT if "ardupilot" in name else GOOD.family
+    autopilot = ARDUPILOT if "ardupilot" in name else GOOD.autopilot
     held = 0.75 if "mock" in name else 1.0
-    assert judged(load(CONFIGS / f"{name}.yaml"), held, family).verdict is SAFE
+    assert judged(load(CONFIGS / f"{name}.yaml"), held, autopilot).verdict is SAFE
     if "mock" in name:
-        assert judged(load(CONFIGS / f"{name}.yaml"), 1.0, family).verdict is INEFFECTIVE
+        assert judged(load(CONFIGS / f"{name}.yaml"), 1.0, autopilot).verdict is INEFFECTIVE

@@ -13,7 +13,7 @@ from companion.preflight.evidence import Identity
 from companion.preflight.finding import Change, Finding
 from companion.preflight.undo import Undo, UndoFile
 from companion.vehicle.parameter_rules import Verdict
-from companion.vehicle.registry import family_for
+from companion.vehicle.registry import autopilot_for
 
 YES, NO, ALL, QUIT = Answer.YES, Answer.NO, Answer.ALL, Answer.QUIT
 
@@ -24,7 +24,7 @@ class FakeLink:
     def __init__(self, undo_folder, **values):
         self.values = dict(values)
         self.locked, self.drifting = set(), set()
-        self.family = family_for(12, 2)
+        self.autopilot = autopilot_for(12, 2)
         self.settings = SimpleNamespace(target_system=1)
         self.state = SimpleNamespace(heartbeat=SimpleNamespace(received=0.0, armed=False))
         self.undo_at_write = []

@@ -10,10 +10,20 @@ import pytest
 from companion.attitude import Target
 from companion.cli.main import main
 from companion.study import registry
-from companion.study.nmpc import contest, exchange, findings
-from companion.study.nmpc.contest import CIRCLE, EIGHT, Flight
-from companion.study.nmpc.contestants import LOOKS, MODELS, PAPERS, RATE_HZ, Contestant
-from companion.study.nmpc.vehicle import DRAG, MAX_TILT, Vehicle
+from companion.study.nmpc import findings, flights, timing
+from companion.study.nmpc.flights import Flight, Vehicle
+from companion.study.nmpc.variants import (
+    CIRCLE,
+    DRAG,
+    EIGHT,
+    LOOKS,
+    MAX_ITERATIONS,
+    MAX_TILT,
+    MODELS,
+    RATE_HZ,
+    UNLIMITED,
+    Variant,
+)
 
 
 def fly(task, who, seconds):
@@ -42,17 +52,18 @@ def test_the_vehicle_answers_late_and_within_its_tilt():
 
 
 def test_from_a_standing_start_ours_settles_and_the_quaternion_runs_away():
-    ours = fly(CIRCLE, Contestant("limited"), 4.5)
+    ours = fly(CIRCLE, Variant("limited"), 4.5)
     assert max(ours.errors) > 1.0
     assert max(ours.errors[-15:]) < 0.02
     assert ours.failures == 0
-    other = fly(CIRCLE, Contestant("quaternion", told=False), 3.0)
+    other = fly(CIRCLE, Variant("quaternion", knows_dead_time=False), 3.0)
     assert other.errors[-1] > 3.0
 
 
 def test_a_dead_time_that_is_known_is_predicted_past():
     known, unknown = (
-        fly(EIGHT, Contestant("proposed", told=told), 4.0).errors[-50:] for told in (True, False)
+        fly(EIGHT, Variant("proposed", knows_dead_time=known), 4.0).errors[-50:]
+        for known in (True, False)
     )
     assert max(known) < 0.03
     assert np.mean(unknown) > 2.0 * np.mean(known)
@@ -63,9 +74,9 @@ def out(tmp_path_factory):
     """The whole study, each flight for a second."""
     folder = tmp_path_factory.mktemp("nmpc")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contest, "SECONDS", 1)
-        patch.setattr(contest, "SETTLED", 0.5)
-        patch.setattr(exchange, "_REQUESTS", 20)
+        patch.setattr(flights, "SECONDS", 1)
+        patch.setattr(flights, "SETTLED", 0.5)
+        patch.setattr(timing, "_REQUESTS", 20)
         patch.setattr("companion.study.nmpc.study.PARTS", 3)
         assert main(["study", "nmpc", "--out", str(folder)]) == 0
     return folder
@@ -112,7 +123,7 @@ def test_the_tables_of_errors_are_those_of_the_flights(out):
     (row,) = [row for row in rows(out, "nmpc-error") if row["model"] == LOOKS["limited"].label]
     late = np.array(mine[25:])
     assert float(row["eight: RMS, m"]) == pytest.approx(np.sqrt(np.mean(late**2)))
-    assert mine == pytest.approx(fly(EIGHT, Contestant("limited"), 1.0).errors, abs=1e-6)
+    assert mine == pytest.approx(fly(EIGHT, Variant("limited"), 1.0).errors, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -137,50 +148,59 @@ class Flown:
         self.solve_ms = lambda share: milliseconds
 
 
-def contest_of(milliseconds=None, errors=None, untold=0.05):
+def flights_of(milliseconds=None, errors=None, unknown=0.05):
     """Every model alike, but for what is given by model."""
-    told = {
-        (task.name, Contestant(model, most)): Flown(
+    known = {
+        (task.name, Variant(model, most)): Flown(
             (milliseconds or {}).get(model, 2.0), (errors or {}).get(model, 0.01)
         )
         for task in (CIRCLE, EIGHT)
         for model in MODELS
-        for most in (1, findings.SQP_ITERATIONS)
+        for most in (1, MAX_ITERATIONS)
     }
-    less = {(EIGHT.name, Contestant(model, told=False)): Flown(2.0, untold) for model in PAPERS}
-    return {**told, **less}
+    less = {
+        (EIGHT.name, Variant(model, knows_dead_time=False)): Flown(2.0, unknown)
+        for model in UNLIMITED
+    }
+    return {**known, **less}
 
 
 ALIKE = {model: {"a state": 9.0} for model in MODELS}
-FAR = ALIKE | {model: {"a state": np.inf} for model in PAPERS}
-QUICK = exchange.Exchange(np.full(99, 5.0), np.full(99, 4.0), 0)
+FAR = ALIKE | {model: {"a state": np.inf} for model in UNLIMITED}
+QUICK = timing.ProcessTimes(np.full(99, 5.0), np.full(99, 4.0), 0)
 
 
 @pytest.mark.parametrize(
     ("words", "flown", "counts", "timed", "holds"),
     [
-        ("faster than Euler (37)", contest_of({"proposed": 1.9}), ALIKE, QUICK, True),
-        ("faster than Euler (37)", contest_of({"quaternion": 1.9}), ALIKE, QUICK, False),
-        ("faster than Euler, can", contest_of({"proposed": 1.9}), ALIKE, QUICK, True),
-        ("faster than Euler, can", contest_of({"euler-reduced": 1.9}), ALIKE, QUICK, False),
-        ("from further off", contest_of(), ALIKE | {"euler": {"a state": np.inf}}, QUICK, False),
-        ("from further off", contest_of(), FAR, QUICK, True),
-        ("ours: (34) with limits settles", contest_of(), ALIKE, QUICK, True),
+        ("faster than Euler (37)", flights_of({"proposed": 1.9}), ALIKE, QUICK, True),
+        ("faster than Euler (37)", flights_of({"quaternion": 1.9}), ALIKE, QUICK, False),
+        ("faster than Euler, can", flights_of({"proposed": 1.9}), ALIKE, QUICK, True),
+        ("faster than Euler, can", flights_of({"euler-reduced": 1.9}), ALIKE, QUICK, False),
+        ("from more states", flights_of(), ALIKE | {"euler": {"a state": np.inf}}, QUICK, False),
+        ("from more states", flights_of(), FAR, QUICK, True),
+        ("ours: (34) with limits settles", flights_of(), ALIKE, QUICK, True),
         (
             "ours: (34) with limits settles",
-            contest_of(errors={"limited": 0.2}),
+            flights_of(errors={"limited": 0.2}),
             ALIKE,
             QUICK,
             False,
         ),
-        ("proposed (34) settles", contest_of(errors={"proposed": 0.2}), ALIKE, QUICK, False),
-        ("past the dead time", contest_of(), ALIKE, QUICK, True),
-        ("past the dead time", contest_of(untold=0.009), ALIKE, QUICK, False),
-        ("flies nearest", contest_of(errors={"limited": 0.009}), ALIKE, QUICK, True),
-        ("flies nearest", contest_of(errors={"euler": 0.009}), ALIKE, QUICK, False),
-        ("within 10 ms", contest_of(), ALIKE, QUICK, True),
-        ("within 10 ms", contest_of(), ALIKE, QUICK._replace(whole_ms=np.full(9, 11.0)), False),
-        ("within 10 ms", contest_of(), ALIKE, QUICK._replace(troubles=1), False),
+        ("proposed (34) settles", flights_of(errors={"proposed": 0.2}), ALIKE, QUICK, False),
+        ("past the dead time", flights_of(), ALIKE, QUICK, True),
+        ("past the dead time", flights_of(unknown=0.009), ALIKE, QUICK, False),
+        ("smallest error", flights_of(errors={"limited": 0.009}), ALIKE, QUICK, True),
+        ("smallest error", flights_of(errors={"euler": 0.009}), ALIKE, QUICK, False),
+        ("answers within 10 ms", flights_of(), ALIKE, QUICK, True),
+        (
+            "answers within 10 ms",
+            flights_of(),
+            ALIKE,
+            QUICK._replace(answer_ms=np.full(9, 11.0)),
+            False,
+        ),
+        ("answers within 10 ms", flights_of(), ALIKE, QUICK._replace(troubles=1), False),
     ],
 )
 def test_a_verdict_is_made_of_the_numbers(words, flown, counts, timed, holds):

@@ -1,57 +1,55 @@
-"""What the study says of the paper's claims, and of ours; each made from its numbers."""
+"""What the numbers of the study say of the statements on its page."""
 
 from collections.abc import Sequence
 from math import isinf
-from typing import Literal
 
 import numpy as np
 
-from companion.study.nmpc.cold_start import STATES, Counts
-from companion.study.nmpc.contest import CIRCLE, EIGHT, Contest
-from companion.study.nmpc.contestants import (
-    LOOKS,
-    MODELS,
-    PAPERS,
-    RATE_HZ,
-    SQP_ITERATIONS,
-    Contestant,
-)
-from companion.study.nmpc.exchange import Exchange
+from companion.study.nmpc.flights import Flights
 from companion.study.nmpc.models import ModelName
-from companion.study.outcome import Finding
+from companion.study.nmpc.timing import STATES, ColdStarts, ProcessTimes
+from companion.study.nmpc.variants import (
+    CIRCLE,
+    EIGHT,
+    LOOKS,
+    MAX_ITERATIONS,
+    MODELS,
+    RATE_HZ,
+    UNLIMITED,
+    Variant,
+)
+from companion.study.outcome import Finding, Source
 
 _SETTLED_M = 0.1
-"""A flight whose error stays below this over its last seconds has settled."""
+"""Largest error over the last seconds of a flight that has settled."""
 _LAST = round(2.0 * RATE_HZ)
-_WHOLE_MS = 10.0
+_MAX_ANSWER_MS = 10.0
 
 
-def find(contest: Contest, counts: Counts, exchange: Exchange) -> tuple[Finding, ...]:
+def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
-        _solved_faster("paper", ("euler", "quaternion"), contest),
-        _solved_faster("asked", ("euler-reduced",), contest),
+        _solved_faster("paper", ("euler", "quaternion"), flown),
+        _solved_faster("ours", ("euler-reduced",), flown),
         _from_cold(counts),
-        _settles("limited", contest),
-        _settles("proposed", contest),
-        _dead_time(contest),
-        _nearest(contest),
-        _in_time(exchange),
+        _settles("limited", flown),
+        _settles("proposed", flown),
+        _dead_time(flown),
+        _smallest_error(flown),
+        _in_time(times),
     )
 
 
-def _solved_faster(
-    source: Literal["paper", "asked"], others: Sequence[ModelName], contest: Contest
-) -> Finding:
-    """Whether the proposed model is, by one iteration and to the end."""
+def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
+    """Whether the proposed model is, with one iteration and to the end."""
     shares = {
-        (model, most): _typical(model, most, contest) / _typical("proposed", most, contest)
+        (model, most): _typical(model, most, flown) / _typical("proposed", most, flown)
         for model in others
-        for most in (1, SQP_ITERATIONS)
+        for most in (1, MAX_ITERATIONS)
     }
-    told = "; ".join(
-        f"{LOOKS[model].label} takes {shares[model, 1]:.2f} × its time by one iteration,"
-        f" {shares[model, SQP_ITERATIONS]:.2f} × to the end"
+    medians = "; ".join(
+        f"{LOOKS[model].label} takes {shares[model, 1]:.2f} × its time with one iteration,"
+        f" {shares[model, MAX_ITERATIONS]:.2f} × to the end"
         for model in others
     )
     names = " and ".join(LOOKS[model].label for model in others)
@@ -59,31 +57,31 @@ def _solved_faster(
         source,
         f"The proposed model is solved faster than {names}.",
         min(shares.values()) > 1.0,
-        f"Medians: {told}.",
+        f"Medians: {medians}.",
     )
 
 
-def _typical(model: ModelName, iterations: int, contest: Contest) -> float:
-    return contest[EIGHT.name, Contestant(model, iterations)].solve_ms(50)
+def _typical(model: ModelName, iterations: int, flown: Flights) -> float:
+    return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
-def _from_cold(counts: Counts) -> Finding:
+def _from_cold(counts: ColdStarts) -> Finding:
     reached = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
-    others = max(reached[model] for model in PAPERS)
-    told = ", ".join(f"{LOOKS[model].label} {reached[model]}" for model in MODELS)
+    others = max(reached[model] for model in UNLIMITED)
+    reaching = ", ".join(f"{LOOKS[model].label} {reached[model]}" for model in MODELS)
     return Finding(
-        "asked",
-        "With its limits as constraints the problem converges from further off.",
+        "ours",
+        "With limits as constraints the solver converges from more states.",
         reached["limited"] > others,
-        f"States out of {len(STATES)} from which the tolerance is reached: {told}.",
+        f"States out of {len(STATES)} from which it reaches the tolerance: {reaching}.",
     )
 
 
-def _settles(model: ModelName, contest: Contest) -> Finding:
-    flight = contest[CIRCLE.name, Contestant(model)]
+def _settles(model: ModelName, flown: Flights) -> Finding:
+    flight = flown[CIRCLE.name, Variant(model)]
     last = max(flight.errors[-_LAST:])
     return Finding(
-        "asked",
+        "ours",
         f"From a standing start, {LOOKS[model].label} settles on the circle within 4 s.",
         last < _SETTLED_M,
         f"The error is {max(flight.errors):.2g} m at most, and {last:.2g} m in the last 2 s of 6 s"
@@ -91,46 +89,46 @@ def _settles(model: ModelName, contest: Contest) -> Finding:
     )
 
 
-def _nearest(contest: Contest) -> Finding:
-    told = []
+def _smallest_error(flown: Flights) -> Finding:
+    compared = []
     for task in (CIRCLE, EIGHT):
-        errors = {model: contest[task.name, Contestant(model)].rms for model in MODELS}
-        other = min((errors[model], LOOKS[model].label) for model in PAPERS)
-        told.append((task.name, errors["limited"], *other))
+        errors = {model: flown[task.name, Variant(model)].rms for model in MODELS}
+        other = min((errors[model], LOOKS[model].label) for model in UNLIMITED)
+        compared.append((task.name, errors["limited"], *other))
     return Finding(
-        "asked",
-        "Told the dead time alike, our model flies nearest to both trajectories.",
-        all(ours < theirs for _, ours, theirs, _ in told),
+        "ours",
+        "If all models know the dead time, ours has the smallest error on both trajectories.",
+        all(ours < theirs for _, ours, theirs, _ in compared),
         "; ".join(
             f"{name}: {ours:.2g} m RMS against {theirs:.2g} m of {label}"
-            for name, ours, theirs, label in told
+            for name, ours, theirs, label in compared
         )
         + ".",
     )
 
 
-def _dead_time(contest: Contest) -> Finding:
-    """What knowing the dead time is worth on the eight, for every model that flew without, too."""
+def _dead_time(flown: Flights) -> Finding:
+    """How much knowing the dead time reduces the error on the figure-eight."""
     gains = {
-        model: contest[EIGHT.name, Contestant(model, told=False)].rms
-        / contest[EIGHT.name, Contestant(model)].rms
-        for model in PAPERS
+        model: flown[EIGHT.name, Variant(model, knows_dead_time=False)].rms
+        / flown[EIGHT.name, Variant(model)].rms
+        for model in UNLIMITED
     }
-    told = ", ".join(f"{LOOKS[model].label} {gain:.2g} ×" for model, gain in gains.items())
+    ratios = ", ".join(f"{LOOKS[model].label} {gain:.2g} ×" for model, gain in gains.items())
     return Finding(
-        "asked",
+        "ours",
         "Predicting past the dead time helps every model.",
         min(gains.values()) > 1.0,
-        f"Error on the eight without it, against with it: {told}.",
+        f"Error on the figure-eight without it, divided by the error with it: {ratios}.",
     )
 
 
-def _in_time(exchange: Exchange) -> Finding:
-    p99 = float(np.percentile(exchange.whole_ms, 99))
+def _in_time(times: ProcessTimes) -> Finding:
+    p99 = float(np.percentile(times.answer_ms, 99))
     return Finding(
-        "asked",
-        f"In its own process our model is solved within {_WHOLE_MS:.0f} ms at 50 Hz.",
-        p99 < _WHOLE_MS and exchange.troubles == 0,
-        f"p99 of the whole answer, data exchange included, {p99:.2g} ms; {exchange.troubles} of"
+        "ours",
+        f"The solver process answers within {_MAX_ANSWER_MS:.0f} ms at 50 Hz.",
+        p99 < _MAX_ANSWER_MS and times.troubles == 0,
+        f"p99 of the answer time, data exchange included, {p99:.2g} ms; {times.troubles} of"
         " the requests were late or failed.",
     )

@@ -1,45 +1,243 @@
-"""The study put together: what is flown, and the page's section made of it."""
+"""The study `nmpc`: what is flown, its tables, its figure, its section of the page."""
 
-from companion.study.nmpc import contest, tables
-from companion.study.nmpc.cold_start import count_iterations
-from companion.study.nmpc.exchange import time_exchange
-from companion.study.nmpc.figure import CAPTION, draw_figure
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from companion.study.drawing import draw, new_figure
+from companion.study.methods import REFERENCE
 from companion.study.nmpc.findings import find
-from companion.study.outcome import Outcome, Tick
+from companion.study.nmpc.flights import SECONDS, Flights, fly_all
+from companion.study.nmpc.timing import (
+    STATES,
+    ColdStarts,
+    ProcessTimes,
+    count_iterations,
+    time_process,
+)
+from companion.study.nmpc.variants import (
+    CIRCLE,
+    EIGHT,
+    LOOKS,
+    MAX_ITERATIONS,
+    MODELS,
+    RATE_HZ,
+    Task,
+    Variant,
+)
+from companion.study.outcome import Cell, Outcome, Table, Tick
 
-PARTS = contest.SECONDS + 2
+PARTS = SECONDS + 2
+
+_CAPTION = (
+    "All models know the dead time; one iteration per solve. The standing start into the circle"
+    " seen from above, and its error over time; the error on the figure-eight; and the distribution"
+    " of the solve times on the figure-eight, with one iteration (thin) and to the end (thick)."
+)
 
 
 def run(tick: Tick) -> Outcome:
-    """Solve from cold, time the process, and fly all models side by side.
+    """Count iterations from a cold start, time the solver process, and fly all models.
 
     Raises:
-        ChildProcessError: the solver's process does not come up.
+        ChildProcessError: the solver process does not start.
     """
     tick("cold starts")
     counts = count_iterations()
-    tick("the solver's process")
-    exchange = time_exchange()
-    flown = contest.fly_contest(tick)
+    tick("the solver process")
+    times = time_process()
+    flown = fly_all(tick)
     return Outcome(
         name="nmpc",
-        title="Predictive control: what each prediction model costs, and what it is worth",
+        title="Predictive control: solve time and position error of each prediction model",
         conditions=(
             "A horizon of 1 s in 20 steps, the same cost for all models, Gauss–Newton SQP by"
             " CasADi with HPIPM, at 50 Hz. The vehicle is a point mass with 1 s⁻¹ of drag, flown"
             " by model-following (p = 5 s⁻¹, 50° of tilt, 120 °/s) behind a rate loop with 45 ms"
             " of dead time and 25 ms of lag. The models (34), (37) and (39) are the paper's, with"
-            " drag; they have no limits but that of the thrust. Ours adds the limits of tilt and"
-            " rate and the second-order response. Solve times are of this machine, as it was."
+            " drag; their only limit is the thrust. Ours adds the limits of tilt and rate and the"
+            " second-order response. Solve times depend on this machine and its load."
         ),
-        figure=draw_figure(flown),
-        caption=CAPTION,
+        figure=_draw_figure(flown),
+        caption=_CAPTION,
         tables=(
-            tables.time_table(flown),
-            tables.cold_start_table(counts),
-            tables.error_table(flown),
-            tables.exchange_table(exchange),
+            _time_table(flown),
+            _cold_start_table(counts),
+            _error_table(flown),
+            _process_table(times),
         ),
-        findings=find(flown, counts, exchange),
-        series=(tables.series(flown),),
+        findings=find(flown, counts, times),
+        series=(_series(flown),),
+    )
+
+
+def _time_table(flown: Flights) -> Table:
+    """Solve times of every model: one iteration, and to the end."""
+    rows: list[tuple[Cell, ...]] = []
+    for model in MODELS:
+        single = flown[EIGHT.name, Variant(model)]
+        whole = flown[EIGHT.name, Variant(model, MAX_ITERATIONS)]
+        rows.append(
+            (
+                LOOKS[model].label,
+                single.solve_ms(50),
+                single.solve_ms(99),
+                whole.solve_ms(50),
+                whole.solve_ms(99),
+                float(np.mean(whole.iterations)),
+                int(max(whole.iterations)),
+            )
+        )
+    return Table(
+        "nmpc",
+        "Processor time of the solver on the figure-eight, all models in turn: the real-time"
+        f" iteration, and the SQP to its tolerance or to {MAX_ITERATIONS} iterations (the end).",
+        (
+            "model",
+            "one iteration: p50, ms",
+            "one iteration: p99, ms",
+            "to the end: p50, ms",
+            "to the end: p99, ms",
+            "iterations: mean",
+            "iterations: most",
+        ),
+        tuple(rows),
+    )
+
+
+def _cold_start_table(counts: ColdStarts) -> Table:
+    """Iterations from every state."""
+    return Table(
+        "nmpc-cold-start",
+        "SQP iterations to the tolerance, by the state of the vehicle while it should be on the"
+        " circle at 5 m/s. The first guess is the circle.",
+        ("model", *STATES),
+        tuple((LOOKS[model].label, *of_model.values()) for model, of_model in counts.items()),
+    )
+
+
+def _error_table(flown: Flights) -> Table:
+    """Errors in flight, by model and by whether it knows the dead time."""
+    rows: list[tuple[Cell, ...]] = []
+    for (task, variant), eight in flown.items():
+        if task != EIGHT.name or variant.iterations > 1:
+            continue
+        circle = flown[CIRCLE.name, variant]
+        known = "known" if variant.knows_dead_time else "not known"
+        rows.append((variant.label, known, circle.rms, circle.worst, eight.rms, eight.worst))
+    return Table(
+        "nmpc-error",
+        "Distance from the trajectory from 4 s on, one iteration per solve at 50 Hz: after"
+        " the standing start into the circle, and on the figure-eight.",
+        (
+            "model",
+            "dead time",
+            "circle: RMS, m",
+            "circle: largest, m",
+            "eight: RMS, m",
+            "eight: largest, m",
+        ),
+        tuple(rows),
+    )
+
+
+def _process_table(times: ProcessTimes) -> Table:
+    """Answer times of the solver process."""
+    rows = (("whole answer", times.answer_ms), ("solve only", times.solve_ms))
+    return Table(
+        "nmpc-exchange",
+        "Our model's solver in its own process at 50 Hz, one iteration per solve: from the"
+        " request to the answer, with prediction, reference and data exchange.",
+        ("what", "p50, ms", "p99, ms", "largest, ms"),
+        tuple(
+            (name, *(float(np.percentile(ms, share)) for share in (50, 99, 100)))
+            for name, ms in rows
+        ),
+    )
+
+
+def _series(flown: Flights) -> Table:
+    """Every period of every flight."""
+    return Table(
+        "nmpc-flights",
+        "All flights.",
+        (
+            "task",
+            "model",
+            "most iterations",
+            "dead time known",
+            "period",
+            "error, m",
+            "solve, s",
+        ),
+        tuple(
+            (
+                task,
+                variant.label,
+                variant.iterations,
+                int(variant.knows_dead_time),
+                period,
+                error,
+                seconds,
+            )
+            for (task, variant), flight in flown.items()
+            for period, (error, seconds) in enumerate(
+                zip(flight.errors, flight.seconds, strict=True)
+            )
+        ),
+    )
+
+
+def _draw_figure(flown: Flights) -> Figure:
+    """All panels, as `_CAPTION` describes them."""
+    figure, ((path, eight), (circle, times)) = new_figure(2, 2)
+    _draw_paths(path, flown)
+    _draw_errors(circle, flown, CIRCLE, "Error after the standing start")
+    _draw_errors(eight, flown, EIGHT, "Error on the figure-eight")
+    _draw_times(times, flown)
+    circle.set(yscale="log", ylim=(1e-3, None))
+    circle.legend(loc="lower left")
+    return figure
+
+
+def _draw_paths(axes: Axes, flown: Flights) -> None:
+    for model in MODELS:
+        north, east, _ = np.array(flown[CIRCLE.name, Variant(model)].path).T
+        axes.plot(east, north, **LOOKS[model].line)
+    begin = CIRCLE.trajectory.at(CIRCLE.begin).position
+    times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
+    wanted = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
+    axes.plot(wanted[:, 1], wanted[:, 0], **REFERENCE)
+    axes.plot(0.0, 0.0, "o", color="black", markersize=4)
+    low, high = wanted.min(axis=0) - 5.0, wanted.max(axis=0) + 5.0
+    axes.set(
+        title="Standing start into the circle (● start)",
+        xlabel="east, m",
+        ylabel="north, m",
+        aspect="equal",
+        xlim=(low[1], high[1]),
+        ylim=(low[0], high[0]),
+    )
+
+
+def _draw_errors(axes: Axes, flown: Flights, task: Task, title: str) -> None:
+    for model in MODELS:
+        errors = np.array(flown[task.name, Variant(model)].errors)
+        time = (np.arange(len(errors)) + 1) / RATE_HZ
+        draw(axes, time, errors, LOOKS[model].line, LOOKS[model].label)
+    axes.set(title=title, xlabel="time, s", ylabel="distance, m")
+
+
+def _draw_times(axes: Axes, flown: Flights) -> None:
+    for model in MODELS:
+        for iterations, width in ((1, 1.0), (MAX_ITERATIONS, 2.5)):
+            times = np.sort(flown[EIGHT.name, Variant(model, iterations)].seconds)
+            share = (np.arange(len(times)) + 1) / len(times)
+            axes.plot(1e3 * times, share, **{**LOOKS[model].line, "linewidth": width})
+    axes.set(
+        title="Processor time of a solve",
+        xlabel="time, ms",
+        ylabel="share of the solves",
+        xlim=(0.0, None),
+        ylim=(0.0, 1.0),
     )

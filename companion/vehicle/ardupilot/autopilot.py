@@ -1,4 +1,4 @@
-"""ArduPilot's copter: its mode numbers and how it wants to be told things.
+"""ArduPilot's copter: its mode numbers, the messages it needs asking for, and its commands.
 
 Sources: ArduCopter's `mode.h`, `GCS_MAVLink_Copter.cpp`, `mode_guided.cpp`; the figures are
 measured on ArduCopter 4.7 in simulation, 2025.
@@ -7,18 +7,21 @@ measured on ArduCopter 4.7 in simulation, 2025.
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from pymavlink.dialects.v20 import ardupilotmega as dialect
-
-from companion.mavlink.command import (
+from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
+from companion.mavlink.messages import dialect
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from companion.vehicle.autopilot import FLIGHT_RATES, OffboardLossFailsafe
-from companion.vehicle.readiness import Readiness
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import (
+    FLIGHT_RATES,
+    ControlEntry,
+    OffboardLossFailsafe,
+    Readiness,
+    Role,
+)
 
 _ARMED, _GUIDED = 128, 8  # MAV_MODE_FLAG
 _CUSTOM_MODE_ENABLED = 1.0
@@ -42,17 +45,19 @@ _ROLES = {
 
 
 class ArduPilot:
-    """ArduCopter's member of `AutopilotFamily`.
+    """ArduCopter's `Autopilot`.
 
-    GUIDED is take-off and offboard at once. The first setpoint ends the one before, so none
-    may leave while it climbs. Which of them it does is told by the guided bit of `base_mode`: it
-    says that the position controller runs, and so clears while body rates are obeyed.
+    GUIDED serves take-off and offboard. The first setpoint ends the take-off, so none may be sent
+    during the climb. The guided bit of `base_mode` tells the two apart: it is set while the
+    position controller runs, and clear while body rates are obeyed.
     """
 
     name = "ArduPilot"
-    autopilot = 3
+    mav_autopilot = 3
     modes: Mapping[str, int] = MappingProxyType(_MODES)
     ready_mode = "GUIDED"
+    offboard_mode = "GUIDED"
+    control_entry = ControlEntry.BY_FIRST_SETPOINT
     bytewise_parameters = False
     # Silent until asked. ODOMETRY it does not send, so there is no count of estimator resets.
     wanted_rates: Mapping[str, float] = MappingProxyType(
@@ -71,7 +76,7 @@ class ArduPilot:
     offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
     )
-    unready_in = frozenset[Role]()
+    cannot_arm_in = frozenset[Role]()
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
@@ -117,9 +122,6 @@ class ArduPilot:
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Take off here, to a height above home."""
         return Command(MAV_CMD_NAV_TAKEOFF, p7=height_m)
-
-    def take_over(self) -> None:
-        """The first setpoint does it, armed and in the air in GUIDED."""
 
     def hold(self) -> Command:
         """BRAKE: it stops and holds; LOITER would obey the sticks of a transmitter that is off."""

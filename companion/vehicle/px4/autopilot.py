@@ -1,4 +1,4 @@
-"""PX4: its mode numbers and how it wants to be told things.
+"""PX4: its mode numbers, the messages it needs asking for, and its commands.
 
 Sources: PX4's `px4_custom_mode.h` and `commander`; the figures are measured on PX4 main in
 simulation, 2026.
@@ -8,17 +8,21 @@ from collections.abc import Mapping
 from math import nan
 from types import MappingProxyType
 
-from companion.mavlink.command import (
+from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
     MAV_CMD_NAV_LAND,
     MAV_CMD_NAV_TAKEOFF,
     Command,
 )
-from companion.vehicle.autopilot import FLIGHT_RATES, OffboardLossFailsafe
+from companion.vehicle.autopilot import (
+    FLIGHT_RATES,
+    ControlEntry,
+    OffboardLossFailsafe,
+    Readiness,
+    Role,
+)
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
-from companion.vehicle.readiness import Readiness
-from companion.vehicle.roles import Role
 
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x8  # attitude, both velocities, horizontal position
 _CUSTOM_MODE_ENABLED = 1.0
@@ -59,18 +63,20 @@ _ROLES = {
 
 
 class Px4:
-    """PX4's member of `AutopilotFamily`.
+    """PX4's `Autopilot`.
 
     OFFBOARD may be entered once setpoints have streamed at 2 Hz or more for a second. The last
     rates are held after the stream stops until COM_OF_LOSS_T is over, so stop the rotation first.
-    As long as the intended mode is OFFBOARD a later setpoint enters it again; only a mode command
-    lets go for good.
+    While the intended mode is OFFBOARD a later setpoint enters it again; only a mode command
+    releases control for good.
     """
 
     name = "PX4"
-    autopilot = 12
+    mav_autopilot = 12
     modes: Mapping[str, int] = MappingProxyType(_MODES)
     ready_mode = "AUTO.LOITER"
+    offboard_mode = "OFFBOARD"
+    control_entry = ControlEntry.BY_COMMAND
     bytewise_parameters = True
     # PX4 rounds the interval to its inner loop: asked 250 Hz, a 250 Hz loop gives 197 and an
     # 800 Hz loop 196; asked 400 Hz they give 191 and 392.
@@ -90,7 +96,7 @@ class Px4:
     offboard_loss_failsafe = OffboardLossFailsafe(
         "COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True
     )
-    unready_in = frozenset({Role.OFFBOARD, Role.LAND})
+    cannot_arm_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
@@ -133,10 +139,6 @@ class Px4:
         """Take off here, keeping the heading: NaN means "as it is" to PX4."""
         altitude = home_altitude_m + height_m
         return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
-
-    def take_over(self) -> Command:
-        """Into OFFBOARD."""
-        return self.set_mode("OFFBOARD")
 
     def hold(self) -> Command:
         """Into AUTO.LOITER."""

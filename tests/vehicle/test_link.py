@@ -259,7 +259,7 @@ def test_no_vehicle_is_said_clearly(run):
     async def scene():
         async with Link(LinkSettings(endpoint="udpin://127.0.0.1:0")) as link:
             with pytest.raises(NotConnected):
-                _ = link.family
+                _ = link.autopilot
             with pytest.raises(LinkTimeout, match="is the vehicle running"):
                 await link.wait_connected(0.02)
             other = await FakeVehicle(link.local_address).open_udp()

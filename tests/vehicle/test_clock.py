@@ -11,7 +11,7 @@ import pytest
 
 from companion.vehicle.clock import Misfit, VehicleClock
 
-RECORDINGS = Path(__file__).parent / "recordings"
+RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 STALE = 0.1
 """deadman.telemetry_stale_ms."""
 

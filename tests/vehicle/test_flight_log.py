@@ -10,7 +10,7 @@ from companion.identification import identify_vehicle
 from companion.mavlink.errors import LogError
 from companion.vehicle.flight_log import read_flight_log
 
-RECORDINGS = Path(__file__).parent / "recordings"
+RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 PX4, ARDUPILOT = (12, 0x00060000), (3, 4)
 VEHICLE, COMPANION = (1, 1), (1, 191)
 

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 from pymavlink.dialects.v20 import development
 
-from companion.mavlink.codec import decode
+from companion.mavlink.messages import decode
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler

@@ -7,18 +7,19 @@ import pytest
 from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
-from companion.vehicle.readiness import Readiness
-from companion.vehicle.registry import FAMILIES, family_for
-from companion.vehicle.roles import Role
+from companion.vehicle.autopilot import ControlEntry, Readiness, Role
+from companion.vehicle.registry import AUTOPILOTS, autopilot_for
 
 QUADROTOR, HEXAROTOR, FIXED_WING = 2, 13, 1
-PX4, ARDUPILOT = family_for(12, QUADROTOR), family_for(3, HEXAROTOR)
+PX4, ARDUPILOT = autopilot_for(12, QUADROTOR), autopilot_for(3, HEXAROTOR)
 GOOD = Readiness(prearm_good=True, estimator_flags=0x33F, position=True, home=True)
-EVERY_FAMILY = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+EVERY_AUTOPILOT = pytest.mark.parametrize(
+    "autopilot", AUTOPILOTS, ids=lambda autopilot: autopilot.name
+)
 
 
 @pytest.mark.parametrize(
-    ("family", "base_mode", "custom_mode", "name", "roles"),
+    ("autopilot", "base_mode", "custom_mode", "name", "roles"),
     [
         (PX4, 29, 0x03040000, "AUTO.LOITER", {Role.HOLD, Role.READY}),
         (PX4, 157, 0x02040000, "AUTO.TAKEOFF", {Role.TAKEOFF, Role.READY}),
@@ -38,14 +39,15 @@ EVERY_FAMILY = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: fa
         (ARDUPILOT, 209, 99, "mode 99", set()),
     ],
 )
-def test_what_a_heartbeat_means_to_a_flight(family, base_mode, custom_mode, name, roles):
-    assert family.mode_name(base_mode, custom_mode) == name
-    assert family.roles(name) == roles
+def test_what_a_heartbeat_means_to_a_flight(autopilot, base_mode, custom_mode, name, roles):
+    assert autopilot.mode_name(base_mode, custom_mode) == name
+    assert autopilot.roles(name) == roles
 
 
 def test_px4_speaks_px4():
     assert PX4.set_mode("AUTO.LOITER")[:4] == PX4.hold()[:4] == (176, 1.0, 4.0, 3.0)
-    assert PX4.take_over()[:4] == (176, 1.0, 6.0, 0.0)
+    assert PX4.control_entry is ControlEntry.BY_COMMAND
+    assert PX4.set_mode(PX4.offboard_mode)[:4] == (176, 1.0, 6.0, 0.0)
     assert [command[:3] for command in PX4.arm()] == [(176, 1.0, 4.0), (400, 1.0, 0.0)]
     assert PX4.disarm()[:2] == (400, 0.0)
     assert PX4.land()[0] == 21
@@ -58,33 +60,35 @@ def test_ardupilot_speaks_as_recorded():
     """The commands of the recorded flight, whose ACKs were all 0; BRAKE it did not need."""
     assert [command[:3] for command in ARDUPILOT.arm()] == [(176, 1.0, 4.0), (400, 1.0, 0.0)]
     assert ARDUPILOT.take_off(10.0, 584.09) == (22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0)
-    assert ARDUPILOT.take_over() is None
+    assert ARDUPILOT.control_entry is ControlEntry.BY_FIRST_SETPOINT
     assert ARDUPILOT.land()[:3] == (176, 1.0, 9.0)
     assert ARDUPILOT.hold()[:3] == (176, 1.0, 17.0)
     assert ARDUPILOT.disarm()[:2] == (400, 0.0)
 
 
-@EVERY_FAMILY
-def test_a_family_is_complete(family):
-    for name, number in family.modes.items():
-        assert family.mode_name(128 | 8, number) == name
-    assert family.ready_mode in family.modes
-    assert Role.READY in family.roles(family.ready_mode)
+@EVERY_AUTOPILOT
+def test_a_family_is_complete(autopilot):
+    for name, number in autopilot.modes.items():
+        assert autopilot.mode_name(128 | 8, number) == name
+    assert autopilot.ready_mode in autopilot.modes
+    assert Role.READY in autopilot.roles(autopilot.ready_mode)
     with pytest.raises(KeyError):
-        family.set_mode("WARP")
-    for name in family.wanted_rates:
+        autopilot.set_mode("WARP")
+    for name in autopilot.wanted_rates:
         Router(LinkStats()).subscribe(name, lambda _: None)
     assert {"ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HOME_POSITION"} <= set(
-        family.wanted_rates
+        autopilot.wanted_rates
     )
     # What tells of a takeover sooner than a heartbeat at 1 Hz does.
-    assert ("HEARTBEAT" in family.wanted_rates) != ("CURRENT_MODE" in family.wanted_rates)
-    assert family.offboard_loss_failsafe.parameter in {rule.name for rule in family.parameters}
+    assert ("HEARTBEAT" in autopilot.wanted_rates) != ("CURRENT_MODE" in autopilot.wanted_rates)
+    assert autopilot.offboard_loss_failsafe.parameter in {
+        rule.name for rule in autopilot.parameters
+    }
 
 
-@EVERY_FAMILY
-def test_it_is_ready_only_when_nothing_is_missing(family):
-    assert family.not_ready(GOOD) is None
+@EVERY_AUTOPILOT
+def test_it_is_ready_only_when_nothing_is_missing(autopilot):
+    assert autopilot.not_ready(GOOD) is None
     for missing in (
         {"prearm_good": False},
         {"prearm_good": None},
@@ -94,7 +98,7 @@ def test_it_is_ready_only_when_nothing_is_missing(family):
         {"position": False},
         {"home": False},
     ):
-        assert family.not_ready(GOOD._replace(**missing)), missing
+        assert autopilot.not_ready(GOOD._replace(**missing)), missing
 
 
 def test_ardupilot_is_not_ready_with_a_position_it_only_assumes():
@@ -105,6 +109,6 @@ def test_ardupilot_is_not_ready_with_a_position_it_only_assumes():
 
 def test_other_autopilots_and_vehicles_are_refused():
     with pytest.raises(UnsupportedAutopilot, match=r"PX4 \(12\) or ArduPilot \(3\)"):
-        family_for(9, QUADROTOR)
+        autopilot_for(9, QUADROTOR)
     with pytest.raises(UnsupportedAutopilot, match="no multirotor"):
-        family_for(3, FIXED_WING)
+        autopilot_for(3, FIXED_WING)

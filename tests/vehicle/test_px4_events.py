@@ -3,8 +3,8 @@
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
-from companion.mavlink.codec import CRC_EXTRA
 from companion.mavlink.framing import FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.px4.events import EventReader, event_id
 

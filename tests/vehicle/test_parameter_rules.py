@@ -7,7 +7,7 @@ import pytest
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from companion.vehicle.parameter_rules import Setup, Verdict, judge
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
-from companion.vehicle.registry import FAMILIES
+from companion.vehicle.registry import AUTOPILOTS
 
 UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
 PX4_SETUP = Setup(
@@ -90,16 +90,16 @@ PX4 = (PX4_PARAMETERS, GOOD_PX4, PX4_SETUP)
 ARDUPILOT = (ARDUPILOT_PARAMETERS, GOOD_ARDUPILOT, ARDUPILOT_SETUP)
 
 
-def complaints(family, changes=None, **setup):
+def complaints(autopilot, changes=None, **setup):
     """What is found amiss after `changes` of a good vehicle's values, and of our setup."""
-    rules, good, ours = family
+    rules, good, ours = autopilot
     findings = judge(rules, good | (changes or {}), ours._replace(**setup))
     return [finding for finding in findings if finding.verdict is not Verdict.SAFE]
 
 
-@pytest.mark.parametrize("family", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
-def test_a_good_vehicle_is_found_good_by_every_rule(family):
-    rules, good, ours = family
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
+def test_a_good_vehicle_is_found_good_by_every_rule(autopilot):
+    rules, good, ours = autopilot
     findings = judge(rules, good, ours)
     assert [finding.rule.name for finding in findings] == [rule.name for rule in rules]
     assert {finding.verdict for finding in findings} == {Verdict.SAFE}
@@ -154,20 +154,20 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("family", "changes", "verdict", "set_to"), MISTAKES)
+@pytest.mark.parametrize(("autopilot", "changes", "verdict", "set_to"), MISTAKES)
 def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
-    family, changes, verdict, set_to
+    autopilot, changes, verdict, set_to
 ):
-    (found,) = complaints(family, changes)
+    (found,) = complaints(autopilot, changes)
     assert found.rule.name in changes
     assert (found.verdict, found.set_to, found.value) == (verdict, set_to, changes[found.rule.name])
     assert found.because
     if set_to is not None:
-        assert not complaints(family, changes | {found.rule.name: set_to})
+        assert not complaints(autopilot, changes | {found.rule.name: set_to})
 
 
 @pytest.mark.parametrize(
-    ("family", "setup", "name"),
+    ("autopilot", "setup", "name"),
     [
         (PX4, {"silence_limit": 1.0}, "COM_OF_LOSS_T"),
         (PX4, {"curve_factor": 0.4}, None),  # PX4 does not make up for the curve, so we may
@@ -178,8 +178,10 @@ def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
         (ARDUPILOT, {"tilt_compensated": True}, "ATC_ANGLE_BOOST"),
     ],
 )
-def test_our_own_configuration_counts_too(family, setup, name):
-    assert [found.rule.name for found in complaints(family, **setup)] == [name] * (name is not None)
+def test_our_own_configuration_counts_too(autopilot, setup, name):
+    assert [found.rule.name for found in complaints(autopilot, **setup)] == [name] * (
+        name is not None
+    )
 
 
 def test_no_loss_of_a_station_matters_where_another_is_watched():
@@ -193,10 +195,10 @@ def test_what_the_autopilot_has_not_is_left_out():
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
-@pytest.mark.parametrize("family", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
-def test_what_is_no_number_is_unsafe_whatever_the_rule(family, value):
-    for rule in family[0]:
-        (found,) = (f for f in complaints(family, {rule.name: value}) if f.rule is rule)
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
+def test_what_is_no_number_is_unsafe_whatever_the_rule(autopilot, value):
+    for rule in autopilot[0]:
+        (found,) = (f for f in complaints(autopilot, {rule.name: value}) if f.rule is rule)
         assert (found.verdict, found.set_to) == (UNSAFE, None)
         assert found.because
 
@@ -231,8 +233,8 @@ def test_every_rule_that_can_be_unsafe_is_missed_where_it_is_not_told():
 
 
 def test_names_fit_the_protocol_and_none_is_ruled_twice():
-    for family in FAMILIES:
-        names = [name for rule in family.parameters for name in rule.names]
+    for autopilot in AUTOPILOTS:
+        names = [name for rule in autopilot.parameters for name in rule.names]
         assert len(set(names)) == len(names)
         assert all(len(name) <= 16 for name in names)
-        assert all(rule.meaning and rule.source for rule in family.parameters)
+        assert all(rule.meaning and rule.source for rule in autopilot.parameters)

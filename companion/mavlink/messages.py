@@ -1,0 +1,99 @@
+"""Messages by name and number, and their payloads decoded and encoded by pymavlink.
+
+The dialect holds MAVLink common and the estimator status of one autopilot besides. It lacks
+CURRENT_MODE, which is defined here, and the events, whose payloads are passed on undecoded.
+"""
+
+import struct
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega
+
+from companion.mavlink.errors import UnknownMessage
+
+dialect: Any = ardupilotmega
+"""pymavlink's message classes and enumerations."""
+
+Message = Any
+"""A decoded pymavlink message: fields as attributes, name by `get_type()`."""
+
+CURRENT_MODE = 436
+
+
+class CurrentModeMessage:
+    """The flight mode, sent at once when it changes. Source: MAVLink's `development` dialect.
+
+    Attributes:
+        standard_mode: MAV_STANDARD_MODE; 0 for a mode that is none of these.
+        custom_mode: The mode, in the autopilot's own numbers.
+        intended_custom_mode: The mode that the user commanded last; differs in a failsafe.
+    """
+
+    msgname = "CURRENT_MODE"
+    crc_extra = 193
+    unpacker = struct.Struct("<IIB")
+    lengths = (1, 1, 1)
+    orders = (2, 0, 1)
+
+    def __init__(self, standard_mode: int, custom_mode: int, intended_custom_mode: int) -> None:
+        self.standard_mode = standard_mode
+        self.custom_mode = custom_mode
+        self.intended_custom_mode = intended_custom_mode
+
+    def get_type(self) -> str:
+        """Name of the message, as pymavlink's messages give it."""
+        return self.msgname
+
+
+_CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
+"""Message classes by number."""
+
+UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
+"""Messages of MAVLink common that pymavlink's dialects lack: only their payloads are passed on."""
+
+MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in _CLASSES.items()}
+CRC_EXTRA: dict[int, bytes] = {
+    **{number: bytes([kind.crc_extra]) for number, kind in _CLASSES.items()},
+    410: bytes([160]),
+    411: bytes([106]),
+}
+
+
+def message_id(name: str) -> int:
+    """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
+
+    Raises:
+        UnknownMessage: The dialect has no such message.
+    """
+    try:
+        return MESSAGE_IDS[name]
+    except KeyError:
+        raise UnknownMessage(
+            f"MAVLink has no message {name!r}; names are in capitals, as in HEARTBEAT"
+        ) from None
+
+
+def decode(number: int, payload: bytes) -> Message:
+    """Build pymavlink's message object from a frame's payload (checksum already checked)."""
+    kind = _CLASSES[number]
+    size = kind.unpacker.size
+    flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
+    wire: list[Any] = []
+    at = 0
+    for length in kind.lengths:
+        field = flat[at]
+        if isinstance(field, bytes):
+            wire.append(field.rstrip(b"\0"))
+        else:
+            wire.append(field if length == 1 else list(flat[at : at + length]))
+        at += length
+    return kind(*(wire[order] for order in kind.orders))
+
+
+def encode(message: Message) -> bytes:
+    """Payload of a pymavlink message."""
+    message.pack(_PACKER)
+    return bytes(message.get_payload())
+
+
+_PACKER = dialect.MAVLink(None)

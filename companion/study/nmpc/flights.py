@@ -1,0 +1,201 @@
+"""The flights: every variant flies the same tasks with the same simulated vehicle."""
+
+from math import dist
+
+import numpy as np
+
+from companion.attitude import Limits, Quaternion, Target, make_planner
+from companion.attitude.kinematics import cos_tilt, tilt_products
+from companion.drag import Drag
+from companion.guidance.reference import GRAVITY
+from companion.guidance.trajectory.sample import Vector
+from companion.nmpc import Input, Request, Start, Status
+from companion.nmpc import Vehicle as KnownState
+from companion.study.lag_loop import STEP_HZ, LagBody
+from companion.study.nmpc.variants import (
+    CIRCLE,
+    DEAD_TIME_MS,
+    DRAG,
+    EIGHT,
+    GAIN,
+    LAG_MS,
+    MAX_ITERATIONS,
+    MAX_TILT,
+    MAX_TILT_RATE,
+    MAX_YAW_RATE,
+    MODELS,
+    RATE_HZ,
+    UNLIMITED,
+    YAW_GAIN,
+    Task,
+    Variant,
+)
+from companion.study.outcome import Tick
+from companion.study.step import Floats
+
+SECONDS = 6
+SETTLED = 4.0
+"""Errors count from this time on, s."""
+_INPUTS = 8
+"""Latest inputs given to the solver: more than dead time and lead need."""
+_PLANNER_HZ = 250
+_STEPS = STEP_HZ // _PLANNER_HZ
+
+
+class Vehicle:
+    """A point mass with drag, turned by model-following behind a rate loop with lag.
+
+    It begins at rest, level, at the origin.
+
+    Attributes:
+        position: m, NED.
+        velocity: m/s, NED.
+        body: its attitude and body rates.
+    """
+
+    def __init__(self) -> None:
+        self.position: Vector = (0.0, 0.0, 0.0)
+        self.velocity: Vector = (0.0, 0.0, 0.0)
+        self.body = LagBody((1.0, 0.0, 0.0, 0.0), LAG_MS, DEAD_TIME_MS)
+        self._planner = make_planner(
+            "model-following",
+            GAIN,
+            YAW_GAIN,
+            Limits(MAX_TILT, MAX_TILT_RATE, MAX_YAW_RATE),
+            lag=1e-3 * LAG_MS,
+            dead_time=1e-3 * DEAD_TIME_MS,
+        )
+
+    def fly(self, target: Target, thrust: float, seconds: float) -> None:
+        """Hold a target and a specific thrust (m/s²) for this time."""
+        dt = 1.0 / _PLANNER_HZ
+        for _ in range(round(seconds * _PLANNER_HZ)):
+            before = _lift(self.body.q, thrust)
+            rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
+            self.body.turn(rates, _STEPS)
+            after = _lift(self.body.q, thrust)
+            self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
+
+    def _move(self, lift: tuple[float, ...], dt: float) -> None:
+        """Thrust, gravity and drag over a short time, by the midpoint rule."""
+        position, velocity = [], []
+        for p, v, push in zip(self.position, self.velocity, lift, strict=True):
+            middle = v + 0.5 * dt * (push - DRAG * v)
+            position.append(p + dt * middle)
+            velocity.append(v + dt * (push - DRAG * middle))
+        self.position = (position[0], position[1], position[2])
+        self.velocity = (velocity[0], velocity[1], velocity[2])
+
+
+def _lift(q: Quaternion, thrust: float) -> Vector:
+    """Acceleration by thrust and gravity, m/s², NED (equation 10)."""
+    _, ax, ay = tilt_products(*q)
+    return -2.0 * ay * thrust, 2.0 * ax * thrust, GRAVITY - thrust * cos_tilt(q[1], q[2])
+
+
+class Flight:
+    """One variant at one task.
+
+    Attributes:
+        errors: distance from the trajectory after each period, m.
+        path: position after each period, m, NED.
+        seconds: processor time of each solve.
+        iterations: of each solve.
+        failures: number of solves without a usable answer.
+    """
+
+    def __init__(self, task: Task, variant: Variant) -> None:
+        self.errors: list[float] = []
+        self.path: list[tuple[float, float, float]] = []
+        self.seconds: list[float] = []
+        self.iterations: list[float] = []
+        self.failures = 0
+        self._task = task
+        self._solver = variant.solver(task.trajectory)
+        self._solver.warm_up()
+        self._vehicle = Vehicle()
+        north, east, down = task.trajectory.at(task.begin).position
+        self._start = Start((-north, -east, -down))
+        self._inputs = [Input(0.0, 0.0, 0.0, 0.0, GRAVITY)]
+        self._periods = 0
+
+    def step(self) -> None:
+        """One period: solve, and meanwhile fly the previous answer."""
+        now, vehicle, flown = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
+        known = KnownState(
+            now,
+            vehicle.position,
+            vehicle.velocity,
+            vehicle.body.q,
+            vehicle.body.rates,
+            drag=Drag(DRAG),
+        )
+        at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS:])
+        answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
+        self.seconds.append(answer.solving)
+        self.iterations.append(answer.iterations)
+        if answer.status is Status.SOLVED:
+            target = answer.north, answer.east, answer.heading
+            self._inputs.append(Input(answer.time, *target, answer.thrust))
+        else:
+            self.failures += 1
+        vehicle.fly(Target(flown.north, flown.east, flown.heading), flown.thrust, 1.0 / RATE_HZ)
+        self._periods += 1
+        self._record()
+
+    def _record(self) -> None:
+        there = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
+        wanted = [a + b for a, b in zip(self._start.position, there, strict=True)]
+        self.errors.append(dist(wanted, self._vehicle.position))
+        self.path.append(self._vehicle.position)
+
+    @property
+    def settled(self) -> Floats:
+        """The errors from `SETTLED` on, m."""
+        return np.array(self.errors[round(SETTLED * RATE_HZ) :])
+
+    @property
+    def rms(self) -> float:
+        """Of the settled errors, m."""
+        return float(np.sqrt(np.mean(self.settled**2)))
+
+    @property
+    def worst(self) -> float:
+        """Of the settled errors, m."""
+        return float(self.settled.max())
+
+    def solve_ms(self, percentile: float) -> float:
+        """Solve time at this percentile, ms."""
+        return float(1e3 * np.percentile(self.seconds, percentile))
+
+
+Flights = dict[tuple[str, Variant], Flight]
+"""By the name of the task and the variant."""
+
+
+def fly_all(tick: Tick) -> Flights:
+    """Fly all variants, one period of each in turn.
+
+    A disturbance of the machine then hits all of them. The order rotates with every period.
+    """
+    flown = _all_flights()
+    turns = list(flown.values())
+    for second in range(SECONDS):
+        tick(f"flights, second {second + 1}")
+        for _ in range(round(RATE_HZ)):
+            for flight in turns:
+                flight.step()
+            turns.append(turns.pop(0))
+    return flown
+
+
+def _all_flights() -> Flights:
+    """Every flight, before its first period."""
+    unlimited = [
+        Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED
+    ]
+    real_time = [*unlimited, Variant("limited")]
+    to_the_end = [Variant(model, MAX_ITERATIONS) for model in MODELS]
+    entries = [(CIRCLE, variant) for variant in real_time]
+    entries += [(EIGHT, variant) for variant in (*real_time, *to_the_end)]
+    return {(task.name, variant): Flight(task, variant) for task, variant in entries}

@@ -1,0 +1,146 @@
+"""What a solve costs beside the flights: iterations from a cold start, and the solver process."""
+
+from math import inf
+from time import monotonic, sleep
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.attitude import BodyRates, Coefficients, attitude
+from companion.drag import Drag
+from companion.guidance.reference import GRAVITY
+from companion.guidance.trajectory.sample import Vector
+from companion.nmpc import Input, Request, Solver, Start, Status, Trouble, Vehicle
+from companion.study.nmpc.models import ModelName
+from companion.study.nmpc.variants import CIRCLE, DRAG, EIGHT, MODELS, RATE_HZ, Variant
+from companion.study.step import Floats
+
+_COLD_ITERATIONS = 60
+_REQUESTS = 150
+_START_TIMEOUT = 30.0  # s
+
+
+class State(NamedTuple):
+    """A state of the vehicle while it should be on the circle at 5 m/s.
+
+    Attributes:
+        offset: from its place on the circle, m, NED.
+        velocity: m/s, NED.
+        coefficients: of its attitude.
+        body_rates: rad/s.
+    """
+
+    offset: Vector
+    velocity: Vector
+    coefficients: Coefficients
+    body_rates: BodyRates
+
+
+_LEVEL, _STILL = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+_ON_THE_CIRCLE = CIRCLE.trajectory.at(CIRCLE.begin)
+_V_N, _V_E, _ = _ON_THE_CIRCLE.velocity
+_REST: Vector = (0.0, 0.0, 0.0)
+
+STATES = {
+    "1 m/s too slow": State(_REST, (0.8 * _V_N, 0.8 * _V_E, 0.0), _LEVEL, _STILL),
+    "at rest": State(_REST, _REST, _LEVEL, _STILL),
+    "at rest, 3 m away": State((2.0, 2.0, 1.0), _REST, _LEVEL, _STILL),
+    "the wrong way": State(_REST, (-_V_N, -_V_E, 0.0), _LEVEL, _STILL),
+    "at rest, 37° of tilt, rolling": State(
+        _REST, _REST, Coefficients(-0.36, 0.48), BodyRates(1.5, 0.0, 0.0)
+    ),
+}
+
+ColdStarts = dict[ModelName, dict[str, float]]
+"""SQP iterations to the tolerance, by model and state; inf if it is not reached."""
+
+
+def count_iterations() -> ColdStarts:
+    """Solve from every state with every model, with the circle as the first guess."""
+    counts: ColdStarts = {}
+    for model in MODELS:
+        solver = Variant(model, _COLD_ITERATIONS).solver(CIRCLE.trajectory)
+        counts[model] = {}
+        for name, state in STATES.items():
+            solver.forget()
+            answer = solver.answer(_from_state(state))
+            reached = answer.status is Status.SOLVED and answer.iterations < _COLD_ITERATIONS
+            counts[model][name] = answer.iterations if reached else inf
+    return counts
+
+
+def _from_state(state: State) -> Request:
+    vehicle = Vehicle(
+        0.0,
+        state.offset,
+        state.velocity,
+        attitude(state.coefficients, 0.0),
+        state.body_rates,
+        drag=Drag(DRAG),
+    )
+    north, east, down = _ON_THE_CIRCLE.position
+    return Request(0, vehicle, CIRCLE.begin, Start((-north, -east, -down)), ())
+
+
+class ProcessTimes(NamedTuple):
+    """What the solver process needs at 50 Hz, n answers.
+
+    Attributes:
+        answer_ms: (n,), from before a request is packed until its answer is unpacked.
+        solve_ms: (n,), the part in `Worker.answer`.
+        troubles: number of requests without an answer in time.
+    """
+
+    answer_ms: Floats
+    solve_ms: Floats
+    troubles: int
+
+
+def time_process() -> ProcessTimes:
+    """Ask the solver process for a vehicle on the figure-eight, and wait for each answer.
+
+    Raises:
+        ChildProcessError: the process does not start; the message says why.
+    """
+    troubles: list[tuple[Trouble, str]] = []
+    answering, solving = [], []
+    solver = Solver(
+        Variant("limited").settings, EIGHT.trajectory, lambda *trouble: troubles.append(trouble)
+    )
+    try:
+        _await_start(solver, troubles)
+        for number in range(_REQUESTS):
+            began = monotonic()
+            solver.request(_on_the_eight(number))
+            answer = solver.take(1.0)
+            took = monotonic() - began
+            if answer is not None:
+                answering.append(took)
+                solving.append(answer.seconds)
+            sleep(max(0.0, 1.0 / RATE_HZ - took))
+    finally:
+        solver.close()
+    return ProcessTimes(1e3 * np.array(answering), 1e3 * np.array(solving), len(troubles))
+
+
+def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:
+    until = monotonic() + _START_TIMEOUT
+    while not solver.ready:
+        if troubles or monotonic() > until:
+            raise ChildProcessError(troubles[0][1] if troubles else "the solver does not start")
+        sleep(0.01)
+
+
+def _on_the_eight(number: int) -> Request:
+    time = number / RATE_HZ
+    sample = EIGHT.trajectory.at(time)
+    vehicle = Vehicle(
+        time,
+        sample.position,
+        sample.velocity,
+        (1.0, 0.0, 0.0, 0.0),
+        BodyRates(0.0, 0.0, 0.0),
+        drag=Drag(DRAG),
+    )
+    inputs = tuple(Input(time - k / RATE_HZ, 0.0, 0.0, 0.0, GRAVITY) for k in range(5, 0, -1))
+    return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)
