@@ -1,10 +1,23 @@
 """Where a plan stood a while ago, and where it goes on to."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _TRIMMED = 64
 """Rows that no delay reaches any more are dropped by so many at once."""
+
+
+def between(times: Sequence[float], time: float) -> tuple[int, float]:
+    """Where `time` lies among at least two ascending times, for a linear look-up.
+
+    Returns:
+        The index of the later of the two times around it, and the share of the way from the
+        earlier one to it; below 0 before the first time, above 1 past the last.
+    """
+    later = min(max(bisect_right(times, time), 1), len(times) - 1)
+    start = times[later - 1]
+    return later, (time - start) / (times[later] - start)
 
 
 class PlannedTilt(NamedTuple):
@@ -80,10 +93,7 @@ class History(Generic[Row]):
 
     def at(self, time: float) -> Row:
         """The plan at `time`: linear between rows and beyond them."""
-        times = self._times
-        later = min(max(bisect_right(times, time), 1), len(times) - 1)
-        start = times[later - 1]
-        share = (time - start) / (times[later] - start)
+        later, share = between(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
 

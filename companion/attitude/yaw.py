@@ -1,8 +1,8 @@
 """How `model-following` plans the heading: second order, the short way, within the limits."""
 
-from bisect import bisect_right
 from math import inf
 
+from companion.attitude.history import between
 from companion.attitude.limits import Constants
 from companion.attitude.rate_response import AxisResponse, RateResponse
 from companion.attitude.reference import behind
@@ -150,11 +150,9 @@ class TargetFrame:
     def _way(self, time: float) -> float:
         """How far what was sent until `time` turns them, rad: linear between samples."""
         times, ways = self._times, self._ways
-        later = bisect_right(times, time)
-        if later == 0:
+        if time < times[0]:
             return ways[0]
-        if later == len(times):
+        if time >= times[-1]:
             return ways[-1]
-        start = times[later - 1]
-        share = (time - start) / (times[later] - start)
+        later, share = between(times, time)
         return ways[later - 1] + share * (ways[later] - ways[later - 1])

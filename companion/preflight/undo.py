@@ -1,6 +1,5 @@
 """The undo file: what parameters were before the doctor set them, in YAML for people to read."""
 
-import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from companion.files import bounded_yaml
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError, Section
 from companion.preflight.evidence import Identity
 from companion.vehicle.link import Link
@@ -68,15 +68,9 @@ class UndoFile:
         grown.setdefault(parameter, old)
         self._undo = self._undo.model_copy(update={"parameters": grown})
         text = bounded_yaml.dump(self._undo.model_dump())
-        part = self.path.with_suffix(".part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with part.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(self.path)
-            _sync(self.path.parent)
+            write_whole(self.path, text)
         except OSError as error:
             raise ConfigError(
                 f"recording.directory: the undo file {self.path} cannot be written, so nothing "
@@ -91,12 +85,3 @@ def _unused(directory: Path, name: str) -> Path:
         number += 1
         path = directory / f"{name}-{number}.yaml"
     return path
-
-
-def _sync(directory: Path) -> None:
-    """Have the file's new name on the disk, too."""
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
