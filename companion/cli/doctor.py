@@ -22,6 +22,7 @@ from companion.guidance import ManeuverSequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
+from companion.mavlink.frame_filter import Notice
 from companion.preflight.apply_fixes import Answer, Outcome, mend, require_disarmed, restore
 from companion.preflight.evidence import Evidence
 from companion.preflight.examination import examine
@@ -31,7 +32,6 @@ from companion.preflight.parameter_survey import survey
 from companion.preflight.report import as_dict, outcome_as_dict, outcome_line, tables
 from companion.preflight.session import Patient, patient
 from companion.preflight.undo import Undo, UndoFile
-from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import Verdict
 

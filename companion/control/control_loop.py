@@ -22,10 +22,9 @@ from companion.control.unanswered import Unanswered
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
-from companion.vehicle.clock import Misfit
+from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.held_rates import HeldRates
-from companion.vehicle.records import AttitudeTarget
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 

@@ -20,8 +20,7 @@ from companion.attitude import BodyRates, Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned
 from companion.guidance.horizontal import rotated
 from companion.guidance.reference import Vector
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
 """Between two attitudes, s: further apart the rates say too little of what happened between."""

@@ -28,8 +28,7 @@ from companion.guidance.horizontal import limited
 from companion.guidance.linear import ReferenceAt
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 from companion.vehicle.state import VehicleState
 
 _REJOINED = 1.0

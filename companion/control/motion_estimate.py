@@ -9,8 +9,7 @@ from companion.guidance.horizontal import Horizontal
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.slope_history import SlopeHistory
 from companion.nmpc import Vehicle
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COSINE = 0.2
 """Of the tilt; beyond 78° the thrust is not what height hold asked for."""

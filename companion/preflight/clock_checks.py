@@ -6,7 +6,7 @@ from math import inf
 from companion.config import Config
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.clock_rate import MOST_DRIFT
+from companion.vehicle.clock_estimates import MOST_DRIFT
 from companion.vehicle.parameter_rules import Verdict
 
 SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE

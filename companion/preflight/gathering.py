@@ -12,9 +12,9 @@ from companion.mavlink.stats import LinkStats
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, Stage
 from companion.preflight.link_listener import LinkListener
 from companion.preflight.parameter_survey import Survey, survey
+from companion.vehicle.clock_estimates import DelayUnknown
 from companion.vehicle.link import Link
 from companion.vehicle.streams import StreamRate
-from companion.vehicle.telemetry_delay import DelayUnknown
 
 _WARNING = 4
 """MAV_SEVERITY: this and below is a warning or worse."""

@@ -6,12 +6,12 @@ from contextlib import asynccontextmanager, suppress
 
 from companion.config import Config
 from companion.mavlink.errors import LinkError, LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.frame_filter import Notice
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.preflight.gathering import gather, wanted_rates
 from companion.preflight.link_checks import signing_findings
-from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import Verdict
 

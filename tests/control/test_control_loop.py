@@ -14,8 +14,7 @@ from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import AttitudeTarget
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 TARGET = Target(0.1, 0.0, 0.0)
