@@ -3,7 +3,6 @@
 import socket
 import subprocess
 import sys
-import sysconfig
 import tempfile
 import time
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.endpoint import SerialPort, TcpClient, TcpServer, parse_endpoint
 
@@ -46,13 +46,7 @@ def default_config() -> Path:
     Raises:
         ConfigError: it is in neither place.
     """
-    repository = Path(__file__).parent.parent
-    installed = Path(sysconfig.get_path("data"), "share", "mavlink-companion")
-    for place in (repository, installed):
-        path = place / "configs" / "mock-px4.yaml"
-        if path.is_file():
-            return path
-    raise ConfigError(f"mock-px4.yaml is not in {installed}; name a configuration with --config")
+    return shipped("mock-px4.yaml")
 
 
 def free_port() -> int:

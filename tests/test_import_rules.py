@@ -43,7 +43,7 @@ def test_imports_point_one_way():
         ("companion/mavlink/codec.py", "import companion.vehicle.link"),
         ("companion/vehicle/link.py", "import companion.config"),
         ("companion/preflight/report.py", "import companion.vehicle.px4.events"),
-        ("companion/control/command.py", "import companion.safety.ladder"),
+        ("companion/control/guidance_command.py", "import companion.safety.ladder"),
         ("companion/recording/tlog.py", "import companion.config"),
         ("companion/nmpc/messages.py", "import casadi"),
         ("companion/flight/watch.py", "import companion.study.step"),

@@ -13,7 +13,7 @@ from rich.console import Console
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
-from companion.config.files import changed, load
+from companion.config.files import assigned, changed, load
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
 from companion.flight.assembly import open_link
@@ -64,6 +64,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 
 def _as_told(config: Config, options: argparse.Namespace) -> Config:
+    config = changed(config, assigned(options.set), "--set")
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:
         link["lockstep"] = True

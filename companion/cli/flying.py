@@ -12,7 +12,7 @@ from companion import demo
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import changed, load
+from companion.config.files import assigned, changed, load
 from companion.control.outer_loop import predictive_settings
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
@@ -48,7 +48,8 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     if options.arm:
         flight["arm"] = True
     changes = {"link": link, "flight": flight, "planner": {"name": planner} if planner else {}}
-    told = changed(config, changes, "the command line")
+    told = changed(config, assigned(options.set), "--set")
+    told = changed(told, changes, "the command line")
     # What cannot be flown is to be found out before anything is begun.
     configured_maneuvers(told)
     if told.guidance.kind == "nmpc":

@@ -1,18 +1,12 @@
-"""The commands that do not fly: `bench`, `study`, `plot`, `check-config`."""
+"""The commands that do not fly: `bench`, `study`, `plot`."""
 
 import argparse
 import json
-import sys
 
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
-from companion.config.files import json_schema, load
-from companion.demo import check_mock
 from companion.files.yaml_file import ConfigError
-from companion.flight.assembly import link_settings
-from companion.flight.maneuvers import configured_maneuvers
-from companion.mavlink.endpoint import parse_endpoint
 from companion.recording.figure import draw_flight
 from companion.study import registry
 
@@ -64,18 +58,4 @@ def plot(options: argparse.Namespace) -> int:
     out = options.out or options.folder / "flight.png"
     draw_flight(options.folder, out)
     print(out)
-    return EXIT_OK
-
-
-def check_config(options: argparse.Namespace) -> int:
-    """Check a configuration file, or print the schema."""
-    if options.schema:
-        sys.stdout.write(json_schema())
-        return EXIT_OK
-    config = load(options.file)
-    parse_endpoint(link_settings(config).endpoint)
-    configured_maneuvers(config)  # the trajectory too
-    if config.mock is not None:
-        check_mock(options.file)
-    print(f"{options.file}: ok")
     return EXIT_OK

@@ -1,14 +1,15 @@
 """The configuration as files: read with what they include, changed, described for editors."""
 
 import json
-from collections.abc import Mapping
+import sysconfig
+from collections.abc import Mapping, Sequence
 from os.path import realpath
 from pathlib import Path
 from typing import Any
 
 from companion.config import Config
 from companion.config.root import MOST_INCLUDED
-from companion.files import yaml_file
+from companion.files import bounded_yaml, yaml_file
 from companion.files.yaml_file import ConfigError, UnreadableFileError
 
 _INCLUDE = "include"
@@ -133,6 +134,42 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     for section, values in changes.items():
         data[section].update(values)
     return yaml_file.validated(data, name, Config)
+
+
+def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Changes for `changed` from texts such as `limits.max_tilt_deg=20`, their values in YAML.
+
+    Raises:
+        ConfigError: one of them is no such text.
+    """
+    changes: dict[str, dict[str, Any]] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        section, dot, name = key.strip().partition(".")
+        if not (equals and dot and section and name):
+            raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
+        if section not in Config.model_fields:
+            raise ConfigError(f"--set {text}: there is no section `{section}`")
+        try:
+            changes.setdefault(section, {})[name] = bounded_yaml.parse(value)
+        except bounded_yaml.YamlError as error:
+            raise ConfigError(f"--set {text}: {error}") from error
+    return changes
+
+
+def shipped(name: str) -> Path:
+    """A configuration that ships with the program: in the repository, or where pip put it.
+
+    Raises:
+        ConfigError: it is in neither place.
+    """
+    repository = Path(__file__).parents[2]
+    installed = Path(sysconfig.get_path("data"), "share", "mavlink-companion")
+    for place in (repository, installed):
+        path = place / "configs" / name
+        if path.is_file():
+            return path
+    raise ConfigError(f"{name} is not in {installed}; name a configuration with --config")
 
 
 def json_schema() -> str:

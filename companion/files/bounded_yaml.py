@@ -6,6 +6,7 @@ lines of aliases stand for gigabytes.
 """
 
 import re
+from math import inf
 from typing import Any
 
 import yaml
@@ -73,6 +74,12 @@ def parse(text: str) -> Any:
 def dump(data: dict[str, Any]) -> str:
     """YAML of plain values that `parse` reads as they were."""
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False)
+
+
+def dump_value(value: Any) -> str:
+    """The same of one value, on one line, as it stands behind a key."""
+    text = yaml.dump([value], Dumper=_Dumper, default_flow_style=True, width=inf)
+    return str(text).strip()[1:-1]
 
 
 class _Dumper(yaml.SafeDumper):

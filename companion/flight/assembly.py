@@ -168,14 +168,14 @@ class Assembled:
 
     def counts(self) -> LoopCounts:
         """What the control loop counted."""
-        loop = self.context.loop
+        record = self.context.loop.record
         return LoopCounts(
-            samples=loop.samples,
-            setpoints=loop.setpoints,
-            missed_deadlines=loop.missed_deadlines,
-            stale=loop.stale,
-            refused=loop.refused,
-            unanswered={reason.value: count for reason, count in loop.unanswered.items()},
+            samples=record.samples,
+            setpoints=record.setpoints,
+            missed_deadlines=record.missed_deadlines,
+            stale=record.stale,
+            refused=record.refused,
+            unanswered={reason.value: count for reason, count in record.unanswered.items()},
             rate_hz=self.context.rate_hz,
         )
 
@@ -229,7 +229,7 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    loop.attitude_target = lambda: link.state.attitude_target
+    loop.planner.attitude_target = lambda: link.state.attitude_target
     preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
     context = FlightContext(
         config,

@@ -22,14 +22,14 @@ _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 async def maneuvers(context: FlightContext) -> None:
     """Fly the maneuver to its end, or until it is given up."""
     now = asyncio.get_running_loop().time
-    began, sent = now(), context.loop.setpoints
+    began, sent = now(), context.loop.record.setpoints
     thrust = _ThrustForTilt(context)
     thrust.look()
     context.guidance_loop.follow(context.maneuvers)
 
     def over() -> bool:
         elapsed = now() - began
-        context.rate_hz = (context.loop.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         if context.guidance_loop.given_up is not None:
             raise FlightEnded(context.guidance_loop.given_up)
         thrust.look()
@@ -136,7 +136,7 @@ def _stop_moving(context: FlightContext) -> None:
     if not context.loop.offboard_active:
         return
     try:
-        context.loop.plan_anew()  # the estimator may have jumped
+        context.loop.planner.restart()  # the estimator may have jumped
         context.guidance_loop.hold_here()
     except Exception as error:  # whatever is wrong with guidance, the autopilot must be asked
         context.note(internal(error))

@@ -50,8 +50,8 @@ async def checks(context: FlightContext) -> None:
 async def stream(context: FlightContext) -> None:
     """Begin to answer samples, idle, and see that setpoints really flow."""
     context.loop.on = True
-    enough = context.loop.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.setpoints >= enough, "setpoints to flow")
+    enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:

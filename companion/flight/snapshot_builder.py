@@ -92,10 +92,10 @@ class SnapshotBuilder:
                 now,
                 stats.frames,
                 stats.lost,
-                loop.setpoints,
-                loop.missed_deadlines,
+                loop.record.setpoints,
+                loop.record.missed_deadlines,
                 late,
-                loop.held.copy(),
+                loop.record.held.copy(),
                 self._link.state.positions,
             )
         )
@@ -118,15 +118,15 @@ class SnapshotBuilder:
             ),
             self._motion(),
             Control(
-                loop.last_answer,
-                loop.last_sample,
-                loop.reason,
+                loop.record.last_answer,
+                loop.record.last_sample,
+                loop.record.reason,
                 -inf if command is None else command.made_at,
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.timeline == self._timeline else clock.last_change,
-                self.stood_still(since=loop.last_answer),
+                self.stood_still(since=loop.record.last_answer),
             ),
             self._health(now),
             self._resets(now),
@@ -153,13 +153,13 @@ class SnapshotBuilder:
             velocity,
             self._link.state.height,
             guidance_loop.off_course,
-            None if idle else loop.thrust,
+            None if idle else loop.record.thrust,
             self._origin,
         )
 
     def _health(self, now: float) -> Health:
         since = max(self._began_at, now - _GAPS_WITHIN)
-        gaps = sum(at > since for at in self._loop.gaps)
+        gaps = sum(at > since for at in self._loop.record.gaps)
         first, last = self._counted[0], self._counted[-1]
         span = last.now - first.now
         if span < _EARLY * _WINDOW:

@@ -1,6 +1,6 @@
 """Offboard loss of our own: nothing fresh to fly by, so nothing is sent, for too long."""
 
-from companion.control.unanswered import Unanswered
+from companion.control.loop_record import Unanswered
 from companion.safety.monitor import Judge
 from companion.safety.snapshot import Control, Snapshot
 

@@ -4,7 +4,7 @@ from math import inf
 from typing import NamedTuple
 
 from companion.attitude import Quaternion
-from companion.control.unanswered import Unanswered
+from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.vehicle.records import Battery, Estimator, Gps

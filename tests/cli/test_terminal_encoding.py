@@ -88,7 +88,7 @@ def test_refusals_are_told_on_any_terminal(tmp_path):
 
 def test_help_and_the_schema_are_told_on_any_terminal(tmp_path):
     assert_said(companion(tmp_path, ASCII, "identify", "--help"), 0, b"of tilt")
-    schema = companion(tmp_path, C_LOCALE, "check-config", "--schema")
+    schema = companion(tmp_path, C_LOCALE, "config", "--schema")
     assert_said(schema, 0)
     json.loads(schema.stdout)
 

@@ -42,7 +42,7 @@ def _check(case: Case) -> None:
         with (
             contextlib.redirect_stderr(errors),
             contextlib.redirect_stdout(io.StringIO()),
-            mock.patch("companion.cli.tools.check_mock"),  # a process of its own
+            mock.patch("companion.cli.config.check_mock"),  # a process of its own
         ):
             code = main(["check-config", str(folder / "main.yaml")])
         said = errors.getvalue()

@@ -177,7 +177,7 @@ def _findings(
             + ". The error must be taken in the body frame, q⁻¹ ⊗ q_d.",
         ),
         Finding(
-            "asked",
+            "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
             heading_effect(printed) < _SAME,

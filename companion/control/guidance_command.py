@@ -1,4 +1,4 @@
-"""What guidance leaves behind for the control loop."""
+"""The command that guidance leaves for the control loop."""
 
 from typing import NamedTuple
 
@@ -6,20 +6,20 @@ from companion.attitude import BodyRates, Target
 from companion.attitude.representation import wrap_angle
 
 
-class Command(NamedTuple):
-    """One command of guidance, which holds until the next one.
+class GuidanceCommand(NamedTuple):
+    """One command from guidance; it holds until the next one.
 
     Attributes:
-        target: for the planner; its heading is the one without jumps (`EstimatorResets`).
+        target: for the planner; its heading is in the frame without resets (`EstimatorResets`).
         acceleration_down: wanted vertical acceleration, m/s².
-        made_at: when, s on our clock.
-        idle: on the ground: no rates, no thrust.
-        is_step: an open-loop step, whose response is measured.
-        body_rates: instead of the planner's, rad/s; sent as far as the limits allow.
-        turn: sum of the estimate's jumps in heading when it was made, rad.
-        later: the target `period` after `made_at`; until then it moves there on a straight line,
-            and then it stays. None: `target` stays.
-        period: of guidance, s.
+        made_at: when guidance made the command, s on our clock.
+        idle: zero rates and zero thrust, on the ground.
+        is_step: whether this is an open-loop step whose response is measured.
+        body_rates: sent within the limits instead of the planner's answer, rad/s; None: plan.
+        turn: sum of the heading resets when the command was made, rad.
+        later: the target `period` after `made_at`. The target moves there on a straight line and
+            then stays. None: `target` stays.
+        period: of the guidance loop, s.
     """
 
     target: Target
@@ -33,7 +33,7 @@ class Command(NamedTuple):
     period: float = 0.0
 
     def target_at(self, time: float) -> Target:
-        """The target at a time, s on our clock: `target`, `later`, or between the two."""
+        """The target at `time`, s on our clock: `target`, `later`, or interpolated between them."""
         before, after, elapsed = self.target, self.later, time - self.made_at
         if after is None or not elapsed > 0.0:
             return before

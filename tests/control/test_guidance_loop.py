@@ -99,7 +99,7 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
         bench.guidance_loop.given_up
         == "identify was given up at 31° of tilt, more than limits.max_tilt_deg"
     )
-    assert bench.guidance_loop.pose.position_ned == pytest.approx(HERE, abs=0.01)
+    assert bench.guidance_loop.flown.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None
     assert not bench.guidance_loop.finished
 

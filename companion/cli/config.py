@@ -1,0 +1,86 @@
+"""`companion config`, `companion init` and `companion check-config`."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from companion.cli.exit_codes import EXIT_OK
+from companion.config import Config
+from companion.config.files import json_schema, load, shipped
+from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
+from companion.demo import check_mock
+from companion.files.yaml_file import ConfigError
+from companion.flight.assembly import link_settings
+from companion.flight.maneuvers import configured_maneuvers
+from companion.mavlink.endpoint import parse_endpoint
+
+STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
+"""What `init` begins with, by the name the user gives."""
+
+
+def show(options: argparse.Namespace) -> int:
+    """Print the configuration: all of it, one key, what a file changes, or the schema."""
+    if options.schema:
+        text = json_schema()
+    elif options.markdown:
+        text = as_markdown(keys(Config()))
+    elif options.diff:
+        text = as_yaml(differences(load(options.diff)))
+    else:
+        config = load(options.file) if options.file else Config()
+        text = as_yaml(iter(_found(config, options.get) if options.get else keys(config)))
+    sys.stdout.write(text)
+    return EXIT_OK
+
+
+def _found(config: Config, name: str) -> list[Key]:
+    """The key of that name, or all of a section.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    found = [key for key in keys(config) if name in (key.section, f"{key.section}.{key.name}")]
+    if not found:
+        near = [f"{key.section}.{key.name}" for key in keys(config) if name in key.name]
+        hint = f"did you mean {', '.join(near)}?" if near else "`companion config` prints them all"
+        raise ConfigError(f"--get: there is no key `{name}`; {hint}")
+    return found
+
+
+def init(options: argparse.Namespace) -> int:
+    """Write a commented starting file: a shipped one, with what it includes in it.
+
+    Raises:
+        ConfigError: the file exists or cannot be written.
+    """
+    text = shipped(f"{STARTS[options.name]}.yaml").read_text(encoding="utf-8")
+    lines = []
+    for line in text.splitlines(keepends=True):
+        if line.startswith("# yaml-language-server"):
+            continue
+        if not line.startswith("include: "):
+            lines.append(line)
+            continue
+        included = shipped(line.split()[1]).read_text(encoding="utf-8")
+        lines.append("# How the rate loop answers; `companion identify` measures yours.\n")
+        lines.append(included[included.index("vehicle:\n") :])
+    try:
+        with Path(options.out).open("x", encoding="utf-8") as file:
+            file.write("".join(lines).removeprefix("#\n"))
+    except FileExistsError:
+        raise ConfigError(f"{options.out} exists already; name another with --out") from None
+    except OSError as error:
+        raise ConfigError(f"--out: cannot write {options.out}: {error.strerror}") from error
+    print(f"Wrote {options.out}. Check it with: companion check-config {options.out}")
+    return EXIT_OK
+
+
+def check(options: argparse.Namespace) -> int:
+    """Check a configuration file, with what it includes and flies."""
+    config = load(options.file)
+    parse_endpoint(link_settings(config).endpoint)
+    configured_maneuvers(config)  # the trajectory too
+    if config.mock is not None:
+        check_mock(options.file)
+    print(f"{options.file}: ok")
+    return EXIT_OK

@@ -1,0 +1,149 @@
+"""The reference of the configuration: every key with its default, unit, range and meaning.
+
+All of it comes from the sections themselves, so a key is described in one place.
+"""
+
+import textwrap
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from companion.config import Config
+from companion.files import bounded_yaml
+
+_UNITS = {
+    "_deg_s2": "°/s²",
+    "_rad_s": "rad/s",
+    "_deg_s": "°/s",
+    "_m_s2": "m/s²",
+    "_m_s": "m/s",
+    "_per_s4": "1/s⁴",
+    "_per_s2": "1/s²",
+    "_per_s": "1/s",
+    "_per_m": "1/m",
+    "_deg": "°",
+    "_percent": "%",
+    "_ms": "ms",
+    "_hz": "Hz",
+    "_m": "m",
+    "_s": "s",
+}
+"""By the end of a key; the first that fits counts."""
+_BOUNDS = (
+    ("minimum", "at least {:g}"),
+    ("exclusiveMinimum", "more than {:g}"),
+    ("maximum", "at most {:g}"),
+    ("exclusiveMaximum", "less than {:g}"),
+)
+_WIDTH = 98
+
+
+class Key(NamedTuple):
+    """One key of a section.
+
+    Attributes:
+        section: where it stands.
+        name: of the key.
+        value: as it stands in a file.
+        default: the same.
+        unit: such as °/s; empty: none.
+        allowed: range or choices, in words; empty: as the type says.
+        meaning: what it is.
+    """
+
+    section: str
+    name: str
+    value: Any
+    default: Any
+    unit: str
+    allowed: str
+    meaning: str
+
+
+def sections() -> dict[str, type[BaseModel]]:
+    """The sections of the file, in its order."""
+    kinds = {name: field.annotation for name, field in Config.model_fields.items()}
+    return {
+        name: kind
+        for name, kind in kinds.items()
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+    }
+
+
+def keys(config: Config) -> Iterator[Key]:
+    """Every key, with its value in a configuration."""
+    values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
+    for section, model in sections().items():
+        schema = model.model_json_schema()["properties"]
+        for name, field in model.model_fields.items():
+            yield Key(
+                section,
+                name,
+                values[section][name],
+                defaults[section][name],
+                next((unit for end, unit in _UNITS.items() if name.endswith(end)), ""),
+                _allowed(schema[name]),
+                " ".join((field.description or "").split()),
+            )
+
+
+def differences(config: Config) -> Iterator[Key]:
+    """The keys whose values are not the default."""
+    return (key for key in keys(config) if key.value != key.default)
+
+
+def as_yaml(described: Iterator[Key]) -> str:
+    """Keys as commented YAML, which a configuration may consist of."""
+    models, lines, section = sections(), list[str](), ""
+    for key in described:
+        if key.section != section:
+            section = key.section
+            lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
+        lines += _comment(key.meaning, "  ")
+        limits = ", ".join(part for part in (key.unit, key.allowed) if part)
+        if key.value != key.default:
+            limits += f"; default: {_flow(key.default)}"
+        note = f"  # {limits.removeprefix('; ')}" if limits else ""
+        lines.append(f"  {key.name}: {_flow(key.value)}{note}")
+    return "\n".join(lines).strip() + "\n"
+
+
+def as_markdown(described: Iterator[Key]) -> str:
+    """Keys as tables, one a section."""
+    models, lines, section = sections(), list[str](), ""
+    for key in described:
+        if key.section != section:
+            section = key.section
+            lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
+            lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
+        cells = (f"`{key.name}`", f"`{_flow(key.default)}`", key.unit, key.allowed, key.meaning)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines).strip() + "\n"
+
+
+def _allowed(schema: dict[str, Any]) -> str:
+    """Range or choices of a key, from its JSON Schema."""
+    options = [schema, *schema.get("anyOf", [])]
+    words = []
+    for option in options:
+        if "enum" in option:
+            words.append(" or ".join(str(choice) for choice in option["enum"]))
+        words += [text.format(option[bound]) for bound, text in _BOUNDS if bound in option]
+        if option.get("type") == "null":
+            words.append("or null")
+    return ", ".join(words)
+
+
+def _flow(value: Any) -> str:
+    return bounded_yaml.dump_value(value)
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(
+        _one_line(text), _WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# "
+    )
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
