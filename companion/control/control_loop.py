@@ -24,14 +24,8 @@ from companion.control.planner_runner import PlannerRunner
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
-<<<<<<< HEAD
 from companion.vehicle.clock_jumps import Misfit
-from companion.vehicle.held_rates import HeldRates
-from companion.vehicle.records import AttitudeSample, AttitudeTarget
-=======
-from companion.vehicle.clock import Misfit
-from companion.vehicle.samples import AttitudeSample
->>>>>>> main
+from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""
