@@ -140,8 +140,8 @@ def our_system(value: float, _: Values, settings: CompanionSettings) -> Problem 
         return None
     return Problem(
         INEFFECTIVE,
-        f"our heartbeat says system {settings.source_system}, so the autopilot takes us for another "
-        f"vehicle; set link.source_system to {value:g}",
+        f"our heartbeat says system {settings.source_system}, so the autopilot takes us for "
+        f"another vehicle; set link.source_system to {value:g}",
     )
 
 

@@ -62,8 +62,8 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
         return None
     return Problem(
         INEFFECTIVE,
-        f"our own heartbeat, of system {settings.source_system}, counts as the ground station's, so "
-        "that its loss is not noticed",
+        f"our own heartbeat, of system {settings.source_system}, counts as the ground "
+        "station's, so that its loss is not noticed",
         255.0 if settings.source_system != 255 else None,
     )
 
@@ -73,8 +73,8 @@ def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem 
         return None
     return Problem(
         INEFFECTIVE,
-        f"no message is sent more often, so that link.attitude_rate_hz {settings.attitude_rate_hz:g} "
-        "is denied; ask for less",
+        f"no message is sent more often, so that link.attitude_rate_hz "
+        f"{settings.attitude_rate_hz:g} is denied; ask for less",
     )
 
 
