@@ -26,6 +26,7 @@ from companion.flight.vehicle_memory import VehicleMemory
 from companion.flight.watch import Watch
 from companion.guidance import HoverThrust, ManeuverSequence, ThrustSettings
 from companion.guidance.follow import Follow
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
@@ -34,7 +35,6 @@ from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
-from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
 
 

@@ -9,12 +9,12 @@ from companion.config import Config
 from companion.flight.same_vehicle import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.examination import examine, forbidding, unsafe
+from companion.preflight.examination import blocking, examine, unsafe
 from companion.preflight.finding import Finding
-from companion.preflight.gathering import gather, wanted_rates
+from companion.preflight.session import gather, wanted_rates
 from companion.safety.ending import FlightEnded
 from companion.vehicle.link import Link
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
 _COUNTED_FOR = 1.0
@@ -32,7 +32,7 @@ class Preflight:
     that was done within the last second.
 
     Attributes:
-        note: takes what is amiss without forbidding a flight, once each.
+        note: takes what is amiss without blocking a flight, once each.
         meet: is told who the vehicle is, as soon as it tells.
 
     Args:
@@ -96,11 +96,11 @@ class Preflight:
 
     def _heed(self, findings: list[Finding]) -> None:
         """Refuse what is unsafe, unless the configuration excepts it; say what else is amiss."""
-        refused = forbidding(self._config, findings)
+        refused = blocking(self._config, findings)
         amiss = [
             finding.key
             for finding in findings
-            if finding.verdict is Verdict.INEFFECTIVE and finding not in refused
+            if finding.result is CheckResult.INEFFECTIVE and finding not in refused
         ]
         if amiss:
             self._tell(f"not as it should be: {', '.join(amiss)}; `companion doctor` tells why")

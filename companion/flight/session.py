@@ -16,7 +16,7 @@ from companion.flight.state_logger import StateLogger
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample
 
 
 class Session:

@@ -16,8 +16,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.outer_loop import linear_guidance, motion_estimate
 from companion.flight.assembly import planner
 from companion.guidance import GRAVITY, Reference
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 DT = 0.004
 _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
