@@ -4,17 +4,18 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 from companion.config import Config
 from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
-from companion.flight.judgement import Preflight
-from companion.flight.same_vehicle import SameVehicle
-from companion.flight.snapshot_builder import SnapshotBuilder
+from companion.flight.preflight_checks import PreflightChecks
+from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
@@ -52,7 +53,7 @@ class FlightContext:
     snapshot_builder: SnapshotBuilder
     maneuvers: ManeuverSequence
     ground: GroundContact
-    preflight: Preflight
+    preflight: PreflightChecks
     same_vehicle: SameVehicle
     detail: str = ""
     rate_hz: float = 0.0
@@ -112,3 +113,11 @@ class FlightContext:
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""
         return self.link.state.armed is True
+
+
+async def cancel(task: asyncio.Task[Any]) -> None:
+    """Cancel a task and wait until it has ended; its result was read elsewhere."""
+    task.cancel()
+    await asyncio.wait({task})
+    if not task.cancelled():
+        task.exception()

@@ -3,11 +3,16 @@
 import asyncio
 from math import degrees
 
+from companion.flight.commands import (
+    change_mode,
+    command_if_ours,
+    in_role,
+    in_roles,
+    leave_offboard,
+    require_role,
+)
 from companion.flight.context import FlightContext
-from companion.flight.left_in_offboard import leave_offboard
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import change_mode, command_if_ours
-from companion.safety.ending import FlightEnded, internal
+from companion.safety.actions import FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM = 8.0

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.config import Config
 from companion.identification import dead_time_by_correlation
 from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
-from companion.safety.ending import internal
+from companion.safety.actions import internal
 
 _PERIOD = 2.0
 """Between two looks, s. Each is at one axis, so every axis has its turn after three."""
@@ -40,6 +41,15 @@ class RateLoop(NamedTuple):
     dead_time: float | None = None
     acceleration_limit: float | None = None
     damping: float | None = None
+
+
+def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
+    """The configured responses of roll, pitch and yaw."""
+    roll, pitch, yaw = (
+        RateLoop(axis.lag, axis.dead_time, axis.acceleration_limit, axis.damping)
+        for axis in config.vehicle.axes.values()
+    )
+    return roll, pitch, yaw
 
 
 class DeadTimeWatch:

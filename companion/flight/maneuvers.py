@@ -9,7 +9,7 @@ import numpy as np
 from companion.config import Config, trajectory_file
 from companion.config.flight import IdentifyConfig
 from companion.config.known_drag import assumption, least_drag, most_drag
-from companion.control.outer_loop import thrust_limits
+from companion.control.inner_loop import thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck

@@ -7,7 +7,7 @@ from typing import Any
 from companion.config.flight import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff
 from companion.flight.context import FlightContext
-from companion.safety.ending import Exit
+from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
@@ -43,6 +43,12 @@ class Phase:
     on_failure_landed: Exit | None = None
     modes: frozenset[Role] = frozenset()
     monitored: bool = False
+
+    def exit_on_failure(self, *, standing: bool) -> Exit:
+        """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
+        if self.on_failure_landed is not None and standing:
+            return self.on_failure_landed
+        return self.on_failure
 
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:

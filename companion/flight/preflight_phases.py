@@ -1,16 +1,20 @@
 """What is done on the ground, one coroutine a phase, and how arming is undone."""
 
 from companion.files.yaml_file import ConfigError
+from companion.flight.commands import (
+    command_if_ours,
+    in_role,
+    in_roles,
+    leave_offboard,
+    require_role,
+)
 from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
-from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.maneuvers import require_inside
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import command_if_ours
 from companion.guidance.fence import Place
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Stage
 from companion.preflight.finding import Finding
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.parameter_rules import Values, Verdict
 

@@ -11,8 +11,7 @@ from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.flight import AskLanding
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.observer import Observer
-from companion.flight.state_logger import StateLogger
+from companion.flight.observer import Observer, StateLogger
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link

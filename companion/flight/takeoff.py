@@ -2,11 +2,10 @@
 
 import asyncio
 
+from companion.flight.commands import change_mode, command_if_ours, in_role, in_roles, require_role
 from companion.flight.context import FlightContext
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import change_mode, command_if_ours
 from companion.preflight.evidence import Stage
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
 
 _SETTLING = 1.0
