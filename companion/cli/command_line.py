@@ -1,71 +1,50 @@
 """The command line: its options, and what each error of a command means to the shell."""
 
 import argparse
-import asyncio
 import traceback
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from importlib.metadata import version
 from math import nan
 from pathlib import Path
-from typing import TypeAlias, get_args
+from typing import TypeAlias
 
-from rich.console import Console
-
-from companion import demo
-from companion.cli import config, doctor, flights, identify, tools
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
-from companion.cli.identify import SHIPPED
-from companion.config.flight import FlightConfig
-from companion.extras import MissingExtraError
-from companion.files.yaml_file import ConfigError
-from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
-from companion.realtime import RealtimeError
-from companion.recording.figure import FigureError
 from companion.study import registry
 
 _PACKAGE = "mavlink-companion"
+_STARTS = "px4", "ardupilot", "mock"
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-
-_USAGE_ERRORS = (
-    ConfigError,
-    EndpointError,
-    FigureError,
-    LogError,
-    MissingExtraError,
-    RealtimeError,
-    SigningError,
-)
-_MANEUVERS = get_args(get_args(FlightConfig.model_fields["maneuvers"].annotation)[0])
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code.
 
+    A command's modules are imported once the command line is read: `--help` waits for none of them.
+
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight sees to it.
     """
     options = _parser().parse_args(arguments)
-    errors = Console(stderr=True)
+    module, _, function = options.run.partition(".")
+    errors = import_module("companion.cli.errors")
     try:
-        return int(options.run(options))
-    except _USAGE_ERRORS as error:
-        errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
+        command = getattr(import_module(f"companion.cli.{module}"), function)
+        return int(command(options))
+    except errors.USAGE as error:
+        errors.say(f"{error}")
         return EXIT_USAGE
-    except (LinkError, OSError, demo.VehicleStoppedError) as error:
-        errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
+    except errors.FLIGHT as error:
+        errors.say(f"{error}")
         return EXIT_FLIGHT
-    except asyncio.CancelledError:
-        errors.print("companion: interrupted before anything was sent")
+    except errors.CANCELLED:
+        errors.say("interrupted before anything was sent")
         return EXIT_FLIGHT
     except Exception as error:
         if options.debug:
             traceback.print_exc()
-        errors.print(
-            f"companion: internal error: {error!r}; run again with --debug for where it happened",
-            markup=False,
-            soft_wrap=True,
-        )
+        errors.say(f"internal error: {error!r}; run again with --debug for where it happened")
         return EXIT_FLIGHT
 
 
@@ -97,18 +76,18 @@ def _add_flights(commands: Commands) -> None:
         "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
     )
     _add_link_options(fly)
-    fly.set_defaults(run=flights.fly)
+    fly.set_defaults(run="flights.fly")
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
     show.add_argument(
         "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
     )
-    show.set_defaults(run=flights.demo)
+    show.set_defaults(run="flights.demo")
     for command in (fly, show):
         command.add_argument(
             "--maneuvers",
-            type=_maneuvers,
+            type=lambda text: tuple(text.split(",")),
             metavar="NAME[,NAME]",
-            help=f"fly these instead of flight.maneuvers: {', '.join(_MANEUVERS)}",
+            help="fly these instead of flight.maneuvers: hover, steps, circle, corners",
         )
         command.add_argument(
             "--trajectory",
@@ -156,7 +135,7 @@ def _add_doctor(commands: Commands) -> None:
     )
     command.add_argument("--yes", action="store_true", help="of --fix: set all without asking")
     _add_flight_options(command)
-    command.set_defaults(run=doctor.doctor)
+    command.set_defaults(run="doctor.doctor")
 
 
 def _add_identify(commands: Commands) -> None:
@@ -175,7 +154,7 @@ def _add_identify(commands: Commands) -> None:
         type=Path,
         metavar="FILE",
         nargs="?",
-        const=SHIPPED,
+        const=Path(),  # the configuration that ships
         help="start the bundled vehicle and fly it; default: the mock-px4.yaml that ships",
     )
     which.add_argument(
@@ -187,7 +166,7 @@ def _add_identify(commands: Commands) -> None:
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
-    command.set_defaults(run=identify.identify, trajectory=None, slow_down=False)
+    command.set_defaults(run="identify.identify", trajectory=None, slow_down=False)
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
@@ -219,12 +198,12 @@ def _add_benches(commands: Commands) -> None:
     link.add_argument(
         "--rate", type=_number(1.0, 2000.0), default=250.0, help="samples a second (250)"
     )
-    link.set_defaults(run=tools.bench_link)
+    link.set_defaults(run="tools.bench_link")
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument(
         "--seconds", type=_number(0.001, 3600.0), default=5.0, help="of measuring (5)"
     )
-    step.set_defaults(run=tools.bench_planner)
+    step.set_defaults(run="tools.bench_planner")
     for each in (link, step):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
@@ -253,14 +232,14 @@ def _add_study(commands: Commands) -> None:
         action="store_true",
         help=f"for {registry.names_with_json()}: print its rows as one JSON list",
     )
-    study.set_defaults(run=tools.study)
+    study.set_defaults(run="tools.study")
 
 
 def _add_tools(commands: Commands) -> None:
     plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
-    plot.set_defaults(run=tools.plot)
+    plot.set_defaults(run="tools.plot")
 
 
 def _add_config(commands: Commands) -> None:
@@ -275,10 +254,10 @@ def _add_config(commands: Commands) -> None:
     which.add_argument("--get", metavar="KEY", help="only this key, such as limits.max_tilt_deg")
     which.add_argument("--schema", action="store_true", help="the JSON Schema, for editors")
     which.add_argument("--markdown", action="store_true", help="tables: docs/configuration.md")
-    show.set_defaults(run=config.show)
+    show.set_defaults(run="config.show")
 
     start = commands.add_parser("init", help="write a commented starting configuration")
-    start.add_argument("name", choices=list(config.STARTS), help="for which vehicle")
+    start.add_argument("name", choices=_STARTS, help="for which vehicle")
     start.add_argument(
         "--out",
         type=Path,
@@ -286,7 +265,7 @@ def _add_config(commands: Commands) -> None:
         metavar="FILE",
         help="default: companion.yaml; an existing file is never replaced",
     )
-    start.set_defaults(run=config.init)
+    start.set_defaults(run="config.init")
 
     check = commands.add_parser(
         "check-config",
@@ -296,17 +275,7 @@ def _add_config(commands: Commands) -> None:
         "`companion config` names the smallest and the largest value of each key.",
     )
     check.add_argument("file", type=Path, metavar="FILE")
-    check.set_defaults(run=config.check)
-
-
-def _maneuvers(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    unknown = [name for name in names if name not in _MANEUVERS]
-    if unknown:
-        raise argparse.ArgumentTypeError(
-            f"unknown maneuver {unknown[0]!r}; known: {', '.join(_MANEUVERS)}"
-        )
-    return names
+    check.set_defaults(run="config.check")
 
 
 def _number(least: float, most: float) -> Callable[[str], float]:

@@ -24,8 +24,7 @@ from companion.config.limits import DeadmanConfig, LimitsConfig
 from companion.config.safety import SafetyConfig
 from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
-from companion.guidance.thrust import FOR_TILT, largest_tilt
-from companion.guidance.thrust_curve import ThrustCurve
+from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
 
 FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32

@@ -4,7 +4,7 @@ from math import sin
 
 from companion.attitude import Quaternion, Target
 from companion.guidance import GRAVITY, HoverThrust
-from companion.guidance.horizontal import limited
+from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt
 from companion.vehicle.state import VehicleState
 

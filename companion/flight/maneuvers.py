@@ -15,16 +15,14 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
 from companion.guidance import (
     GRAVITY,
-    Circle,
     Corners,
     Doublets,
-    Hover,
     Maneuver,
     ManeuverSequence,
     Steps,
 )
 from companion.guidance.fence import Place
-from companion.guidance.follow import Follow
+from companion.guidance.follow import Follow, circle, hover
 from companion.guidance.predicted import predicted
 from companion.guidance.trajectory import (
     Envelope,
@@ -81,8 +79,11 @@ def _part(config: Config, name: str) -> Maneuver:
     if name == "trajectory":
         return _follow(config)
     part = _simple(config, name)
-    require_inside(config, [part], None)
-    if isinstance(part, Circle):
+    try:
+        require_inside(config, [part], None)
+    except TrajectoryError as error:
+        raise ConfigError(f"{name}: {error}") from error
+    if name == "circle":
         (motion,) = _motions(part, least_drag(config))
         for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
             _refuse(part.name, broken, assumption(config))
@@ -90,14 +91,14 @@ def _part(config: Config, name: str) -> Maneuver:
 
 
 def _simple(config: Config, name: str) -> Maneuver:
-    corners, steps, circle = config.corners, config.steps, config.circle
+    corners, steps = config.corners, config.steps
     match name:
         case "hover":
-            return Hover(config.hover.duration_s)
+            return hover(config.hover.duration_s)
         case "steps":
             return Steps(steps.coefficient, steps.duration_s, steps.settle_s)
         case "circle":
-            return Circle(circle.radius_m, circle.speed_m_s, circle.laps)
+            return circle(config.circle.radius_m, config.circle.speed_m_s, config.circle.laps)
         case "corners":
             return Corners(
                 corners.north_coefficient,

@@ -1,4 +1,4 @@
-"""The mock's wires of bytes: one client a TCP port, a serial line, frames never cut short."""
+"""The mock's byte streams: one client per TCP port, a serial line, frames never truncated."""
 
 import os
 import socket

@@ -5,17 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance import Circle, Corners, Hover, ManeuverSequence, Pose, Steps
+from companion.guidance import Corners, ManeuverSequence, Pose, Steps
+from companion.guidance.follow import circle, hover
 
 START = Pose((3.0, -2.0, -5.0), 0.7)
-CIRCLES = [Circle(3.0, 2.0, 1.0), Circle(1.0, 3.0, 0.2), Circle(8.0, 0.5, 2.5)]
+CIRCLES = [(3.0, 2.0, 1.0), (1.0, 3.0, 0.2), (8.0, 0.5, 2.5)]
+"""Radius in m, speed in m/s, laps."""
 
 
-@pytest.mark.parametrize("circle", CIRCLES)
-def test_circle_derivatives_agree_with_finite_differences(circle):
-    h = 1e-4
-    for t in np.linspace(2 * h, circle.duration - 2 * h, 200):
-        behind, here, ahead = (circle.at(t + d, START) for d in (-h, 0.0, h))
+@pytest.mark.parametrize("flown", CIRCLES)
+def test_circle_derivatives_agree_with_finite_differences(flown):
+    lap, h = circle(*flown), 1e-4
+    for t in np.linspace(2 * h, lap.duration - 2 * h, 200):
+        behind, here, ahead = (lap.at(t + d, START) for d in (-h, 0.0, h))
         velocity = (np.array(ahead.position_ned) - np.array(behind.position_ned)) / (2 * h)
         acceleration = (np.array(ahead.velocity_ned) - np.array(behind.velocity_ned)) / (2 * h)
         assert here.velocity_ned == pytest.approx(velocity, abs=1e-6)
@@ -23,21 +25,20 @@ def test_circle_derivatives_agree_with_finite_differences(circle):
         assert here.acceleration_ned == pytest.approx(acceleration, abs=2e-3)
 
 
-@pytest.mark.parametrize("circle", CIRCLES)
-def test_circle_begins_and_ends_at_rest_and_keeps_its_radius(circle):
-    for t in (0.0, circle.duration, circle.duration + 5.0):
-        assert circle.at(t, START).velocity_ned == pytest.approx((0, 0, 0), abs=1e-9)
-    assert circle.at(0.0, START).position_ned == pytest.approx(START.position_ned)
-    centre = np.add(START.position_ned, (circle.radius, 0.0, 0.0))
-    for t in np.linspace(0.0, circle.duration, 50):
-        reference = circle.at(t, START)
-        assert np.linalg.norm(np.array(reference.position_ned) - centre) == pytest.approx(
-            circle.radius
-        )
-        assert np.linalg.norm(reference.velocity_ned) <= circle.speed * (1 + 1e-9)
+@pytest.mark.parametrize(("radius", "speed", "laps"), CIRCLES)
+def test_circle_begins_and_ends_at_rest_and_keeps_its_radius(radius, speed, laps):
+    flown = circle(radius, speed, laps)
+    for t in (0.0, flown.duration, flown.duration + 5.0):
+        assert flown.at(t, START).velocity_ned == pytest.approx((0, 0, 0), abs=1e-9)
+    assert flown.at(0.0, START).position_ned == pytest.approx(START.position_ned)
+    centre = np.add(START.position_ned, (radius, 0.0, 0.0))
+    for t in np.linspace(0.0, flown.duration, 50):
+        reference = flown.at(t, START)
+        assert np.linalg.norm(np.array(reference.position_ned) - centre) == pytest.approx(radius)
+        assert np.linalg.norm(reference.velocity_ned) <= speed * (1 + 1e-9)
         assert reference.heading == START.heading
-    full = circle.laps % 1.0 == 0.0
-    end = circle.at(circle.duration, START).position_ned
+    full = laps % 1.0 == 0.0
+    end = flown.at(flown.duration, START).position_ned
     assert (end == pytest.approx(START.position_ned, abs=1e-9)) is full
 
 
@@ -61,7 +62,7 @@ def test_steps_leave_an_ideal_vehicle_where_it_was():
 
 @pytest.mark.parametrize("maneuvers", [Steps(0.25, 1.0, 3.0), Corners(0.3, 0.4, 1.0, 2.0)])
 def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(maneuvers):
-    drifted, before = 0.0, Hover(1.0).at(0.0, START)
+    drifted, before = 0.0, hover(1.0).at(0.0, START)
     for k in range(round(maneuvers.duration / 0.01)):
         reference = maneuvers.at(0.01 * k + 0.005, START)
         assert not (reference.drifting and reference.coefficients)
@@ -73,9 +74,20 @@ def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(maneuvers):
     assert drifted == pytest.approx(runs * 1.0)
 
 
+def test_the_circle_gathers_speed_as_a_raised_cosine_and_no_lap_is_too_long_to_check():
+    """Half the speed in the middle of a ramp of speed/(1 m/s²), three quarters after two thirds."""
+    flown = circle(3.0, 2.0, 1.0)
+    for time, speed in ((1.0, 1.0), (4.0 / 3.0, 1.5), (2.0, 2.0), (flown.duration - 1.0, 1.0)):
+        assert np.linalg.norm(flown.at(time, START).velocity_ned) == pytest.approx(speed)
+    assert flown.duration == pytest.approx(2.0 * np.pi * 3.0 / 2.0 + 2.0)
+    hours = circle(3.0, 2.0, 1000.0)
+    assert hours.duration > 9000.0
+    assert hours.check_times()[-1] == hours.duration
+
+
 @given(st.floats(0.0, 40.0))
 def test_sequence_plays_its_parts_in_order(time):
-    parts = [Hover(3.0), Steps(0.2, 1.0, 2.0), Circle(3.0, 2.0, 1.0)]
+    parts = [hover(3.0), Steps(0.2, 1.0, 2.0), circle(3.0, 2.0, 1.0)]
     sequence = ManeuverSequence(parts)
     assert sequence.duration == pytest.approx(sum(p.duration for p in parts))
     edges = np.cumsum([p.duration for p in parts])
