@@ -41,7 +41,7 @@ EXPECTED = (
     "disarmed",
     "autopilot: ",
     "realtime: ",
-    "should our setpoints stop",
+    "offboard loss: if our setpoints stop",
     "the vehicle's drag is",
 )
 """How the events of an undisturbed flight begin."""

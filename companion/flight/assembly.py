@@ -1,4 +1,4 @@
-"""Puts a flight together from the configuration: the one place where YAML's units become SI."""
+"""Assembles a flight from the configuration: link, loops, monitors, watch and phases."""
 
 import asyncio
 from collections.abc import Callable
@@ -53,7 +53,7 @@ def link_settings(config: Config) -> LinkSettings:
 
 
 def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
-    """The link that `link.backend` names, not open yet; `tap` and `notice` as of `Link`.
+    """The link of `link.backend`, still closed; `tap` and `notice` as in `Link`.
 
     Raises:
         SigningError: the key cannot be used.
@@ -68,7 +68,7 @@ def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
 
 
 def realtime_wishes(config: Config) -> Wishes:
-    """What to ask of the operating system."""
+    """The real-time settings to request from the operating system."""
     section = config.realtime
     return Wishes(
         fifo_priority=section.priority if section.scheduler == "fifo" else None,
@@ -88,7 +88,7 @@ def _signing(key_file: Path | None) -> Signing | None:
 
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """A flight ready to run over an open link, and what is read from it afterwards."""
+    """A flight ready to run over an open link, and its figures afterwards."""
 
     flight: Flight
     context: FlightContext
@@ -97,12 +97,12 @@ class Assembled:
     memory: VehicleMemory
 
     def close(self) -> None:
-        """End what runs beside the flight."""
+        """End the process of predictive control."""
         if self.context.guidance_loop.predictive is not None:
             self.context.guidance_loop.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
-        """What came of predictive control; None where it did not fly."""
+        """The figures of predictive control; None where it did not fly."""
         predictive = self.context.guidance_loop.predictive
         if predictive is None:
             return None
@@ -111,7 +111,7 @@ class Assembled:
         return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
 
     def counts(self) -> LoopCounts:
-        """What the control loop counted."""
+        """The counters of the control loop."""
         record = self.context.loop.record
         return LoopCounts(
             samples=record.samples,
@@ -132,10 +132,7 @@ def assemble(
     folder: Path,
     maneuvers: ManeuverSequence,
 ) -> Assembled:
-    """Wire the rooms together over an open link, to fly `maneuvers`.
-
-    What is noted in flight waits in `folder`.
-    """
+    """Assemble a flight of `maneuvers` over an open link; its records are written to `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
     thrust = hover_thrust(config)

@@ -20,7 +20,7 @@ LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
 COMPANION = Path(__file__).parents[2] / "companion"
 
 
-def test_every_command_of_a_flight_goes_by_orders():
+def test_every_command_of_a_flight_goes_through_one_function():
     """`context.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
     senders = {
         path.name
@@ -31,7 +31,7 @@ def test_every_command_of_a_flight_goes_by_orders():
         and isinstance(node.func, ast.Attribute)
         and ast.unparse(node.func).endswith("link.command")
     }
-    assert senders == {"orders.py", "context.py"}
+    assert senders == {"commands.py", "context.py"}
 
 
 class Vehicle:
