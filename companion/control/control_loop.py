@@ -24,8 +24,8 @@ from companion.control.planner_runner import PlannerRunner
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
-from companion.vehicle.clock import Misfit
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.clock_jumps import Misfit
+from companion.vehicle.records import AttitudeSample
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""

@@ -26,8 +26,7 @@ from companion.guidance import (
 )
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 from companion.vehicle.state import VehicleState
 
 _LEVEL = Target(0.0, 0.0, 0.0)

@@ -9,8 +9,7 @@ from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COSINE = 0.2
 """Lower limit for the cosine of the tilt: beyond 78° the thrust does not hold the height."""

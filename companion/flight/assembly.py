@@ -21,6 +21,7 @@ from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance import ManeuverSequence
 from companion.guidance.follow import Follow
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
@@ -30,7 +31,6 @@ from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
 from companion.safety.snapshot_builder import SnapshotBuilder
-from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
 
 

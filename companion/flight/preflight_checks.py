@@ -9,12 +9,12 @@ from companion.config import Config
 from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.examination import examine, forbidding, unsafe
+from companion.preflight.examination import blocking, examine, unsafe
 from companion.preflight.finding import Finding
-from companion.preflight.gathering import gather, wanted_rates
+from companion.preflight.session import gather, wanted_rates
 from companion.safety.actions import FlightEnded
 from companion.vehicle.link import Link
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
 _COUNTED_FOR = 1.0
@@ -31,7 +31,7 @@ class PreflightChecks:
     always the newest; rates and parameters are taken again unless they are less than a second old.
 
     Attributes:
-        note: takes each finding that does not forbid the flight, once.
+        note: takes each finding that does not block the flight, once.
         meet: called with the vehicle's identity once it is known.
 
     Args:
@@ -73,7 +73,7 @@ class PreflightChecks:
 
         Raises:
             ChecksVoid: it may be another vehicle than was checked.
-            FlightEnded: a finding forbids the flight.
+            FlightEnded: a finding blocks the flight.
             LinkLost: the connection dropped meanwhile.
         """
         before = evidence = self._evidence
@@ -95,11 +95,11 @@ class PreflightChecks:
 
     def _heed(self, findings: list[Finding]) -> None:
         """End the flight for unsafe findings that are not accepted; report all others."""
-        refused = forbidding(self._config, findings)
+        refused = blocking(self._config, findings)
         amiss = [
             finding.key
             for finding in findings
-            if finding.verdict is Verdict.INEFFECTIVE and finding not in refused
+            if finding.result is CheckResult.INEFFECTIVE and finding not in refused
         ]
         if amiss:
             self._tell(f"preflight warnings: {', '.join(amiss)}; see `companion doctor`")

@@ -16,7 +16,7 @@ from companion.preflight.evidence import Stage
 from companion.preflight.finding import Finding
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
-from companion.vehicle.parameter_rules import Values, Verdict
+from companion.vehicle.parameter_rules import CheckResult, Values
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -152,7 +152,7 @@ def _ready(context: FlightContext) -> bool:
 
 
 def _refuse(finding: Finding) -> None:
-    if finding.verdict is Verdict.UNSAFE:
+    if finding.result is CheckResult.UNSAFE:
         raise FlightEnded(finding.sentence())
 
 

@@ -15,7 +15,7 @@ from companion.flight.observer import Observer, StateLogger
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample
 
 
 class Session:

@@ -8,11 +8,17 @@ import yaml
 
 from companion.files.yaml_file import ConfigError, load
 from companion.mavlink.errors import ParameterRefused, UnknownParameter
-from companion.preflight.apply_fixes import Answer, NotWhileArmedError, mend, restore
 from companion.preflight.evidence import Identity
 from companion.preflight.finding import Change, Finding
-from companion.preflight.undo import Undo, UndoFile
-from companion.vehicle.parameter_rules import Verdict
+from companion.preflight.parameter_fixes import (
+    Answer,
+    Undo,
+    UndoFile,
+    VehicleArmedError,
+    apply_fixes,
+    restore,
+)
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.registry import autopilot_for
 
 YES, NO, ALL, QUIT = Answer.YES, Answer.NO, Answer.ALL, Answer.QUIT
@@ -46,11 +52,11 @@ class FakeLink:
 
 def finding(parameter, old, new):
     change = Change(parameter, old, new, reboot=False)
-    return Finding(parameter, Verdict.UNSAFE, f"{parameter} is {old:g}", change=change)
+    return Finding(parameter, CheckResult.UNSAFE, f"{parameter} is {old:g}", change=change)
 
 
 WRONG = [finding("A", 5.0, 1.0), finding("B", 2.0, 3.0), finding("C", 7.0, 8.0)]
-SAFE = Finding("D", Verdict.SAFE, "D is 1")
+SAFE = Finding("D", CheckResult.SAFE, "D is 1")
 
 
 def treat(link, folder, answers, findings=(*WRONG, SAFE)):
@@ -64,7 +70,7 @@ def treat(link, folder, answers, findings=(*WRONG, SAFE)):
     async def scene():
         link.state.heartbeat.received = asyncio.get_running_loop().time()
         undo = UndoFile(folder, link, Identity("1.18.0", 0, "00ab"))
-        await mend(link, findings, ask, undo, outcomes.append)
+        await apply_fixes(link, findings, ask, undo, outcomes.append)
         return undo.path
 
     return asyncio.run(scene()), [(o.change.parameter, o.refusal) for o in outcomes], proposed
@@ -127,7 +133,7 @@ def test_a_refused_write_and_one_that_does_not_hold_are_told_and_the_rest_goes_o
 def test_nothing_is_set_while_armed_or_while_nobody_knows(tmp_path):
     link = FakeLink(tmp_path, A=5.0, B=2.0, C=7.0)
     link.state.heartbeat.armed = True
-    with pytest.raises(NotWhileArmedError, match="is armed"):
+    with pytest.raises(VehicleArmedError, match="is armed"):
         treat(link, tmp_path, [ALL])
     link.state.heartbeat.armed = False
 
@@ -137,9 +143,9 @@ def test_nothing_is_set_while_armed_or_while_nobody_knows(tmp_path):
 
     async def scene():
         undo = UndoFile(tmp_path, link, Identity())
-        await mend(link, WRONG, long_thought, undo, lambda _: None)
+        await apply_fixes(link, WRONG, long_thought, undo, lambda _: None)
 
-    with pytest.raises(NotWhileArmedError, match="no heartbeat"):
+    with pytest.raises(VehicleArmedError, match="no heartbeat"):
         asyncio.run(scene())
     assert link.values == {"A": 5.0, "B": 2.0, "C": 7.0}
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""What the ear hears of others, of clocks and of jumps, over a real socket."""
+"""What the listener hears of others, of clocks and of jumps, over a real socket."""
 
 import asyncio
 from math import inf, nan
@@ -40,7 +40,7 @@ def odometry(resets):
 def test_who_else_is_there_and_who_steers():
     async def scene():
         async with linked() as (link, vehicle):
-            with LinkListener(link, asyncio.get_running_loop().time) as ear:
+            with LinkListener(link, asyncio.get_running_loop().time) as listener:
                 for source, message in (
                     ((255, 190), of_type(GROUND_STATION)),
                     ((1, 192), of_type(COMPANION)),
@@ -48,12 +48,12 @@ def test_who_else_is_there_and_who_steers():
                 ):
                     system, component = source
                     vehicle.send_raw(frames_of(message, system=system, component=component)[0])
-                await until(lambda: len(ear.company.sources) == 3)
-            assert ear.company.companions == {(1, 192)}
-            assert ear.company.steering == {(1, 193)}
+                await until(lambda: len(listener.other_nodes.sources) == 3)
+            assert listener.other_nodes.companions == {(1, 192)}
+            assert listener.other_nodes.steering == {(1, 193)}
             vehicle.send_raw(frames_of(setpoint(), system=9)[0])
             await until(lambda: link.stats.ignored_foreign == 4)
-            assert len(ear.company.sources) == 3  # the ear is off
+            assert len(listener.other_nodes.sources) == 3  # the listener is off
 
     asyncio.run(scene())
 
@@ -61,16 +61,16 @@ def test_who_else_is_there_and_who_steers():
 def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
     async def scene():
         async with linked() as (link, vehicle):
-            with LinkListener(link, asyncio.get_running_loop().time) as ear:
+            with LinkListener(link, asyncio.get_running_loop().time) as listener:
                 vehicle.send(target(0.0), odometry(7))
                 await until(lambda: link.state.reset_counter == 7)
-                assert not ear.company.echo
+                assert not listener.other_nodes.echo
                 vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
                 await until(lambda: link.state.reset_counter == 9)
-                assert not ear.company.echo
-                assert ear.resets == 2
+                assert not listener.other_nodes.echo
+                assert listener.resets == 2
                 vehicle.send(heartbeat(), target(0.4), odometry(9))
-                await until(lambda: ear.company.echo)
+                await until(lambda: listener.other_nodes.echo)
 
     asyncio.run(scene())
 
@@ -92,10 +92,10 @@ def test_samples_that_cannot_be_answered(values):
         return lambda: None
 
     link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
-    with LinkListener(link, lambda: 0.0) as ear:
+    with LinkListener(link, lambda: 0.0) as listener:
         callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
         callbacks["ATTITUDE_QUATERNION"](attitude(4))
-    assert (ear.samples.heard, ear.samples.unusable) == (2, 1)
+    assert (listener.samples.heard, listener.samples.unusable) == (2, 1)
 
 
 def test_pauses_and_stamps_of_the_samples():
@@ -107,11 +107,11 @@ def test_pauses_and_stamps_of_the_samples():
         return lambda: None
 
     link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
-    with LinkListener(link, lambda: next(times)) as ear:
-        assert ear.samples.clock_rate is None
+    with LinkListener(link, lambda: next(times)) as listener:
+        assert listener.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
             callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
-    heard, pause, not_newer, rate, age, change, unusable, even = ear.samples
+    heard, pause, not_newer, rate, age, change, unusable, even = listener.samples
     assert abs(even - 10 / 1.2) < 1e-9
     assert (age, change) == (None, "")
     assert (heard, not_newer, unusable) == (11, 2, 0)

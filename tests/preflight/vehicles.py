@@ -7,8 +7,8 @@ import yaml
 from companion.config.files import load
 from companion.files import bounded_yaml
 from companion.flight.assembly import open_link
-from companion.preflight.session import patient
-from companion.vehicle.parameter_rules import Verdict
+from companion.preflight.session import open_session
+from companion.vehicle.parameter_rules import CheckResult
 from tests.flight.fly import CONFIGS, merged, mock_vehicle
 
 FAMILIES = ("px4", "ardupilot")
@@ -40,8 +40,8 @@ def config_file(folder, mock, **changes):
 @asynccontextmanager
 async def met(config):
     """A vehicle that was heard."""
-    async with patient(config, lambda notice: open_link(config, None, notice)) as vehicle:
-        assert await vehicle.met() == []
+    async with open_session(config, lambda notice: open_link(config, None, notice)) as vehicle:
+        assert await vehicle.wait_for_vehicle() == []
         yield vehicle
 
 
@@ -50,9 +50,9 @@ def configured(folder, mock, **changes):
 
 
 def amiss(findings):
-    """Verdict by key of all that is not safe."""
+    """CheckResult by key of all that is not safe."""
     return {
-        str(finding.key): finding.verdict
+        str(finding.key): finding.result
         for finding in findings
-        if finding.verdict is not Verdict.SAFE
+        if finding.result is not CheckResult.SAFE
     }
