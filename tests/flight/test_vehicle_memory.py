@@ -7,7 +7,7 @@ from companion.drag import Drag
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.vehicle_memory import VehicleMemory
+from companion.flight.vehicle_identity import VehicleMemory
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
