@@ -215,7 +215,7 @@ def test_the_battery_is_made_up_for_at_once():
     assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
     assert thrust.learned == 0.5
     assert thrust.largest == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
-    thrust.stand()
+    thrust.on_ground()
     assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
 
 

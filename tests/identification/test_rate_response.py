@@ -161,7 +161,7 @@ def test_too_few_samples_and_too_much_doubt_are_refused():
     found = fit_rate_response(*fly(QUICK, 0.03, 0.04))
     few = replace(found, fit=replace(found.fit, excited=19))
     doubtful = replace(found, fit=replace(found.fit, lag_error=0.0081))
-    assert few.reason() == "too little excitation: 19 samples tell of the response, 20 are needed"
+    assert few.reason() == "too little excitation: 19 samples show the response, 20 are needed"
     assert doubtful.reason() == "lag and dead time are uncertain by 8.1 ms"
 
 
