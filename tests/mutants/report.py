@@ -25,9 +25,7 @@ class Mutant:
         """Dotted name of the function or method: `companion.attitude.rotation.multiply`."""
         module, _, mangled = self.name.partition("__mutmut_")[0].rpartition(".")
         # mutmut writes x_function or xǁClassǁmethod.
-        return f"{module}.{mangled[1:].lstrip('_') if 'ǁ' not in mangled else mangled[2:]}".replace(
-            "ǁ", "."
-        )
+        return f"{module}.{mangled[2:]}".replace("ǁ", ".")
 
     @property
     def change(self) -> str:
