@@ -14,10 +14,8 @@ from pathlib import Path
 
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
-from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamp_judge import SignatureResult, StampJudge, Stamps
-
-__all__ = ["SignatureResult", "Signing", "key_from_hex", "key_from_passphrase_file"]
+from companion.mavlink.stamp_store import StampFile
+from companion.mavlink.stamps import SignatureResult, StampJudge, Stamps
 
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
