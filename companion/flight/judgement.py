@@ -8,8 +8,8 @@ from math import inf
 from companion.config import Config
 from companion.flight.same_vehicle import SameVehicle
 from companion.guidance import ManeuverSequence
+from companion.preflight.all_checks import blocking, run_checks, unsafe
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.examination import blocking, examine, unsafe
 from companion.preflight.finding import Finding
 from companion.preflight.session import gather, wanted_rates
 from companion.safety.ending import FlightEnded
@@ -91,7 +91,7 @@ class Preflight:
         self._same_vehicle.require()
         self.meet(evidence.identity)
         evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
-        self._heed(examine(self._config, evidence, again=before is not None))
+        self._heed(run_checks(self._config, evidence, again=before is not None))
         return evidence
 
     def _heed(self, findings: list[Finding]) -> None:

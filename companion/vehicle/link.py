@@ -14,7 +14,7 @@ from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.stamp_store import StampKeeper
+from companion.mavlink.signing import StampKeeper
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.endpoint import parse_endpoint
