@@ -12,8 +12,8 @@ from companion.mavlink.errors import EndpointError, LinkTimeout
 from companion.mavlink.peer import PeerRule, resolve
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.transport.base import tcp as tcp_module
-from companion.mavlink.transport.base import udp as udp_module
+from companion.mavlink.transport import tcp as tcp_module
+from companion.mavlink.transport import udp as udp_module
 from companion.mavlink.transport.endpoint import PeerAddress
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
