@@ -7,11 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.mode_roles import in_roles
-from companion.flight.orders import change_mode, command_if_ours
+from companion.flight.commands import change_mode, command_if_ours, in_roles
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
 LAND = Command(21)
@@ -21,7 +20,7 @@ LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
 COMPANION = Path(__file__).parents[2] / "companion"
 
 
-def test_every_command_of_a_flight_goes_by_orders():
+def test_every_command_of_a_flight_goes_through_one_function():
     """`context.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
     senders = {
         path.name
@@ -32,7 +31,7 @@ def test_every_command_of_a_flight_goes_by_orders():
         and isinstance(node.func, ast.Attribute)
         and ast.unparse(node.func).endswith("link.command")
     }
-    assert senders == {"orders.py", "context.py"}
+    assert senders == {"commands.py", "context.py"}
 
 
 class Vehicle:
@@ -112,6 +111,6 @@ def test_it_is_given_four_times_at_most():
 
 
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
-    monkeypatch.setattr("companion.flight.orders._ENTERED", 0.01)
+    monkeypatch.setattr("companion.flight.commands._ENTERED", 0.01)
     with pytest.raises(FlightEnded, match=r"left again, not by us: Role\.HOLD"):
         run(Vehicle((None, Role.HOLD)), change_mode)

@@ -1,4 +1,4 @@
-"""Makes the snapshots: newest telemetry, our own counters, and shares over the last second."""
+"""Builds the snapshots from the newest telemetry, our counters, and shares over one second."""
 
 from collections import deque
 from math import dist, inf
@@ -15,21 +15,21 @@ from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.link import Link
 
 _WINDOW = 1.0
-"""Shares are over the last of this, s."""
+"""Averaging time of shares and rates, s."""
 _EARLY = 0.9
-"""Of the window; before so much of it is known there are no shares."""
+"""Shares are known once this part of the window is filled."""
 _LATE = 0.03
-"""Between two looks, s; the timer's period is 0.02 s."""
+"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
 _PLACE_LASTS = 1.0
-"""The vehicle hovers where control begins: where it was so long ago, s, is the same place."""
+"""An older GLOBAL_POSITION_INT does not tell where control begins, s."""
 _GAPS_WITHIN = 5.0
-"""Within this time, s, gaps in the answers are counted together."""
-_WHILE = 30.0
-"""Within so long, s, resets of the estimator are counted together."""
+"""Gaps in the answers are counted over this time, s."""
+_RESETS_WITHIN = 30.0
+"""Estimator resets are counted over this time, s."""
 
 
-class _Counted(NamedTuple):
-    """Counters at one look; `late` is by how long that look came late, s."""
+class _Counters(NamedTuple):
+    """Counters at one call of `listen`; `late` is how late that call came, s."""
 
     now: float
     frames: int
@@ -42,13 +42,13 @@ class _Counted(NamedTuple):
 
 
 class SnapshotBuilder:
-    """Looks at everything that the monitors judge.
+    """Collects the data that the monitors judge.
 
     Args:
         link: to the vehicle.
         loop: answers the samples.
         guidance_loop: makes the commands.
-        real_time: whether deadlines mean anything: in lockstep the vehicle waits for us.
+        real_time: whether deadlines count; in lockstep the vehicle waits for us.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class SnapshotBuilder:
     ) -> None:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self._real_time = real_time
-        self._counted: deque[_Counted] = deque()
+        self._counted: deque[_Counters] = deque()
         self._frames = 0
         self._heard_at = 0.0
         self._start: Vector | None = None
@@ -68,7 +68,7 @@ class SnapshotBuilder:
         self._timeline = 0
 
     def begin(self, now: float) -> None:
-        """Control begins: fences are about this place, and resets before this do not count."""
+        """Note that control begins: the fence is centred here, and earlier resets do not count."""
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
         self._start = None if motion is None else motion.position_ned
@@ -80,22 +80,22 @@ class SnapshotBuilder:
         self._counted.clear()
 
     def listen(self, now: float) -> None:
-        """Note what is heard, and count; at every look, whatever the phase."""
-        stats, loop = self._link.stats, self._loop
+        """Take the counters at `now`; the watch calls this 50 times a second in every phase."""
+        stats, loop, record = self._link.stats, self._loop, self._loop.record
         if stats.frames != self._frames:
             self._frames, self._heard_at = stats.frames, now
         loop.resets.on_counter(self._link.state.reset_counter, now)
         counted = self._counted
         late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0
         counted.append(
-            _Counted(
+            _Counters(
                 now,
                 stats.frames,
                 stats.lost,
-                loop.record.setpoints,
-                loop.record.missed_deadlines,
+                record.setpoints,
+                record.missed_deadlines,
                 late,
-                loop.record.held.copy(),
+                record.held.copy(),
                 self._link.state.positions,
             )
         )
@@ -103,8 +103,9 @@ class SnapshotBuilder:
             counted.popleft()
 
     def snapshot(self, now: float) -> Snapshot:
-        """What is known at `now`, s on our clock; after `listen`."""
+        """The snapshot at `now`, s on our clock; call `listen` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
+        record = loop.record
         command = loop.command
         return Snapshot(
             now,
@@ -118,15 +119,15 @@ class SnapshotBuilder:
             ),
             self._motion(),
             Control(
-                loop.record.last_answer,
-                loop.record.last_sample,
-                loop.record.reason,
+                record.last_answer,
+                record.last_sample,
+                record.reason,
                 -inf if command is None else command.made_at,
                 -inf if state.position is None else state.position.received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.timeline == self._timeline else clock.last_change,
-                self.stood_still(since=loop.record.last_answer),
+                self.stood_still(since=record.last_answer),
             ),
             self._health(now),
             self._resets(now),
@@ -135,8 +136,8 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """For how long our own timer did not run since then, s."""
-        return sum(look.late for look in self._counted if look.now > since)
+        """How long our timer did not run since `since` (s on our clock), s."""
+        return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:
         guidance_loop, loop, start = self._guidance_loop, self._loop, self._start
@@ -180,7 +181,7 @@ class SnapshotBuilder:
 
     def _resets(self, now: float) -> Resets:
         resets = self._loop.resets
-        since = max(self._began_at, now - _WHILE)
+        since = max(self._began_at, now - _RESETS_WITHIN)
         return Resets(
             sum(at > since for at in resets.times),
             dist(resets.shift, self._shift),
@@ -189,7 +190,7 @@ class SnapshotBuilder:
         )
 
     def _place(self, now: float) -> Place | None:
-        """Latitude and longitude of where the vehicle is, if they were told lately."""
+        """Latitude and longitude of the vehicle, or None if they are old."""
         told = self._link.state.global_position
         if told is None or now - told.received > _PLACE_LASTS:
             return None

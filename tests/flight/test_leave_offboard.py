@@ -6,10 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from companion.flight.commands import leave_offboard
 from companion.flight.control_phases import _require_landing
-from companion.flight.left_in_offboard import leave_offboard
 from companion.mavlink.errors import CommandRefused
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.autopilot import Role
 from companion.vehicle.px4.autopilot import Px4
@@ -24,7 +24,7 @@ def test_after_a_failsafe_landing_the_next_flight_begins(tmp_path):
         cut = {"fault": {"kind": "drop", "duration_s": 3.0}}
         observer = When("maneuvers", lambda: mock.ask(cut), after=1.0)
         first = fly(mock, tmp_path / "first", observer)
-        assert "letting go" in first.events[-1][1]
+        assert "releasing control" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])
         assert (left["mode"], left["crashed"]) == ("OFFBOARD", False)
         second = fly(mock, tmp_path / "second")
