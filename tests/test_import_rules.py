@@ -38,7 +38,7 @@ def test_imports_point_one_way():
         ("sitl_mock/autopilot/events.py", "import sitl_mock.autopilot.personality"),
         ("companion/flight/watch.py", "import sitl_mock.physics.rigid_body"),
         ("companion/attitude/limits.py", "import companion.guidance"),
-        ("companion/guidance/height.py", "import asyncio"),
+        ("companion/guidance/feedback.py", "import asyncio"),
         ("companion/attitude/history.py", "import numpy"),
         ("companion/mavlink/codec.py", "import companion.vehicle.link"),
         ("companion/vehicle/link.py", "import companion.config"),

@@ -2,10 +2,16 @@
 
 from math import sqrt
 
-from companion.attitude.constants import Constants
-from companion.attitude.kinematics import heading_of, speed_to_rates, tilt_products
-from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
-from companion.attitude.rotation import short_way, within
+from companion.attitude.kinematics import (
+    SMALLEST_A,
+    heading_of,
+    levelling_rates,
+    share_of_law,
+    speed_to_rates,
+    tilt_products,
+)
+from companion.attitude.limits import Constants
+from companion.attitude.rotation import clamp, short_way
 from companion.attitude.types import Quaternion, Target
 
 
@@ -51,4 +57,4 @@ def first_order(
         still *= scale
     error = short_way(heading - heading_of(a, w, z))
     yaw = share * (yaw_gain * error + heading_rate) + still
-    return roll, pitch, within(yaw, max_yaw_rate)
+    return roll, pitch, clamp(yaw, max_yaw_rate)

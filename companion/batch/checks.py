@@ -7,10 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from companion.attitude.errors import InvalidQuaternionError, InvalidTargetError
-from companion.attitude.representation import NORM_TOLERANCE, normalised
-from companion.attitude.target import LARGEST_HEADING_RATE, admissible
-from companion.attitude.types import Target
+from companion.attitude.representation import (
+    LARGEST_HEADING_RATE,
+    NORM_TOLERANCE,
+    admissible,
+    normalised,
+)
+from companion.attitude.types import InvalidQuaternionError, InvalidTargetError, Target
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import rotation
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.planner import Law
 from companion.batch import series
 from companion.batch.compiler import Compiler, Substitutes

@@ -17,10 +17,8 @@ from math import asin, atan2, cos, hypot, radians, sin, sqrt
 
 from companion.attitude import BodyRates, Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned
-from companion.guidance.horizontal import rotated
-from companion.guidance.reference import Vector
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.guidance.reference import Vector, rotated
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
 """Attitudes further apart than this are not compared, s: the rates between them are unknown."""

@@ -4,7 +4,7 @@ from math import sin
 
 from companion.attitude import Quaternion, Target
 from companion.guidance import GRAVITY, HoverThrust
-from companion.guidance.horizontal import limited
+from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt
 from companion.vehicle.state import VehicleState
 
@@ -50,7 +50,7 @@ class HoverLearning:
         north, east = limited(target.north, target.east, most)
         return target._replace(north=north, east=east)
 
-    def stand(self) -> None:
+    def on_ground(self) -> None:
         """Note that the vehicle stands on the ground."""
         self._hover_thrust.stand()
 

@@ -6,7 +6,7 @@ from enum import Enum
 from math import inf
 
 from companion.vehicle.held_rates import HeldRates
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample
 
 _KEPT_GAPS = 32
 """Number of latest gaps that are kept; far fewer end a flight."""

@@ -5,12 +5,11 @@ from collections.abc import Callable
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, GuidanceInput, MotionObserver, VehicleMotion
-from companion.guidance.horizontal import Horizontal
+from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
-from companion.guidance.slope_history import SlopeHistory
+from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COSINE = 0.2
 """Lower limit for the cosine of the tilt: beyond 78° the thrust does not hold the height."""

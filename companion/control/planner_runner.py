@@ -5,8 +5,7 @@ from math import inf
 
 from companion.attitude import BodyRates, Planner, Target
 from companion.control.estimator_resets import EstimatorResets
-from companion.vehicle.records import AttitudeTarget
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_STEP = 0.1
 """A planner never integrates over a longer time, s."""

@@ -55,7 +55,7 @@ def config(tmp_path, text):
         ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
-        ("circle: {radius_m: 26}", "circle: from 33.75 s on it leaves the fence, by up to 2.0 m"),
+        ("circle: {radius_m: 26}", "circle: from 33.85 s on it leaves the fence, by up to 2.0 m"),
         (
             "flight: {maneuvers: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",

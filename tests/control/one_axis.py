@@ -13,11 +13,10 @@ import numpy as np
 from companion.attitude import BodyRates
 from companion.config import Config
 from companion.control.guidance_command import GuidanceCommand
+from companion.control.inner_loop import planner
 from companion.control.outer_loop import linear_guidance, motion_estimate
-from companion.flight.assembly import planner
 from companion.guidance import GRAVITY, Reference
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 DT = 0.004
 _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3

@@ -15,8 +15,7 @@ from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import AttitudeTarget
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 TARGET = Target(0.1, 0.0, 0.0)

@@ -13,8 +13,7 @@ from companion.control.outer_loop import linear_guidance, motion_estimate
 from companion.guidance import Doublets
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb=2.0, climb_step=0.25, settle=1.0)
 IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5

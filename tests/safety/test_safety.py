@@ -7,11 +7,11 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import LoopRecord, Unanswered
-from companion.flight.snapshot_builder import SnapshotBuilder
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import Battery, Estimator, Gps
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})

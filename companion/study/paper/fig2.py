@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Quaternion, Target, body_error
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.planner import LawPlanner
 from companion.study.drawing import (
     draw,
