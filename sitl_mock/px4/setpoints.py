@@ -1,4 +1,4 @@
-"""What an offboard setpoint message asks, by PX4's type-mask rules (measured, see README)."""
+"""What an offboard setpoint message asks, by PX4's type-mask rules (docs/mock-vehicle.md)."""
 
 import math
 import struct
