@@ -1,4 +1,4 @@
-"""The bundled vehicle as a process of its own, for `companion demo`."""
+"""The mock vehicle as a process of its own, for `companion demo`."""
 
 import socket
 import subprocess
@@ -15,21 +15,21 @@ from companion.files.yaml_file import ConfigError
 from companion.mavlink.endpoint import SerialPort, TcpClient, TcpServer, parse_endpoint
 
 _LOCAL_PORT_OFFSET = 40
-"""The vehicle sends from this many ports above the one it sends to."""
+"""The vehicle's own UDP port is this far above the one it sends to."""
 
 _READY = "ready on "
-"""The vehicle says this on its first line, once its ports are open."""
+"""First words of the vehicle once its ports are open."""
 
 _START = 20.0
-"""A vehicle that says neither that nor why it cannot start by then never will, s."""
+"""Time allowed for the vehicle to start, s."""
 
 
 class Wire(NamedTuple):
-    """What joins us and the bundled vehicle.
+    """The connection between the program and the mock vehicle.
 
     Attributes:
-        endpoint: Our end, in our notation.
-        vehicle: Its end, as arguments of its command line.
+        endpoint: our end, as in `link.endpoint`.
+        vehicle: the vehicle's end, as arguments of its command line.
     """
 
     endpoint: str
@@ -37,7 +37,7 @@ class Wire(NamedTuple):
 
 
 class VehicleStoppedError(Exception):
-    """The bundled vehicle ended before the flight did."""
+    """The mock vehicle ended before the flight did."""
 
 
 def default_config() -> Path:
@@ -50,7 +50,7 @@ def default_config() -> Path:
 
 
 def free_port() -> int:
-    """A UDP port on which a companion can listen and a mock vehicle can have its own beside it."""
+    """A free UDP port for the companion, with a free one for the mock vehicle beside it."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))
@@ -65,7 +65,7 @@ def free_port() -> int:
 
 
 def udp_wire() -> Wire:
-    """Free UDP ports.
+    """A connection by free UDP ports.
 
     Raises:
         ConfigError: there are none.
@@ -76,9 +76,9 @@ def udp_wire() -> Wire:
 
 @contextmanager
 def wire_like(endpoint: str) -> Iterator[Wire]:
-    """A wire of the kind that an endpoint is, while the block runs: UDP, TCP or serial.
+    """A connection of the endpoint's kind while the block runs: UDP, TCP or serial.
 
-    Over TCP the vehicle listens and we call, whichever way the endpoint says.
+    Over TCP the vehicle always listens and the program connects.
 
     Raises:
         EndpointError: the endpoint's notation is wrong.
@@ -98,10 +98,10 @@ def wire_like(endpoint: str) -> Iterator[Wire]:
 
 
 def check_mock(config: Path) -> None:
-    """Let the vehicle itself check its section of a configuration.
+    """Let the mock vehicle check its section of a configuration.
 
     Raises:
-        ConfigError: with the vehicle's own words.
+        ConfigError: the section is wrong; the message is the vehicle's.
     """
     _run_check([sys.executable, "-m", "sitl_mock", "--check", "--config", str(config)])
 
@@ -114,18 +114,18 @@ def _run_check(command: list[str]) -> None:
 
 @contextmanager
 def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> Iterator[None]:
-    """Run the mock vehicle on a wire while the block runs; its own words go to `log`.
+    """Run the mock vehicle while the block runs; its output goes to `log`.
 
-    It has a session of its own, so that Ctrl-C reaches us alone and the vehicle can still be
-    handed back to its autopilot. Its standard input is a pipe that ends with us, however we end
-    (kill -9 too), and it ends with that.
+    It has its own session, so Ctrl-C reaches only this program, which can then hand the vehicle
+    back. Its standard input is a pipe. The pipe closes when this program ends, even by kill -9,
+    and then the vehicle ends too.
 
     Raises:
-        VehicleStoppedError: it stopped by itself, at once or meanwhile; with its last words.
+        VehicleStoppedError: it stopped by itself; the message has its last line of output.
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     command += ["--end-with-stdin"]
-    # No ground station's link: its port is a fixed one, and may be somebody else's.
+    # No link for a ground station: its fixed port may be in use.
     command += [*wire.vehicle, "--gcs-port", "0", *(["--lockstep"] if lockstep else [])]
     with log.open("wb") as words:
         process = subprocess.Popen(
@@ -162,11 +162,11 @@ def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
     while not log.read_text(errors="replace").startswith(_READY):
         _check_running(process, log)
         if time.monotonic() > deadline:
-            raise VehicleStoppedError(f"the bundled vehicle does not start, see {log}")
+            raise VehicleStoppedError(f"the mock vehicle does not start, see {log}")
         time.sleep(0.02)
 
 
 def _check_running(process: "subprocess.Popen[bytes]", log: Path) -> None:
     if process.poll() is not None:
         last = log.read_text(errors="replace").strip().rpartition("\n")[2]
-        raise VehicleStoppedError(f"the bundled vehicle stopped, see {log}: {last}")
+        raise VehicleStoppedError(f"the mock vehicle stopped, see {log}: {last}")

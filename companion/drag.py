@@ -1,4 +1,4 @@
-"""How the air slows a vehicle down: linear and quadratic drag per mass, the same along all axes."""
+"""Linear and quadratic drag per mass, the same along all axes."""
 
 from typing import NamedTuple, TypeVar
 
@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = TypeVar("Number", float, NDArray[np.float64])
-"""Of a vector's component: a number, an array of them, or a symbol of CasADi."""
+"""Type of a vector component: a number, an array, or a CasADi symbol."""
 
 _TINY = 1e-12
 """(m/s)²: keeps the speed differentiable at rest."""
 
 
 class Drag(NamedTuple):
-    """Deceleration = (linear + quadratic·|v|)·v, v the velocity against the air.
+    """Deceleration = (linear + quadratic·|v|)·v, where v is the airspeed vector.
 
     Attributes:
         linear: 1/s.

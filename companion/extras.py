@@ -1,19 +1,19 @@
-"""Packages that only some commands need, and the one sentence for when they are missing."""
+"""Optional packages, and the one message for a missing one."""
 
 import importlib.util
 
 
 class MissingExtraError(Exception):
-    """A command needs a package that is not installed; the message says how to get it."""
+    """A command needs a package that is not installed; the message says how to install it."""
 
 
 def require(module: str, extra: str, purpose: str) -> None:
-    """Make sure that an optional package is there, before anything is begun.
+    """Check that an optional package is installed.
 
     Args:
-        module: what would be imported.
+        module: the module to import.
         extra: the extra of this project that installs it.
-        purpose: what needs it, as the beginning of a sentence.
+        purpose: what needs it; the message begins with it.
 
     Raises:
         MissingExtraError: it is not installed.

@@ -1,7 +1,7 @@
-"""What is asked of the operating system so that the control loop is not kept waiting.
+"""Real-time settings requested from Linux, so that the control loop is not kept waiting.
 
-Everything is asked for the calling thread, which runs the event loop, or for the whole process;
-nothing that is refused stops a flight, unless the user said so. Linux only, as the program is.
+A setting applies to the calling thread, which runs the event loop, or to the process. A refusal
+stops no flight unless `realtime.required` is true.
 """
 
 import ctypes
@@ -25,26 +25,26 @@ _HOW_MEMORY = (
 
 
 def schedule_as_usual(pid: int) -> None:
-    """Take from a process that we have begun the priority that it has from us."""
+    """Give a child process the normal scheduler: it inherited ours."""
     with suppress(ProcessLookupError):  # it has ended already
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
 class RealtimeError(Exception):
-    """Something that was required is refused; the message says what, why, and how to get it."""
+    """A required setting was refused; the message says which, why, and how to get it."""
 
 
 class Refused(Exception):  # noqa: N818 - it is no error of ours
-    """The system does not grant it, with why and what to do."""
+    """The system refuses a setting; the message says why and what to do."""
 
 
 class Grant(NamedTuple):
-    """One thing that was asked for.
+    """One setting that was requested.
 
     Attributes:
         name: its key in the section `realtime`.
-        asked: what, for people.
-        refusal: why it was not granted and how to get it; None if it was granted.
+        asked: the setting, in words.
+        refusal: why it was refused and how to get it; None: granted.
     """
 
     name: str
@@ -59,14 +59,14 @@ class Grant(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
-    """What to ask for.
+    """The settings to request.
 
     Attributes:
-        fifo_priority: of SCHED_FIFO, 1..99; None: leave the scheduler as it is.
-        processors: numbers of those to run on; empty: any.
+        fifo_priority: priority of SCHED_FIFO, 1..99; None: keep the scheduler.
+        processors: numbers of the processors to run on; empty: any.
         lock_memory: keep all memory in RAM.
-        freeze_gc: no garbage collection meanwhile.
-        required: raise rather than go on without.
+        freeze_gc: switch the garbage collector off.
+        required: raise if one is refused.
     """
 
     fifo_priority: int | None = None
@@ -78,10 +78,10 @@ class Wishes:
 
 @contextmanager
 def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
-    """Ask for all wishes, and give back what was granted when the block ends.
+    """Request all settings, and undo the granted ones when the block ends.
 
     Raises:
-        RealtimeError: something is refused, and all is required.
+        RealtimeError: a setting is refused although `required`.
     """
     grants: list[Grant] = []
     with ExitStack() as undo:
@@ -102,7 +102,7 @@ _Take = Callable[[], _Undo]
 
 
 def _steps(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
-    """What was wished for: its key, what to call it, and what takes it and tells how to undo it."""
+    """Each requested setting: its key, its name in words, and the function that applies it."""
     priority, processors = wishes.fifo_priority, wishes.processors
     if processors:
         numbers = ", ".join(map(str, processors))
@@ -111,14 +111,14 @@ def _steps(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
         yield "freeze_gc", "no garbage collection in flight", _stop_collecting
     if wishes.lock_memory:
         yield "lock_memory", "memory locked in RAM", _lock_memory
-    if priority is not None:  # last: what the others take time for is not done at this priority
+    if priority is not None:  # last: the others take time, at normal priority
         yield "scheduler", f"SCHED_FIFO at priority {priority}", lambda: _take_fifo(priority)
 
 
 def _take_fifo(priority: int) -> _Undo:
     before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    # Threads that begin from here on (recording, MAVSDK) inherit it, and must: one that is kept
-    # from the processor while it holds the interpreter would keep the loop waiting with it.
+    # Threads that start later (recording, MAVSDK) must inherit the priority: a preempted thread
+    # that holds the interpreter lock would block the control loop.
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
@@ -147,7 +147,7 @@ def _lock_memory() -> _Undo:
     libc = ctypes.CDLL(None, use_errno=True)
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
-        # It may be enough for now; but then an allocation in flight would fail.
+        # Even if it suffices now, an allocation in flight could fail.
         raise Refused(f"this user may lock {limit // 1024} KiB only; {_HOW_MEMORY}")
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         number = ctypes.get_errno()

@@ -28,16 +28,16 @@ def reply(simulation: Simulation, request: bytes) -> bytes:
 
 def _answer(simulation: Simulation, request: bytes) -> dict[str, Any]:
     try:
-        asked = json.loads(request)
+        requested = json.loads(request)
     except (ValueError, RecursionError):
         return {"error": f"not JSON; {_USAGE}"}
-    match asked:
-        case {"fault": dict(fault)} if len(asked) == 1:
+    match requested:
+        case {"fault": dict(fault)} if len(requested) == 1:
             return _add_fault(simulation, fault)
-        case {"clear": True} if len(asked) == 1:
+        case {"clear": True} if len(requested) == 1:
             simulation.clear_faults()
             return {"ok": True}
-        case {"state": True} if len(asked) == 1:
+        case {"state": True} if len(requested) == 1:
             return truth(simulation)
     return {"error": _USAGE}
 

@@ -35,13 +35,13 @@ MOST_GROWTH = 2 * 1024 * 1024
 AFTERMATH_S = 12.0
 """So long after a fault it may still show: the dead time is judged over 8 s, and twice."""
 EXPECTED = (
-    "not as it should be: ",  # on the ground, by a vehicle as PX4 sets it up
+    "preflight warnings: ",  # on the ground, by a vehicle as PX4 sets it up
     "mode ",
     "armed",
     "disarmed",
     "autopilot: ",
     "realtime: ",
-    "should our setpoints stop",
+    "offboard loss: if our setpoints stop",
     "the vehicle's drag is",
 )
 """How the events of an undisturbed flight begin."""

@@ -4,6 +4,7 @@ import ast
 import re
 import shlex
 from collections.abc import Iterator
+from dataclasses import fields
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from companion.cli import command_line
 from companion.config import Config
+from companion.mavlink.stats import LinkStats
 from companion.preflight.finding import Key
 
 ROOT = Path(__file__).parents[1]
@@ -97,7 +99,8 @@ def test_configurations_of_the_command_lines_exist(page: Path) -> None:
 
 @each_page
 def test_keys_of_the_configuration_exist(page: Path) -> None:
-    """Each `section.key` in the text or behind `--set` is a key, a file or a doctor's finding."""
+    """`section.key` in the text or behind `--set` is a key, a file, a finding or a counter."""
+    others = {*Key, *(f"link.{counter.name}" for counter in fields(LinkStats))}
     quoted = [re.split("[=:]", code)[0] for code in INLINE.findall(prose(page))]
     for arguments in command_lines(page.read_text("utf-8")):
         quoted += [b.split("=")[0] for a, b in pairwise(arguments) if a == "--set"]
@@ -106,7 +109,7 @@ def test_keys_of_the_configuration_exist(page: Path) -> None:
         field = Config.model_fields.get(section)
         known = getattr(field and field.annotation, "model_fields", None)
         if known and re.fullmatch(r"[a-z0-9_]+", key) and key not in ("tlog", "yaml"):
-            assert key in known or name in set(Key), f"{named(page)}: there is no key `{name}`"
+            assert key in known or name in others, f"{named(page)}: there is no key `{name}`"
 
 
 def test_readme_is_short() -> None:

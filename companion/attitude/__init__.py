@@ -5,12 +5,6 @@ UAV First-Order Acceleration Coefficients Tracking*, Sensors 2026, 26(9), 2727; 
 this package are that paper's.
 """
 
-from companion.attitude.errors import (
-    AttitudeError,
-    InvalidBodyRatesError,
-    InvalidQuaternionError,
-    InvalidTargetError,
-)
 from companion.attitude.limits import Limits
 from companion.attitude.planner import LAW_NAMES, PLANNER_NAMES, Planner, make_planner
 from companion.attitude.representation import (
@@ -21,7 +15,17 @@ from companion.attitude.representation import (
     is_unit,
     wrap_angle,
 )
-from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target, TiltYaw
+from companion.attitude.types import (
+    AttitudeError,
+    BodyRates,
+    Coefficients,
+    InvalidBodyRatesError,
+    InvalidQuaternionError,
+    InvalidTargetError,
+    Quaternion,
+    Target,
+    TiltYaw,
+)
 
 __all__ = [
     "LAW_NAMES",

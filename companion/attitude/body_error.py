@@ -6,7 +6,7 @@ the response is the same at every heading. One gain serves all three axes, as th
 
 from math import sqrt
 
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.rotation import angle_per_sine, attitude_of, body_error, within_limits
 from companion.attitude.types import Quaternion, Target
 

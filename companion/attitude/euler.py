@@ -2,7 +2,7 @@
 
 from math import cos, sin
 
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.rotation import attitude_of, euler_angles, short_way, within_limits
 from companion.attitude.types import Quaternion, Target
 

@@ -2,9 +2,15 @@
 
 from math import asin, atan2, cos, exp, inf, sin, sqrt
 
-from companion.attitude.constants import Constants
-from companion.attitude.kinematics import heading_of, into_body, split
-from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
+from companion.attitude.kinematics import (
+    SMALLEST_A,
+    heading_of,
+    into_body,
+    levelling_rates,
+    share_of_law,
+    split,
+)
+from companion.attitude.limits import Constants
 from companion.attitude.reference import distance_left
 from companion.attitude.rotation import angle_per_sine, short_way, within, within_limits
 from companion.attitude.types import Quaternion, Target

@@ -2,9 +2,15 @@
 
 from math import sqrt
 
-from companion.attitude.constants import Constants
-from companion.attitude.kinematics import heading_of, speed_to_rates, tilt_products
-from companion.attitude.recovery import SMALLEST_A, levelling_rates, share_of_law
+from companion.attitude.kinematics import (
+    SMALLEST_A,
+    heading_of,
+    levelling_rates,
+    share_of_law,
+    speed_to_rates,
+    tilt_products,
+)
+from companion.attitude.limits import Constants
 from companion.attitude.rotation import short_way, within
 from companion.attitude.types import Quaternion, Target
 

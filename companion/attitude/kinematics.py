@@ -7,6 +7,8 @@ them need a², a·x and a·y only, and so neither a root nor a division.
 
 from math import acos, atan, sqrt
 
+from companion.attitude.rotation import first_is_negative
+
 
 def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(a², a·x, a·y) of the split; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (10)."""
@@ -85,3 +87,30 @@ def heading_of(a: float, w: float, z: float) -> float:
     By the half angle, so that the arctangent is that of a number between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
+
+
+SMALLEST_A = 1e-12
+"""a = cos(tilt/2) below this counts as this: exactly inverted."""
+
+
+def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
+    """1 at the recovery angle, 0 from 10° beyond it on, smooth between: no jump in rates."""
+    ratio = 1.0 + slope * (cosine - cos_recovery)
+    if ratio <= 0.0:
+        return 0.0
+    return ratio * ratio * (3.0 - 2.0 * ratio)
+
+
+def levelling_rates(
+    gain: float, a: float, inverse: float, w: float, x: float, y: float, z: float
+) -> tuple[float, float]:
+    """Body rates (roll, pitch) of 2·gain·sin(tilt/2), rad/s, about the axis of the tilt itself.
+
+    `inverse` is 1/a². They need no division by cos(tilt), so they hold up to the inverted
+    attitude, where every axis is as short as any other; the same is taken for q and −q.
+    """
+    if a <= SMALLEST_A:
+        scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain
+        return scale * x, scale * y
+    scale = -2.0 * gain * a * inverse
+    return scale * (w * x + z * y), scale * (w * y - z * x)

@@ -4,11 +4,8 @@ from dataclasses import replace
 from math import cos, radians, sin, sqrt
 
 from companion.attitude.axis_lead import PITCH, ROLL, AxisLead, Turn
-from companion.attitude.constants import Constants
-from companion.attitude.errors import InvalidBodyRatesError
 from companion.attitude.first_order import first_order
-from companion.attitude.heading_model import HeadingModel
-from companion.attitude.history import History, PlannedTilt, PlannedYaw
+from companion.attitude.history import History, PlannedTilt, PlannedYaw, SampleHold
 from companion.attitude.kinematics import (
     heading_of,
     into_body,
@@ -16,16 +13,19 @@ from companion.attitude.kinematics import (
     speed_to_rates,
     tilt_products,
 )
-from companion.attitude.margin import largest_gain
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.limits import Constants
+from companion.attitude.rate_response import AxisResponse, RateResponse, largest_gain
 from companion.attitude.reference_model import ReferenceModel, model_lag
-from companion.attitude.representation import is_unit, normalised, wrap_angle
+from companion.attitude.representation import admissible, is_unit, normalised, wrap_angle
 from companion.attitude.rotation import within, within_limits
-from companion.attitude.sample_hold import SampleHold
-from companion.attitude.target import admissible
-from companion.attitude.target_frame import TargetFrame
-from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
-from companion.attitude.yaw_model import YawModel
+from companion.attitude.types import (
+    BodyRates,
+    Coefficients,
+    InvalidBodyRatesError,
+    Quaternion,
+    Target,
+)
+from companion.attitude.yaw import HeadingModel, TargetFrame, YawModel
 
 SHARE_OF_LARGEST_GAIN = 0.25
 """Of the largest stable gain, at most this is fed back: a gain margin of 4, and no overshoot."""

@@ -5,15 +5,13 @@ from math import inf
 from typing import Any, Protocol
 
 from companion.attitude.body_error import quaternion, so3
-from companion.attitude.constants import Constants, make_constants
 from companion.attitude.euler import euler
 from companion.attitude.exact import exact
 from companion.attitude.first_order import first_order
-from companion.attitude.limits import Limits
+from companion.attitude.limits import Constants, Limits, make_constants
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.representation import normalised
-from companion.attitude.target import admissible
+from companion.attitude.representation import admissible, normalised
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]

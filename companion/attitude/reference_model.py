@@ -2,9 +2,9 @@
 
 from math import ceil, hypot, inf, sin, sqrt
 
-from companion.attitude.constants import Constants
 from companion.attitude.kinematics import speed_to_rates
-from companion.attitude.lag import Lag
+from companion.attitude.limits import Constants
+from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _FURTHEST = sin(1.4)

@@ -8,25 +8,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.attitude.planner import LawPlanner
-from companion.batch.checks import admissible_targets, as_rows, compiled_look, unit_quaternions
+from companion.batch.checks import admissible_targets, as_rows, compiled_check, unit_quaternions
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
 from companion.extras import require
 
 COMPILE_FROM = 600_000
-"""Steps, of all vehicles together, from which on compiling pays.
+"""Steps of all vehicles together above which compiling is faster.
 
-A compiled law costs 2 to 3 s once in a process, importing numba included; a step in Python costs
-about 4 µs, so that is what this many of them take.
+Compiling costs 2 to 3 s once in a process, including the import of numba. A step in Python costs
+about 4 µs.
 """
 
 _BLOCK = 336
-"""Vehicles that are advanced together: what a step reads and writes fits the first cache."""
+"""Vehicles advanced together; the data of a step then fits the first-level cache."""
 
 _CACHE_LINE = 8  # numbers
 
 
 class History(NamedTuple):
-    """What `simulate` saw: attitudes q (steps + 1, 4, n), body rates (steps, 3, n) in rad/s.
+    """The result of `simulate`: attitudes q (steps + 1, 4, n), body rates (steps, 3, n) in rad/s.
 
     `rates[k]` is held from `q[k]` to `q[k + 1]`.
     """
@@ -36,7 +36,7 @@ class History(NamedTuple):
 
 
 def can_compile() -> bool:
-    """Whether numba is installed, with the compiler that it stands on."""
+    """Whether numba and its compiler are installed."""
     return all(importlib.util.find_spec(module) for module in ("numba", "llvmlite"))
 
 
@@ -57,8 +57,8 @@ def rates(
         compiled: True for numba, False for Python; None decides by `COMPILE_FROM`.
 
     Returns:
-        (3, n) roll, pitch, yaw in rad/s, body FRD; compiled, within some 1e-15 of what the law
-        gives in Python, or of an angle of 1e-15 rad a sample with `exact`.
+        (3, n) roll, pitch, yaw in rad/s, body FRD. Compiled rates differ from those in Python by
+        about 1e-15, with `exact` by an angle of 1e-15 rad per sample.
 
     Raises:
         InvalidQuaternionError: an attitude is not a unit quaternion.
@@ -100,7 +100,7 @@ def simulate(
     steps: int,
     compiled: bool | None = None,
 ) -> History:
-    """As `advance`, with every attitude and body rate on the way."""
+    """As `advance`, but returns every attitude and body rate on the way."""
     q, targets, loops = _prepared(planner, q, targets, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
@@ -114,7 +114,7 @@ def simulate(
 def _prepared(
     planner: LawPlanner, q: ArrayLike, targets: ArrayLike, steps: int, compiled: bool | None
 ) -> tuple[Array, Array, Loops]:
-    """The arrays fit for the law, and the loops to use."""
+    """The arrays as the law accepts them, and the loops to use."""
     q, targets = as_rows(q, "q"), as_rows(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")
@@ -126,7 +126,7 @@ def _prepared(
     if compiled:
         require("numba", "study", "a compiled batch")
         loops = compiled_loops(planner.law)
-        if compiled_look()(q, targets, longest):
+        if compiled_check()(q, targets, longest):
             return q, targets, loops
     else:
         loops = plain_loops(planner.law)
@@ -134,7 +134,7 @@ def _prepared(
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:
-    """Whether a turn on the way to `q` was more than the series in these loops is good for."""
+    """Whether a sample turned further than the series in these loops is valid for."""
     return not loops.any_angle and not bool(np.isfinite(q).all())
 
 
@@ -155,9 +155,9 @@ def _advanced(
 
 
 def _work_space(count: int) -> tuple[Array, Array, Array, Array]:
-    """Three arrays (4, count) and one (3, count), one after the other from a cache line on.
+    """Three arrays (4, count) and one (3, count) in one block that starts on a cache line.
 
-    Where they lie matters: scattered, or off the line, they cost up to a quarter more.
+    Separate or unaligned arrays make a step up to a quarter slower.
     """
     rows = 15
     memory = np.empty(rows * count + _CACHE_LINE)

@@ -1,4 +1,4 @@
-"""Arrays made fit for a law, as a planner makes one sample fit; the rules are the planner's own."""
+"""Checks and clamps arrays for a law, by the rules with which a planner treats one sample."""
 
 from functools import cache
 from math import pi
@@ -7,22 +7,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from companion.attitude.errors import InvalidQuaternionError, InvalidTargetError
-from companion.attitude.representation import NORM_TOLERANCE, normalised
-from companion.attitude.target import LARGEST_HEADING_RATE, admissible
-from companion.attitude.types import Target
+from companion.attitude.representation import (
+    LARGEST_HEADING_RATE,
+    NORM_TOLERANCE,
+    admissible,
+    normalised,
+)
+from companion.attitude.types import InvalidQuaternionError, InvalidTargetError, Target
 from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
 
 _AS_GOOD_AS_ONE = 1e-14
-"""A squared norm this close to 1 need not be divided by: nothing that matters would change."""
+"""A quaternion whose squared norm is this close to 1 is not normalised again."""
 
 
 def as_rows(values: ArrayLike, name: str) -> Array:
     """`values` as a C-contiguous float array (4, n).
 
     Raises:
-        ValueError: the shape is another; `name` is how the message calls it.
+        ValueError: the shape is another; the message calls the array `name`.
     """
     array = np.ascontiguousarray(values, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != 4:
@@ -31,15 +34,15 @@ def as_rows(values: ArrayLike, name: str) -> Array:
 
 
 @cache
-def compiled_look() -> Any:
-    """`all_fit`, compiled: the checks below, in numpy, would take as long as a compiled law."""
+def compiled_check() -> Any:
+    """`all_fit`, compiled. In numpy the checks would take as long as a compiled law."""
     return Compiler({}).loop(all_fit)
 
 
 def all_fit(q: Array, targets: Array, longest: float) -> bool:
-    """Whether every vehicle may go to the law as it is, (4, n) and (4, n).
+    """Whether the law accepts every vehicle unchanged; arrays (4, n) and (4, n).
 
-    Conditions are joined by `&` and counted, so that nothing branches and the loop is vectorised.
+    Conditions are joined by `&` and counted: without branches the loop is vectorised.
     """
     unfit = 0
     for i in range(q.shape[1]):
@@ -72,15 +75,15 @@ def unit_quaternions(q: Array) -> Array:
 
 
 def admissible_targets(targets: Array, longest: float) -> Array:
-    """`targets` (4, n), each as `admissible` makes it.
+    """`targets` (4, n), each as `admissible` returns it.
 
-    What is asked within the limits is passed in bulk; what is not is treated one by one.
+    Targets within the limits are passed in bulk, the others are treated one by one.
 
     Raises:
         InvalidTargetError: a value is not finite.
     """
     north, east, heading, heading_rate = targets
-    with np.errstate(over="ignore", invalid="ignore"):  # then it is not fit, and refused by name
+    with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below
         fit = north * north + east * east <= longest * longest
     fit &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
     admitted = targets.copy()

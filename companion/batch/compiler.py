@@ -1,4 +1,4 @@
-"""numba on functions as they stand: the flight's own laws become machine code for many vehicles."""
+"""Compiles the laws of the flight with numba, unchanged, for many vehicles at once."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -6,19 +6,19 @@ from types import FunctionType
 from typing import Any
 
 Substitutes = Mapping[Callable[..., Any], Callable[..., Any]]
-"""Functions, and those that are compiled in their place."""
+"""Functions, and the functions compiled in their place."""
 
 _OPTIONS: dict[str, Any] = {
-    "error_model": "numpy",  # a check before each division keeps loops from being vectorised
-    "fastmath": {"contract"},  # multiply and add in one instruction; nothing else is loosened
+    "error_model": "numpy",  # a check before each division would prevent vectorised loops
+    "fastmath": {"contract"},  # only: multiply and add in one instruction
 }
 
 
 class Compiler:
-    """Compiles functions together with all that they call, every call inlined.
+    """Compiles functions together with everything they call, every call inlined.
 
-    Inlining is what lets the loop that calls a law be vectorised. A law refers to other functions
-    by its module's globals; it is rebuilt with globals in which they are compiled ones.
+    Only inlined calls let the loop around a law be vectorised. A law finds other functions in its
+    module's globals; it is rebuilt with globals that hold the compiled ones.
     """
 
     def __init__(self, substitutes: Substitutes) -> None:
@@ -27,7 +27,7 @@ class Compiler:
         self._done: dict[Callable[..., Any], Any] = {}
 
     def function(self, function: Callable[..., Any]) -> Any:
-        """`function`, for compiled code to call; it must be plain: no closure, no defaults."""
+        """Compile a function for use in compiled code; it must have no closure and no defaults."""
         if function not in self._done:
             import numba  # noqa: PLC0415  optional, and slow to import
 
@@ -35,7 +35,7 @@ class Compiler:
         return self._done[function]
 
     def loop(self, function: Callable[..., Any]) -> Any:
-        """`function`, for anyone to call; it may close over what `function()` returned."""
+        """Compile a loop; it may close over functions that `function()` returned."""
         import numba  # noqa: PLC0415
 
         return numba.njit(function, **_OPTIONS)
@@ -53,10 +53,10 @@ class Compiler:
 
 
 def _use_wide_registers() -> None:
-    """Let LLVM use all 512 bits where the processor has them: by itself it keeps to 256.
+    """Let LLVM use 512-bit registers if the processor has them; by default it uses 256 bits.
 
-    numba reads this once, before it compiles anything in the process; what the user set by its
-    own environment variable is left as it is.
+    numba reads this once, before it compiles anything. A setting of the user (NUMBA_CPU_FEATURES)
+    is kept.
     """
     import llvmlite.binding as llvm  # noqa: PLC0415
     from numba import config  # noqa: PLC0415

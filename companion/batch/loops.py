@@ -1,8 +1,8 @@
-"""The loops over vehicles and samples around a law: as Python, or compiled.
+"""The loops over vehicles and samples around a law, in Python or compiled.
 
-Compiled, the inner loops are vectorised. For that they run over whole C-contiguous arrays, from 0
-to the end, and write to other arrays than they read; and law and turn are two loops, since one
-loop with both needs more registers than there are.
+Compiled inner loops are vectorised. For that they run over whole C-contiguous arrays, from 0 to the
+end, and write to other arrays than they read. Law and turn are two loops, because one loop with
+both needs more registers than a processor has.
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import rotation
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.planner import Law
 from companion.batch import series
 from companion.batch.compiler import Compiler, Substitutes
@@ -34,18 +34,18 @@ class Loops(NamedTuple):
     apply: _Apply
     """(q, targets, rates, dt, constants): fills rates (3, n)."""
     advance: Callable[[Array, Array, Array, Array, float, Constants, int], None]
-    """(q, spare, targets, rates, dt, constants, steps): q and spare (4, n) hold the attitudes by
-    turns, q the even steps."""
+    """(q, spare, targets, rates, dt, constants, steps): q (4, n) holds the attitudes of even steps,
+    spare (4, n) those of odd steps."""
     record: Callable[[Array, Array, Array, float, Constants], None]
     """(q, targets, rates, dt, constants): fills q (steps + 1, 4, n) from q[0] on, and rates
     (steps, 3, n)."""
     any_angle: bool
-    """Whether turns of more than 1 rad a sample are right, too."""
+    """Whether the loops are valid for turns of more than 1 rad per sample."""
 
 
 @cache
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
-    """`law` compiled; unless `any_angle`, only for turns up to 1 rad a sample, which is quicker."""
+    """`law` compiled; without `any_angle` for turns up to 1 rad per sample, which is faster."""
     compiler = Compiler(_ARCTANGENT if any_angle else _ALL_SERIES)
     one_law, turned = compiler.function(law), compiler.function(rotation.turned)
 
@@ -66,7 +66,7 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
 
 @cache
 def plain_loops(law: Law) -> Loops:
-    """`law` called for one vehicle after the other, on floats as a flight does."""
+    """`law` called for one vehicle after the other, on floats as in flight."""
     one_law: Any = law
     turned: Any = rotation.turned
 
@@ -82,7 +82,7 @@ def plain_loops(law: Law) -> Loops:
 
 
 def _over_samples(apply: _Apply, turn: _Turn, made: Callable[[Any], Any], any_angle: bool) -> Loops:
-    """The loops over samples around those over vehicles, as `made` makes them."""
+    """Wrap the loops over vehicles into loops over samples; `made` may compile them."""
 
     def advance(
         q: Array,

@@ -1,8 +1,8 @@
-"""Elementary functions as polynomials: what a compiler can put on many vehicles at once.
+"""Elementary functions as polynomials that a compiler can vectorise over many vehicles.
 
-The C library's functions work on one number a call, and such a call keeps the whole loop around it
-from being vectorised. These have no branches and are within 5e-15 of them on their domains. The
-sums are taken in pairs (Estrin), not in a row (Horner): a row makes each term wait for the last.
+A call of the C library takes one number and prevents vectorising the loop around it. The functions
+here have no branches and are within 5e-15 of the C library on their domains. The sums are taken in
+pairs (Estrin), because in a row (Horner) each term waits for the one before.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
 LARGEST_SQUARE = 0.25
-"""rad²; up to here `cos_and_sinc` is good: a turn of 1 rad in a sample."""
+"""Largest argument of `cos_and_sinc`, rad²: a turn of 1 rad per sample."""
 
 
 def _fitted(
@@ -22,7 +22,7 @@ def _fitted(
 ) -> tuple[float, ...]:
     """Coefficients, constant first, of the polynomial through the Chebyshev points of [0, largest].
 
-    That is within a small factor of the best polynomial there is.
+    Its error is within a small factor of that of the best polynomial.
     """
     fit = Chebyshev.interpolate(function, terms - 1, domain=[0.0, largest])
     return tuple(float(c) for c in fit.convert(kind=Polynomial).coef)
@@ -34,7 +34,7 @@ _SINC = _fitted(lambda u: np.sin(np.sqrt(u)) / np.sqrt(u), LARGEST_SQUARE, 6)
 
 
 def arctangent(t: float) -> float:
-    """atan(t) in rad for t in [−1, 1]: the laws take it of half angles only."""
+    """atan(t) in rad for t in [−1, 1]; the laws use it for half angles only."""
     u = t * t
     u2 = u * u
     u4 = u2 * u2
@@ -46,9 +46,9 @@ def arctangent(t: float) -> float:
 
 
 def cos_and_sinc(square: float) -> tuple[float, float]:
-    """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`, in place of the one in `rotation`.
+    """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`, replacing that of `rotation`.
 
-    A larger h² gives NaN, and an attitude once turned so stays NaN: it cannot be mistaken.
+    A larger h² gives NaN. The attitude then stays NaN, which the caller detects.
     """
     square = square if square <= LARGEST_SQUARE else nan
     fourth = square * square

@@ -6,9 +6,9 @@ from typing import NoReturn
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.control.command import Command
 from companion.control.control_loop import ControlLoop, Deadlines
-from companion.flight.assembly import hover_thrust, planner, rate_limits
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings
 from companion.recording.trace import FlightTrace
@@ -39,7 +39,7 @@ async def answer(link: Link) -> NoReturn:
     loop.on = True
     link.on_attitude = loop.on_sample
     while True:
-        loop.command = Command(Target(0.1, 0.0, 0.0), 0.0, now())
+        loop.command = GuidanceCommand(Target(0.1, 0.0, 0.0), 0.0, now())
         await asyncio.sleep(_GUIDANCE_PERIOD_S)
 
 

@@ -15,7 +15,7 @@ from mavsdk.component_type import ComponentType
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.flight.assembly import planner as make_planner
+from companion.control.inner_loop import planner as make_planner
 
 STAMP_MODULUS = 8192  # float32 holds the degrees and their radians exactly enough up to here
 _HOVER = 0.5

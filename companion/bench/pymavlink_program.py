@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.flight.assembly import planner
+from companion.control.inner_loop import planner
 
 _RATES_AND_THRUST = 128  # ATTITUDE_TARGET_TYPEMASK: ignore the attitude
 _HOVER = 0.5

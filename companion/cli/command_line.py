@@ -1,72 +1,23 @@
-"""The command line: its options, and what each error of a command means to the shell."""
+"""The options of the command line. It imports no command, so that `--help` answers at once."""
 
 import argparse
-import asyncio
-import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
-from math import nan
 from pathlib import Path
-from typing import TypeAlias, get_args
 
-from rich.console import Console
-
-from companion import demo
-from companion.cli import config, doctor, flights, identify, tools
-from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
-from companion.cli.identify import SHIPPED
-from companion.config.flight import FlightConfig
-from companion.extras import MissingExtraError
-from companion.files.yaml_file import ConfigError
-from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
-from companion.realtime import RealtimeError
-from companion.recording.figure import FigureError
-from companion.study import registry
+from companion.cli import tool_options
+from companion.cli.tool_options import Commands, number
 
 _PACKAGE = "mavlink-companion"
 
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 
-_USAGE_ERRORS = (
-    ConfigError,
-    EndpointError,
-    FigureError,
-    LogError,
-    MissingExtraError,
-    RealtimeError,
-    SigningError,
-)
-_MANEUVERS = get_args(get_args(FlightConfig.model_fields["maneuvers"].annotation)[0])
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Read the command line; ends the program for `--help`, `--version` and wrong usage.
 
-
-def run(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C where no flight sees to it.
+    Args:
+        arguments: of the command line; None: those that the program was started with.
     """
-    options = _parser().parse_args(arguments)
-    errors = Console(stderr=True)
-    try:
-        return int(options.run(options))
-    except _USAGE_ERRORS as error:
-        errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
-        return EXIT_USAGE
-    except (LinkError, OSError, demo.VehicleStoppedError) as error:
-        errors.print(f"companion: {error}", markup=False, highlight=False, soft_wrap=True)
-        return EXIT_FLIGHT
-    except asyncio.CancelledError:
-        errors.print("companion: interrupted before anything was sent")
-        return EXIT_FLIGHT
-    except Exception as error:
-        if options.debug:
-            traceback.print_exc()
-        errors.print(
-            f"companion: internal error: {error!r}; run again with --debug for where it happened",
-            markup=False,
-            soft_wrap=True,
-        )
-        return EXIT_FLIGHT
+    return _parser().parse_args(arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -84,10 +35,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_flights(commands)
     _add_doctor(commands)
     _add_identify(commands)
-    _add_benches(commands)
-    _add_study(commands)
-    _add_tools(commands)
-    _add_config(commands)
+    tool_options.add_benches(commands)
+    tool_options.add_study(commands)
+    tool_options.add_tools(commands)
+    tool_options.add_config(commands)
     return parser
 
 
@@ -97,18 +48,18 @@ def _add_flights(commands: Commands) -> None:
         "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
     )
     _add_link_options(fly)
-    fly.set_defaults(run=flights.fly)
+    fly.set_defaults(run="flights.fly")
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
     show.add_argument(
         "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
     )
-    show.set_defaults(run=flights.demo)
+    show.set_defaults(run="flights.demo")
     for command in (fly, show):
         command.add_argument(
             "--maneuvers",
-            type=_maneuvers,
+            type=lambda text: tuple(text.split(",")),
             metavar="NAME[,NAME]",
-            help=f"fly these instead of flight.maneuvers: {', '.join(_MANEUVERS)}",
+            help="fly these instead of flight.maneuvers: hover, steps, circle, corners",
         )
         command.add_argument(
             "--trajectory",
@@ -140,7 +91,7 @@ def _add_doctor(commands: Commands) -> None:
     command.add_argument("--endpoint", help="instead of link.endpoint")
     command.add_argument(
         "--wait",
-        type=_number(0.01, 3600.0),
+        type=number(0.01, 3600.0),
         default=10.0,
         metavar="SECONDS",
         help="for the vehicle to be ready, at most (10)",
@@ -156,7 +107,7 @@ def _add_doctor(commands: Commands) -> None:
     )
     command.add_argument("--yes", action="store_true", help="of --fix: set all without asking")
     _add_flight_options(command)
-    command.set_defaults(run=doctor.doctor)
+    command.set_defaults(run="doctor.doctor")
 
 
 def _add_identify(commands: Commands) -> None:
@@ -175,7 +126,7 @@ def _add_identify(commands: Commands) -> None:
         type=Path,
         metavar="FILE",
         nargs="?",
-        const=SHIPPED,
+        const=Path(),  # the configuration that ships
         help="start the bundled vehicle and fly it; default: the mock-px4.yaml that ships",
     )
     which.add_argument(
@@ -187,7 +138,7 @@ def _add_identify(commands: Commands) -> None:
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
-    command.set_defaults(run=identify.identify, trajectory=None, slow_down=False)
+    command.set_defaults(run="identify.identify", trajectory=None, slow_down=False)
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
@@ -205,120 +156,3 @@ def _add_flight_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
     command.add_argument("--json", action="store_true", help="end with one line of JSON")
-
-
-def _add_benches(commands: Commands) -> None:
-    bench = commands.add_parser("bench", help="measure this program's speed")
-    benches = bench.add_subparsers(required=True, metavar="WHAT")
-    link = benches.add_parser(
-        "link", help="sample in → setpoint out: ours, echo, pymavlink, MAVSDK"
-    )
-    link.add_argument(
-        "--seconds", type=_number(0.1, 3600.0), default=20.0, help="for each program (20)"
-    )
-    link.add_argument(
-        "--rate", type=_number(1.0, 2000.0), default=250.0, help="samples a second (250)"
-    )
-    link.set_defaults(run=tools.bench_link)
-    step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
-    step.add_argument(
-        "--seconds", type=_number(0.001, 3600.0), default=5.0, help="of measuring (5)"
-    )
-    step.set_defaults(run=tools.bench_planner)
-    for each in (link, step):
-        each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
-
-
-def _add_study(commands: Commands) -> None:
-    study = commands.add_parser(
-        "study",
-        help="the paper's experiments, as figures, tables and a page (extra `study`)",
-        epilog=f"studies:\n{registry.help_table()}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    study.add_argument(
-        "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
-    )
-    study.add_argument(
-        "--case",
-        type=Path,
-        metavar="FILE",
-        help=f"for {registry.names_with_case()}: such as configs/study-case.yaml",
-    )
-    study.add_argument(
-        "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
-    )
-    study.add_argument(
-        "--json",
-        action="store_true",
-        help=f"for {registry.names_with_json()}: print its rows as one JSON list",
-    )
-    study.set_defaults(run=tools.study)
-
-
-def _add_tools(commands: Commands) -> None:
-    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
-    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
-    plot.set_defaults(run=tools.plot)
-
-
-def _add_config(commands: Commands) -> None:
-    show = commands.add_parser(
-        "config",
-        help="print the configuration: every key, its default, unit, range and meaning",
-        description="Print every key as commented YAML, with the values of FILE or the defaults.",
-    )
-    which = show.add_mutually_exclusive_group()
-    which.add_argument("file", type=Path, nargs="?", metavar="FILE")
-    which.add_argument("--diff", type=Path, metavar="FILE", help="only what FILE changes")
-    which.add_argument("--get", metavar="KEY", help="only this key, such as limits.max_tilt_deg")
-    which.add_argument("--schema", action="store_true", help="the JSON Schema, for editors")
-    which.add_argument("--markdown", action="store_true", help="tables: docs/configuration.md")
-    show.set_defaults(run=config.show)
-
-    start = commands.add_parser("init", help="write a commented starting configuration")
-    start.add_argument("name", choices=list(config.STARTS), help="for which vehicle")
-    start.add_argument(
-        "--out",
-        type=Path,
-        default=Path("companion.yaml"),
-        metavar="FILE",
-        help="default: companion.yaml; an existing file is never replaced",
-    )
-    start.set_defaults(run=config.init)
-
-    check = commands.add_parser(
-        "check-config",
-        help="check a configuration file",
-        description="Check a configuration file and what it includes. It is read as YAML 1.2 "
-        "(010 is ten, yes is a text; no aliases, no tags), up to 250 kB and 6000 values; "
-        "`companion config` names the smallest and the largest value of each key.",
-    )
-    check.add_argument("file", type=Path, metavar="FILE")
-    check.set_defaults(run=config.check)
-
-
-def _maneuvers(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    unknown = [name for name in names if name not in _MANEUVERS]
-    if unknown:
-        raise argparse.ArgumentTypeError(
-            f"unknown maneuver {unknown[0]!r}; known: {', '.join(_MANEUVERS)}"
-        )
-    return names
-
-
-def _number(least: float, most: float) -> Callable[[str], float]:
-    """A number of the command line within bounds, NaN not among them."""
-
-    def number(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = nan
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
-        return value
-
-    return number

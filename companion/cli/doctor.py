@@ -22,24 +22,30 @@ from companion.guidance import ManeuverSequence
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
-from companion.preflight.apply_fixes import Answer, Outcome, mend, require_disarmed, restore
+from companion.mavlink.frame_filter import Notice
 from companion.preflight.evidence import Evidence
 from companion.preflight.examination import examine
 from companion.preflight.finding import Finding, Key
-from companion.preflight.gathering import identify
+from companion.preflight.parameter_fixes import (
+    Answer,
+    Outcome,
+    Undo,
+    UndoFile,
+    apply_fixes,
+    require_disarmed,
+    restore,
+)
 from companion.preflight.parameter_survey import survey
 from companion.preflight.report import as_dict, outcome_as_dict, outcome_line, tables
-from companion.preflight.session import Patient, patient
-from companion.preflight.undo import Undo, UndoFile
-from companion.vehicle.inbox import Notice
+from companion.preflight.session import PreflightSession, identify, open_session
 from companion.vehicle.link import Link
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 
 _ANSWERS = {answer.value[0]: answer for answer in Answer}
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Find what is wrong with a vehicle before it flies, and mend it if asked to."""
+    """Find what is wrong with a vehicle before it flies, and fix it if asked to."""
     config = _as_told(load(options.config), options)
     if options.yes and not options.fix:
         raise ConfigError("--yes answers the questions of --fix, and goes with it alone")
@@ -78,7 +84,7 @@ def _flown(config: Config) -> tuple[ManeuverSequence | None, list[Finding]]:
     except ConfigError as error:
         found = f"what is configured cannot be flown: {error}"
         because = "`companion fly` refuses it"
-        return None, [Finding(Key.MANEUVERS, Verdict.INEFFECTIVE, found, because)]
+        return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 
 class _Visit:
@@ -90,23 +96,23 @@ class _Visit:
         self.result: dict[str, Any] = {}
 
     async def examine(self, wait: float, *, fix: bool, unasked: bool) -> int:
-        """Look, tell, and mend if asked to; what is found after that decides the exit code."""
+        """Look, tell, and fix if asked to; what is found after that decides the exit code."""
         config = self._config
-        async with patient(config, self._link) as vehicle:
+        async with open_session(config, self._link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
-            findings = await vehicle.met()
+            findings = await vehicle.wait_for_vehicle()
             if findings:
                 return self._told(findings)
             try:
-                evidence = await vehicle.evidence(wait)
+                evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
-                return self._told(vehicle.silent(error))
+                return self._told(vehicle.unanswered(error))
             flown, refusals = _flown(config)
             evidence = replace(evidence, maneuvers=flown)
             findings = [*refusals, *examine(config, evidence)]
             code = self._told(findings)
             if fix:
-                code = await self._mend(vehicle, evidence, findings, unasked=unasked)
+                code = await self._fix(vehicle, evidence, findings, unasked=unasked)
         return code
 
     def _link(self, notice: Notice) -> Link:
@@ -114,8 +120,8 @@ class _Visit:
 
     async def restore(self, undo: Undo, path: Path) -> int:
         """Set the parameters back to what an undo file says."""
-        async with patient(self._config, self._link) as vehicle:
-            findings = await vehicle.met()
+        async with open_session(self._config, self._link) as vehicle:
+            findings = await vehicle.wait_for_vehicle()
             if findings:
                 return self._told(findings)
             link = vehicle.link
@@ -128,8 +134,13 @@ class _Visit:
         self.result = {"changes": [outcome_as_dict(outcome) for outcome in self._outcomes]}
         return EXIT_FLIGHT if any(outcome.refusal for outcome in self._outcomes) else EXIT_OK
 
-    async def _mend(
-        self, vehicle: Patient, evidence: Evidence, findings: list[Finding], *, unasked: bool
+    async def _fix(
+        self,
+        vehicle: PreflightSession,
+        evidence: Evidence,
+        findings: list[Finding],
+        *,
+        unasked: bool,
     ) -> int:
         link, config = vehicle.link, self._config
         proposed = [finding for finding in findings if finding.change is not None]
@@ -139,7 +150,7 @@ class _Visit:
         require_disarmed(link)
         undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
-            await mend(link, proposed, _agree if unasked else self._ask, undo, self._note)
+            await apply_fixes(link, proposed, _agree if unasked else self._ask, undo, self._note)
         finally:
             if undo.path.exists():
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
@@ -153,7 +164,7 @@ class _Visit:
     async def _ask(self, finding: Finding) -> Answer:
         change = finding.change
         assert change is not None
-        self.say(f"{finding.verdict.value}: {finding.sentence()}")
+        self.say(f"{finding.result.value}: {finding.sentence()}")
         while True:
             self._console.print(
                 f"Set {change.parameter} from {change.old:g} to {change.new:g}? "

@@ -27,27 +27,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if by_default:  # not where a shell ignores it, nor where a test has its own
         signal.signal(signal.SIGINT, _leave)
-    run = _loaded()
+    run = _loaded(arguments)
     try:
         if by_default:
             signal.signal(signal.SIGINT, signal.default_int_handler)
-        return run(arguments)
+        return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")
         return EXIT_FLIGHT
     finally:
-        if by_default and arguments is None:  # all is done: Ctrl-C may end the rest at once
+        if by_default and arguments is None:  # the command is done: Ctrl-C may end the rest at once
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _loaded() -> Callable[[Sequence[str] | None], int]:
-    """The command line, imported, with streams that can take all it prints."""
+def _loaded(arguments: Sequence[str] | None) -> Callable[[], int]:
+    """The command that the command line asks for, imported."""
     from companion.cli.text_streams import print_anything  # noqa: PLC0415
 
     print_anything()
-    from companion.cli.command_line import run  # noqa: PLC0415
+    from companion.cli.command_line import parse  # noqa: PLC0415
 
-    return run
+    options = parse(arguments)
+    from companion.cli.run import command_of, run  # noqa: PLC0415
+
+    command = command_of(options)
+    return lambda: run(command, options)
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:

@@ -1,4 +1,4 @@
-"""What signals do to a flight: each hands the vehicle back, and only a Ctrl-C again leaves it."""
+"""Signals in flight: each hands the vehicle back; only a second Ctrl-C leaves the flight."""
 
 import asyncio
 import signal
@@ -9,22 +9,21 @@ from companion.flight.session import Session
 from companion.recording.summary import Summary
 
 LEAVE_AFTER = 1.0
-"""A Ctrl-C so long after the one before, s, leaves; a key that bounces or is held down does not."""
+"""A second Ctrl-C leaves only if it comes this long after the first, s: a key may bounce."""
 
 HOW_TO_LEAVE = f"Ctrl-C again, {LEAVE_AFTER:g} s later or more, leaves at once"
 
 
 class Signals:
-    """Judges the signals that come while a session flies.
+    """Handles the signals that arrive while a session flies.
 
-    A terminal that closes sends more than one: its shell and the kernel each send SIGHUP, and
-    SIGTERM may follow. So repeats of these two change nothing: who wants the vehicle left while it
-    is being handed back has to say so with the keyboard.
+    A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
+    follow. So repeats of these two change nothing. Only the keyboard can end a hand-back.
 
     Args:
-        session: that flies.
-        give_up: ends the session before there is a flight to interrupt.
-        clock: the user's, not the vehicle's, s.
+        session: the one that flies.
+        give_up: ends the session while there is no flight to interrupt.
+        clock: wall clock, not vehicle time, s.
     """
 
     def __init__(
@@ -40,7 +39,7 @@ class Signals:
         self._ctrl_c_at: float | None = None
 
     def take(self, number: signal.Signals) -> None:
-        """A signal came."""
+        """Handle one signal."""
         match number:
             case signal.SIGINT:
                 self._take_ctrl_c()
@@ -59,12 +58,12 @@ class Signals:
 
     def _hand_back(self, name: str) -> None:
         if not self._session.interrupt(f"interrupted by {name}") and not self._gave_up:
-            self._gave_up = True  # once: what is being closed then must not be torn off
+            self._gave_up = True  # only once: closing the link must not be interrupted
             self._give_up()
 
 
 async def fly_interruptibly(session: Session) -> Summary:
-    """Fly; SIGINT (Ctrl-C), SIGTERM and SIGHUP are judged by `Signals`.
+    """Fly a session; `Signals` handles SIGINT (Ctrl-C), SIGTERM and SIGHUP.
 
     Raises:
         CancelledError: interrupted before there was a flight; nothing was sent.

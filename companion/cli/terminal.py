@@ -1,4 +1,4 @@
-"""A flight on the terminal: phases, what they wait for, events; a question at the end."""
+"""Shows a flight on the terminal: phases, events, and the question at the end."""
 
 import asyncio
 import queue
@@ -10,17 +10,17 @@ from rich.console import Console
 from rich.status import Status
 
 _REPEAT = 5.0
-"""Without a live terminal, say what is waited for this often, s."""
+"""Period of the status line where the output is no terminal, s."""
 
 _WAITING = 1000
-"""Lines that a stalled terminal may owe; more are dropped."""
+"""Lines queued for a stalled terminal; further lines are dropped."""
 
 _PATIENCE = 2.0
-"""How long a stalled terminal may hold up the end, s."""
+"""Longest wait for a stalled terminal at the end, s."""
 
 
-class _Speaker:
-    """Prints in a thread of its own: a terminal that stalls or goes away must not stop a flight."""
+class _PrintThread:
+    """Prints in its own thread: a terminal that stalls or closes must not stop a flight."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[Callable[[], None] | None] = queue.Queue(_WAITING)
@@ -53,7 +53,7 @@ class _Speaker:
 
 
 async def read_line() -> str:
-    """A line of standard input, which must be a terminal; the event loop goes on meanwhile."""
+    """Read a line from the terminal while the event loop goes on."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[str] = loop.create_future()
     loop.add_reader(sys.stdin, lambda: answer.set_result(sys.stdin.readline()))
@@ -64,54 +64,54 @@ async def read_line() -> str:
 
 
 class FlightConsole(Console):
-    """A console whose reader may go away: rich would end the program, and silence stdout."""
+    """A console whose reader may close the pipe; rich itself would end the program."""
 
     def on_broken_pipe(self) -> None:
-        """Let whoever printed deal with it."""
+        """Raise to the caller that prints."""
         raise BrokenPipeError
 
 
 class TerminalObserver:
-    """Tells a flight to a person; a live line on a terminal, plain lines elsewhere."""
+    """Shows a flight: a live status line on a terminal, plain lines elsewhere."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._speaker = _Speaker()
+        self._printer = _PrintThread()
         self._status: Status | None = None
         self._said = 0.0
 
     def phase(self, name: str, waits_for: str) -> None:
         """Show that a phase began."""
         self._said = 0.0
-        self._speaker.say(lambda: self._show_phase(name, waits_for))
+        self._printer.say(lambda: self._show_phase(name, waits_for))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Show what is waited for, and for how long."""
+        """Show what the phase waits for, and since when."""
         text = f"{name}: {detail or 'working'} ({elapsed:.0f} of at most {timeout:.0f} s)"
         if self._console.is_terminal:
-            self._speaker.say(lambda: self._show_status(text))
+            self._printer.say(lambda: self._show_status(text))
         elif elapsed - self._said >= _REPEAT:
             self._said = elapsed
-            self._speaker.say(lambda: self._print(f"           {text}"))
+            self._printer.say(lambda: self._print(f"           {text}"))
 
     def event(self, time: float, text: str) -> None:
         """Show an event."""
-        self._speaker.say(lambda: self._print(f"  {time:6.1f} s  {text}"))
+        self._printer.say(lambda: self._print(f"  {time:6.1f} s  {text}"))
 
     def close(self) -> None:
-        """Take the live line away, once all is said."""
-        self._speaker.say(self._stop_status)
-        self._speaker.close()
+        """Remove the status line after the last event."""
+        self._printer.say(self._stop_status)
+        self._printer.close()
 
     async def ask_landing(self) -> bool:
-        """Ask whether to land; where nobody can answer, the vehicle goes on holding."""
+        """Ask whether to land; without a terminal the vehicle goes on holding."""
         if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
-            self._speaker.say(
+            self._printer.say(
                 lambda: self._print("The vehicle holds. Take it over, or command a landing.")
             )
             return False
-        self._speaker.say(self._stop_status)
-        self._speaker.say(
+        self._printer.say(self._stop_status)
+        self._printer.say(
             lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C again leaves) ")
         )
         return (await read_line()).strip().lower() in ("y", "yes")

@@ -1,7 +1,7 @@
-"""Standard output and error that take any character: what they cannot encode is transliterated.
+"""Makes standard output and error accept any character: they transliterate what they cannot encode.
 
-A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name need not be text
-at all. Neither may end a command, least of all one that flies.
+A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name may be any bytes.
+Neither may end a command that flies.
 """
 
 import codecs
@@ -48,7 +48,7 @@ _WORDS = {
 
 
 def print_anything() -> None:
-    """Let standard output and error transliterate from now on."""
+    """Make standard output and error transliterate."""
     codecs.register_error(_HANDLER, _transliterated)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # None where it is closed
@@ -63,7 +63,7 @@ def _transliterated(error: UnicodeError) -> tuple[str, int]:
 
 
 def ascii_for(text: str) -> str:
-    """A text in ASCII that still can be read: m/s² as m/s^2, ω as omega, ċ as c."""
+    """A readable ASCII form of a text: m/s² as m/s^2, ω as omega, ċ as c."""
     out: list[str] = []
     raised = False
     for char in text:

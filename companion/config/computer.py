@@ -12,7 +12,8 @@ class LinkConfig(Section):
     """How to reach the autopilot."""
 
     backend: Literal["direct", "mavsdk"] = "direct"
-    """direct, or mavsdk: MAVSDK holds the connection, and our frames go by it (extra `mavsdk`)."""
+    """direct: our own connection. mavsdk: MAVSDK holds the connection and carries our frames (extra
+    `mavsdk`)."""
     endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
     """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD; udpin and
     tcpin also take ?peer=HOST[:PORT], to hear no other."""
@@ -25,15 +26,16 @@ class LinkConfig(Section):
     source_component: Annotated[int, Field(ge=1, le=255)] = 191
     """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
     signing_key_file: PathKey | None = None
-    """File whose first line is the passphrase: sign what we send, refuse what is not signed."""
+    """File whose first line is the signing passphrase. With it we sign every message and refuse
+    unsigned ones."""
     lockstep: StrictBool = False
-    """Run on the bundled vehicle's clock, step by step. Never with a real vehicle."""
+    """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
-    """Asked of the autopilot for ATTITUDE_QUATERNION; the loop runs at what really arrives."""
+    """Rate requested for ATTITUDE_QUATERNION. The loop runs at the rate that arrives."""
     min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
     """Refuse to fly if less than this arrives."""
     position_rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] = 50.0
-    """Asked for LOCAL_POSITION_NED."""
+    """Rate requested for LOCAL_POSITION_NED."""
     min_position_rate_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 10.0
     """Refuse to fly if less than this arrives."""
 
@@ -52,26 +54,26 @@ class LinkConfig(Section):
 
 
 class RealtimeConfig(Section):
-    """What is asked of the operating system: each is granted or not, and the flight says which."""
+    """Real-time settings that the system grants or refuses; the flight reports which."""
 
     scheduler: Literal["other", "fifo"] = "other"
-    """other: as every program. fifo: before all of them (SCHED_FIFO), while it has work."""
+    """other: the normal scheduler. fifo: SCHED_FIFO, which runs before all normal programs."""
     priority: Annotated[int, Field(ge=1, le=90)] = 50
-    """Of fifo; the kernel's own threads for interrupts have 50, and above 90 are watchdogs."""
+    """Priority of fifo. The kernel's interrupt threads have 50, its watchdogs more than 90."""
     cpu_affinity: Annotated[
         tuple[Annotated[int, Field(ge=0, le=1023)], ...], Field(max_length=1024)
     ] = ()
-    """Run on these processors only, numbered from 0; none named: on any."""
+    """Processors to run on, numbered from 0. Empty: any."""
     lock_memory: StrictBool = False
-    """Keep all of the program's memory in RAM: no wait for the disk in the middle of a step."""
+    """Lock the program's memory in RAM, so that a step never waits for the disk."""
     freeze_gc: StrictBool = False
-    """No garbage collection in flight; what it would have found is freed afterwards."""
+    """Switch the garbage collector off in flight. Its work is done after the flight."""
     required: StrictBool = False
-    """Refuse to fly unless all that is asked for is granted."""
+    """Refuse to fly unless every requested setting is granted."""
 
 
 class RecordingConfig(Section):
-    """What is written down."""
+    """Recording of flights."""
 
     directory: PathKey = Path("flights")
-    """Each flight makes a folder of its own in here."""
+    """Folder in which each flight makes its own folder."""

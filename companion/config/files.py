@@ -1,4 +1,4 @@
-"""The configuration as files: read with what they include, changed, described for editors."""
+"""Configuration files: reading them with their includes, changing keys, the JSON Schema."""
 
 import json
 import sysconfig
@@ -14,13 +14,13 @@ from companion.files.yaml_file import ConfigError, UnreadableFileError
 
 _INCLUDE = "include"
 _DEEPEST = 4
-"""Includes of includes."""
+"""Largest depth of nested includes."""
 
 
 def load(path: Path) -> Config:
-    """Read and check a configuration file, and the files that its `include` names beside it.
+    """Read and check a configuration file and the files that it includes.
 
-    Keys of a file win over those that it includes, those of a later file over an earlier one's.
+    Keys of a file override those of its includes; a later include overrides an earlier one.
 
     Raises:
         ConfigError: a file is missing, includes itself, is not YAML, or holds an unknown key or a
@@ -36,11 +36,11 @@ def load(path: Path) -> Config:
 
 
 class _Reading:
-    """Reads the files that a configuration includes, each below the one that includes it.
+    """Reads included files; an including file overrides them.
 
     Args:
-        data: takes their keys.
-        sources: takes in which file each key stands.
+        data: receives their keys.
+        sources: receives the file of each key.
     """
 
     def __init__(self, data: dict[str, Any], sources: dict[tuple[str, ...], str]) -> None:
@@ -49,11 +49,11 @@ class _Reading:
         self._count = 0
 
     def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
-        """Add the files that the last one of `chain` includes; its keys are not among them.
+        """Add the files that the last file of `chain` includes, without its own keys.
 
         Args:
-            chain: the file, and before it those by whose includes it is read.
-            keys: of the file.
+            chain: the including files, outermost first, and the file itself.
+            keys: those of the file.
 
         Raises:
             ConfigError: as `load`.
@@ -108,7 +108,7 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
 def _merge(
     data: dict[str, Any], part: dict[str, Any], sources: dict[tuple[str, ...], str], name: str
 ) -> None:
-    """Put a file's keys over those of earlier ones, and note in which file each stands."""
+    """Let a file's keys override earlier ones, and note the file of each key."""
     for section, values in part.items():
         sources[(section,)] = name
         data.setdefault(section, {})
@@ -120,15 +120,15 @@ def _merge(
 
 
 def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:
-    """The configuration with some keys changed, checked anew.
+    """The configuration with some keys changed, checked again.
 
     Args:
-        config: to start from.
+        config: the configuration to change.
         changes: new values by section and key.
-        name: stands for the changes in errors.
+        name: names the changes in error messages.
 
     Raises:
-        ConfigError: the result holds together no more.
+        ConfigError: the result is not valid.
     """
     data = config.model_dump()
     for section, values in changes.items():

@@ -23,7 +23,7 @@ class PlannerConfig(Section):
     error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
     needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
-    """p: acceleration approaches its target with the time constant 1/p."""
+    """p: the acceleration approaches its target with time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
     """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
     use gain_per_s for it."""
@@ -37,13 +37,13 @@ class PlannerConfig(Section):
 
 
 class GuidanceConfig(Section):
-    """Linear guidance above the attitude law: a reference followed without lag."""
+    """Guidance: turns a reference into attitude targets, without lag."""
 
     kind: Literal["linear", "nmpc"] = "linear"
     """linear, or nmpc: nonlinear model predictive control follows trajectories, in a process of
     its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
-    """How often guidance makes a new target."""
+    """Rate at which guidance computes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
     makes a stiffer hold. The gains follow from it (LQR). null: 2/T⁴ where dead time and
@@ -53,24 +53,24 @@ class GuidanceConfig(Section):
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
     """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
-    """How quickly wind is found, from how the vehicle moves against what its tilt gives.
+    """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
     null: 1.5/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """By how much the autopilot's position is late where its GPS is later than its estimator
-    believes; measured against another measurement of the position."""
+    """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
+    that is set wrong. Measure it against an independent position."""
     max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0)] = 6.0
-    """Largest acceleration by wind that is believed."""
+    """Largest acceleration by wind that the observer estimates."""
     lead: bool = True
-    """Lead the targets through the known inner response, so that the vehicle is not late."""
+    """Lead the targets by the known attitude response, so that the vehicle does not lag."""
     height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 1.5
-    """Vertical speed per metre of height error."""
+    """Vertical speed commanded per metre of height error."""
     climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 3.5
-    """Vertical acceleration per m/s of vertical speed error."""
+    """Vertical acceleration commanded per m/s of vertical speed error."""
     drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
-    """Linear drag per mass, which is fed forward. null: not known; flight learns it, as it corrects
-    a number, and the next flight of the vehicle begins with what was learned."""
+    """Linear drag per mass, for feedforward. null: unknown. The flight estimates it, and the
+    vehicle's next flight begins with the estimate."""
     quadratic_drag_per_m: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Quadratic drag per mass, where drag_per_s is a number: the vehicle is slowed down by
+    """Quadratic drag per mass, used with drag_per_s: the drag decelerates the vehicle by
     (drag_per_s + quadratic_drag_per_m·speed)·speed."""
 
     position_lateness = Si("position_lateness_ms")

@@ -1,6 +1,6 @@
-"""The vehicle's drag before it flies: as the configuration tells it, or the last flight learned it.
+"""The drag known before a flight: from the configuration, or learned in the last flight.
 
-Before the vehicle tells who it is, the one that flew last is taken to fly again.
+Until the vehicle identifies itself, it is assumed to be the one that flew last.
 """
 
 from pathlib import Path
@@ -11,44 +11,44 @@ from companion.guidance.drag_estimate import ANY_VEHICLE, DragPrior
 from companion.recording.learned_file import newest
 
 _LINEAR, _QUADRATIC = 0.2, 0.02
-"""Standard deviations of a drag that is told or was learned, 1/s and 1/m: flight corrects it."""
+"""Standard deviations of a configured or learned drag, 1/s and 1/m; the flight corrects it."""
 _MOST = Drag(ANY_VEHICLE.drag.linear + ANY_VEHICLE.linear_deviation)
-"""More than most vehicles have."""
+"""Drag that few vehicles exceed."""
 
 
 def prior_of(drag: Drag) -> DragPrior:
-    """What is believed of a drag that is told, or that an earlier flight learned."""
+    """The prior of a drag that is configured or was learned in an earlier flight."""
     return DragPrior(drag, _LINEAR, _QUADRATIC)
 
 
 def drag_prior(config: Config) -> DragPrior:
-    """What the flight's estimate of the drag begins with, whichever vehicle it is."""
+    """The prior with which the drag estimate begins."""
     told = config.guidance.drag
     return ANY_VEHICLE if told is None else prior_of(told)
 
 
 def least_drag(config: Config) -> Drag:
-    """The drag that certainly slows the vehicle; none where it is not known."""
+    """The drag that is known to brake the vehicle; none if it is unknown."""
     return _known(config)[0] or NO_DRAG
 
 
 def most_drag(config: Config) -> Drag:
-    """The drag that thrust may have to overcome; more than usual where it is not known."""
+    """The drag that thrust must be able to overcome; a large one if it is unknown."""
     return _known(config)[0] or _MOST
 
 
 def assumption(config: Config) -> str:
-    """What of the drag is not the configuration's own word, as the end of a sentence."""
+    """What is assumed of an unconfigured drag, as the end of a sentence; empty if configured."""
     drag, source = _known(config)
     if drag is None:
-        return f" (the drag is not known: up to {_MOST.linear:g} 1/s is reckoned with)"
+        return f" (the drag is not known: assumed up to {_MOST.linear:g} 1/s)"
     if source is not None:
-        return f" (reckoned with the drag that an earlier flight learned: {source})"
+        return f" (with the drag that an earlier flight learned: {source})"
     return ""
 
 
 def _known(config: Config) -> tuple[Drag | None, Path | None]:
-    """The drag that is told or was learned, and where the latter is kept."""
+    """The configured or learned drag, and the file of a learned one."""
     if config.guidance.drag is not None:
         return config.guidance.drag, None
     kept = newest(config.recording.directory)

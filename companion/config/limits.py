@@ -11,35 +11,35 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class LimitsConfig(Section):
-    """What we never ask of the vehicle, and where it may fly."""
+    """Limits of what the program commands, and the fence."""
 
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 35.0
-    """Largest tilt of a target; longer targets are shortened along their direction."""
+    """Largest tilt of a target. A larger target keeps its direction and is shortened."""
     max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 90.0
-    """Largest roll-pitch rate, as the length of the two."""
+    """Largest combined roll and pitch rate: √(roll² + pitch²)."""
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0)] = 60.0
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
-    """Beyond this tilt the thrust axis is first brought up, the shortest way (not by quaternion,
-    so3 and euler)."""
+    """Beyond this tilt the planner first rotates the thrust axis upright, the shortest way (not
+    quaternion, so3 and euler)."""
     min_thrust: Share = 0.1
-    """Smallest normalised thrust sent in flight."""
+    """Smallest normalised thrust commanded in flight."""
     max_thrust: Share = 0.9
-    """Largest normalised thrust sent."""
+    """Largest normalised thrust commanded."""
     max_climb_m_s: Annotated[float, Field(ge=0.1, le=20.0)] = 2.0
-    """Largest upward speed that height hold asks for."""
+    """Largest climb rate that height hold commands."""
     max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
-    """Largest downward speed that height hold asks for."""
+    """Largest descent rate that height hold commands."""
     fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
-    """Farthest from where control began; beyond it we hand back and land."""
+    """Fence: largest distance from where control began. Beyond it the vehicle lands."""
     fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
-    """Highest above where control began."""
+    """Fence: largest height above where control began."""
     fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Lowest above home; below it we hand back and land."""
+    """Fence: smallest height above home. Below it the vehicle lands."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
-    """Below this: no arming, and in flight hand back and land."""
+    """Below this battery charge the program does not arm, and lands in flight."""
 
     max_tilt = Si("max_tilt_deg")
     max_tilt_rate = Si("max_tilt_rate_deg_s")
@@ -57,22 +57,22 @@ class LimitsConfig(Section):
 
 
 class DeadmanConfig(Section):
-    """When silence ends control. A setpoint leaves only in answer to fresh data."""
+    """How old data may be. A setpoint leaves only in answer to fresh data."""
 
     telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
-    """Attitude older than this is not answered, and counts as silence. Where TIMESYNC is not
-    answered, older than the quickest sample by this."""
+    """Largest age of an attitude sample that is answered. Without TIMESYNC the age counts from the
+    quickest sample."""
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
-    """Guidance older than this is not answered."""
+    """Largest age of the guidance target. With an older one no sample is answered."""
     position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
-    """Position older than this, by its arrival or by its time stamp on the vehicle's clock, stops
-    guidance, and so the setpoints."""
+    """Largest age of the position, by its arrival and by its time stamp. With an older one guidance
+    stops, and so do the setpoints."""
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
-    """Control that stood still this long is not taken up again: hand back. Keep it below the
-    autopilot's own limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
+    """After this long without a setpoint the program hands back. Keep it below the autopilot's own
+    limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s)."""
     deadline_ms: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
-    """An answer that leaves later than this after its sample reached this computer (over TCP and
-    serial: after it was read) counts as a missed deadline."""
+    """Longest time from the arrival of a sample to its setpoint (over TCP and serial: from reading
+    it). A later setpoint counts as a missed deadline."""
 
     telemetry_stale = Si("telemetry_stale_ms")
     target_stale = Si("target_stale_ms")

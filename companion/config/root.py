@@ -1,4 +1,4 @@
-"""The typed configuration: its sections together, and what no single one of them can know.
+"""The typed configuration: all sections, and the rules between them.
 
 The defaults fly the bundled vehicle.
 """
@@ -24,12 +24,11 @@ from companion.config.limits import DeadmanConfig, LimitsConfig
 from companion.config.safety import SafetyConfig
 from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
-from companion.guidance.thrust import FOR_TILT, largest_tilt
-from companion.guidance.thrust_curve import ThrustCurve
+from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
 
 FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
-"""Files that one configuration may include, those of its includes among them."""
+"""Largest number of included files, nested ones counted."""
 
 FORMER_KEYS = {
     "flight.programme": "is now called `flight.maneuvers`",
@@ -39,7 +38,7 @@ FORMER_KEYS = {
 """Keys that were renamed or removed → what to do instead; see `Section.former_keys`."""
 
 _TILT_SHARE = 0.75
-"""Of the largest tilt may be what a doublet brings about; the rest is for wind and overshoot."""
+"""Share of max_tilt_deg that a doublet may use; the rest is for wind and overshoot."""
 
 
 class Config(Section):
@@ -64,16 +63,16 @@ class Config(Section):
     realtime: RealtimeConfig = RealtimeConfig()
     recording: RecordingConfig = RecordingConfig()
     mock: dict[str, Any] | None = None
-    """The bundled vehicle's own section, read by `python -m sitl_mock`; present only for it."""
+    """Section of the mock vehicle, read by `python -m sitl_mock`."""
     include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
         default=(), exclude=True
     )
-    """Files whose keys are read as if they stood here, relative to this one; own keys win. They may
-    include others, up to four deep."""
+    """Files to include, relative to this one. Keys of this file override theirs. They may include
+    others, up to four deep."""
 
     @property
     def planner_name(self) -> str:
-        """The planner that flies: what `planner.name` says, or what `auto` comes to."""
+        """Name of the planner that flies; `auto` is resolved."""
         if self.planner.name != AUTO:
             return self.planner.name
         return MODEL_FOLLOWING if self.vehicle.known else FIRST_ORDER
@@ -87,7 +86,7 @@ class Config(Section):
 
 
 def _contradictions(config: Config) -> list[tuple[bool, str]]:
-    """What no single section can know: (whether it is wrong, what to say)."""
+    """Rules between sections: (whether it is broken, message)."""
     limits, thrust, flown = config.limits, config.thrust, config.flight.maneuvers
     tilt = limits.max_tilt
     return [
@@ -120,11 +119,11 @@ def _contradictions(config: Config) -> list[tuple[bool, str]]:
 
 
 def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
-    """As `_contradictions`, of the thrust that the height takes at the largest tilt."""
+    """As `_contradictions`: whether the thrust can hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
     hover = curve.share(thrust.hover_thrust)
-    # An autopilot that makes up for tilt may do it with all the thrust there is.
+    # An autopilot that compensates the tilt may use the full thrust.
     most = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
     tilt = degrees(largest_tilt(hover, most))
     needed = hover / cos(limits.max_tilt) / FOR_TILT
@@ -142,7 +141,7 @@ def _thrust_contradictions(config: Config) -> list[tuple[bool, str]]:
 
 
 def _identify_contradictions(config: Config) -> list[tuple[bool, str]]:
-    """As `_contradictions`, of the maneuver `identify`."""
+    """As `_contradictions`, for the maneuver `identify`."""
     limits, identify = config.limits, config.identify
     return [
         (

@@ -14,9 +14,9 @@ from companion.files.yaml_file import Section
 from companion.guidance.fence import inside
 
 Ending = Literal["hand_back", "land"]
-"""hand_back: the autopilot holds, and is left holding. land: it lands."""
+"""hand_back: the autopilot holds, and the program leaves it so. land: it lands."""
 Any = Literal["warn", "hold", "hand_back", "land"]
-"""warn: say so. hold: give the maneuver up, hold in offboard, then see. Or as `Ending`."""
+"""warn: report it. hold: end the maneuver and hold in offboard. Or as `Ending`."""
 Metres = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 Latitude = Annotated[float, Field(ge=-85.0, le=85.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -26,64 +26,65 @@ MOST_CORNERS = 200
 
 
 class SafetyConfig(Section):
-    """The safety ladder, beside `limits` and `deadman`: what is watched, and what follows."""
+    """Limits of the safety monitors, beside `limits` and `deadman`, and the action of each."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
-    """How long a hold may take to mend what it was for; then the vehicle lands."""
+    """If a hold does not clear its cause within this time, the vehicle lands."""
     fence_polygon_m: Annotated[
         tuple[tuple[Metres, Metres], ...], Field(max_length=MOST_CORNERS)
     ] = ()
-    """Corners [north, east] in metres about where control began; the vehicle stays inside."""
+    """Fence polygon: corners [north, east] in metres from where control began."""
     fence_polygon_deg: Annotated[
         tuple[tuple[Latitude, Longitude], ...], Field(max_length=MOST_CORNERS)
     ] = ()
-    """The same as [latitude, longitude]; give one of the two, or none."""
+    """Fence polygon: corners [latitude, longitude]. Give one of the two, or none."""
     braking_m_s2: Annotated[float, Field(ge=0.1, le=20.0)] = 2.5
-    """Deceleration that is certain: the vehicle is stopped where it would leave the fence."""
+    """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence."""
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
-    """Time until it begins."""
+    """Assumed time until braking begins."""
     fence_action: Ending = "land"
-    """Outside the fence. Within braking distance of it the maneuver is given up for a hold."""
+    """Action outside the fence. Within braking distance the maneuver ends in a hold."""
     battery_action: Literal["warn", "hand_back", "land"] = "land"
-    """Below limits.min_battery_percent, or not reported for 5 s."""
+    """Action if the battery is below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
-    """GPS lost, the estimator without attitude, velocity or position, or neither told for 5 s."""
+    """Action if GPS is lost, or the estimator reports no attitude, velocity or position for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
-    """The estimator's position may jump so far in one flight; references move along with it."""
+    """Largest sum of position jumps of the estimator in a flight. References move along."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
-    """The same of its heading; the thrust axis may jump half as far."""
+    """Largest sum of heading jumps; half of it for the thrust axis."""
     max_resets: Annotated[int, Field(ge=0, le=30)] = 3
-    """The estimator may be reset so often within 30 s."""
+    """Largest number of estimator resets within 30 s."""
     reset_action: Ending = "land"
-    """More or larger resets."""
+    """Action on more or larger resets."""
     tilt_margin_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 20.0
-    """So far beyond limits.max_tilt_deg the vehicle may tilt for a moment."""
+    """Tilt beyond limits.max_tilt_deg that is tolerated for a moment."""
     max_body_rate_deg_s: Annotated[float, Field(ge=10.0, le=1800.0)] = 400.0
-    """Faster turning means that nobody controls it."""
+    """Largest body rate; a faster rotation counts as loss of control."""
     envelope_action: Ending = "hand_back"
-    """Beyond that tilt or that body rate."""
+    """Action beyond that tilt or that body rate."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=60.0)] = 15.0
     """Largest speed in any direction."""
     speed_action: Any = "hold"
-    """Faster than that for 0.3 s."""
+    """Action if it is faster for 0.3 s."""
     max_tracking_error_m: Annotated[float, Field(ge=0.05, le=100.0)] = 5.0
-    """Largest distance from the reference; after open-loop steps, once it is back there."""
+    """Largest distance from the reference. After open-loop steps it counts once the vehicle is
+    back."""
     tracking_action: Any = "hold"
-    """Farther than that for 1 s."""
+    """Action if it is farther for 1 s."""
     thrust_action: Any = "hold"
-    """Thrust at limits.min_thrust or limits.max_thrust for 2 s."""
+    """Action if thrust stays at limits.min_thrust or limits.max_thrust for 2 s."""
     max_loss: MonitoredShare = 0.4
-    """Share of the vehicle's frames that may get lost, over a second."""
+    """Largest share of lost frames over a second."""
     max_round_trip_ms: Annotated[float, Field(ge=1.0, le=2000.0)] = 150.0
-    """Longest way through the link and back."""
+    """Longest round trip of the link."""
     link_action: Any = "warn"
-    """More lost for 2 s, or a longer way for 5 s."""
+    """Action if more frames are lost for 2 s, or the round trip is longer for 5 s."""
     max_missed: MonitoredShare = 0.25
-    """Share of the answers that may miss deadman.deadline_ms, over a second."""
+    """Largest share of setpoints that miss deadman.deadline_ms, over a second."""
     max_starved: MonitoredShare = 0.5
-    """Share of a second by which our own timer may be late: the computer gives us no time."""
+    """CPU starvation: largest share of a second by which our own timer may be late."""
     computer_action: Any = "hand_back"
-    """More of either for 1.5 s."""
+    """Action if either is exceeded for 1.5 s."""
 
     max_reset_angle = Si("max_reset_deg")
     tilt_margin = Si("tilt_margin_deg")

@@ -49,7 +49,7 @@ class HoverShape(Section):
     """Stay where it begins."""
 
     duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
-    """How long."""
+    """Duration."""
 
     def trajectory(self, folder: Path) -> Trajectory:
         """What it describes."""

@@ -43,37 +43,35 @@ class AxisKeys(NamedTuple):
 
 
 class VehicleConfig(Section):
-    """How the vehicle's own rate loop answers; `model-following` plans with it."""
+    """Response of the vehicle's rate loop, which `model-following` plans with."""
 
     lag_ms: Milliseconds | None = None
-    """Time constant of the roll rate after its dead time; of a second order, 2·damping/frequency:
-    in either, how late the rate is on average."""
+    """Time constant of the roll rate after its dead time. For a second-order response it is
+    2·damping/frequency."""
     dead_time_ms: Milliseconds | None = None
-    """From an attitude sample to the first effect of its answer on the roll rate."""
+    """Time from an attitude sample to the first effect of its setpoint on the roll rate."""
     acceleration_limit_deg_s2: AccelerationLimit | None = None
-    """The autopilot changes the roll rate it aims at no faster (ArduPilot); null: it does not limit
-    this (PX4)."""
+    """Slew limit of the autopilot's roll rate target (ArduPilot). null: none (PX4)."""
     damping: Damping | None = None
-    """Damping ratio of the roll rate where its response is of second order; null: first order."""
+    """Damping ratio of a second-order roll rate response. null: first order."""
     pitch_lag_ms: Milliseconds | None = None
-    """The same time constant for pitch; null: that of roll."""
+    """As lag_ms, for pitch. null: as roll."""
     pitch_dead_time_ms: Milliseconds | None = None
-    """The same dead time for pitch; null: that of roll."""
+    """As dead_time_ms, for pitch. null: as roll."""
     pitch_acceleration_limit_deg_s2: AccelerationLimit | None = None
-    """The same limit for pitch; null: that of roll."""
+    """As acceleration_limit_deg_s2, for pitch. null: as roll."""
     pitch_damping: Damping | None = None
-    """The same damping ratio for pitch; null: first order, or that of roll with roll's lag."""
+    """As damping, for pitch. null: as roll where pitch_lag_ms is null, else first order."""
     yaw_lag_ms: Milliseconds | None = None
-    """The same time constant for yaw; null: that of roll."""
+    """As lag_ms, for yaw. null: as roll."""
     yaw_dead_time_ms: Milliseconds | None = None
-    """The same dead time for yaw; null: that of roll."""
+    """As dead_time_ms, for yaw. null: as roll."""
     yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
-    """The same limit for yaw; null: that of roll."""
+    """As acceleration_limit_deg_s2, for yaw. null: as roll."""
     yaw_frame_lead_ms: Milliseconds | None = None
-    """By how long the axes along which the autopilot takes our rates turn before the body does, in
-    yaw more than in tilt: ArduPilot's attitude target. Used while ATTITUDE_TARGET does not tell
-    where they stand. null: as the times above say where acceleration is limited (ArduPilot), else
-    0: they are the body's own (PX4)."""
+    """Time by which the axes of the commanded rates lead the body in yaw. ArduPilot applies rates
+    along its attitude target, which leads the body. Used only while ATTITUDE_TARGET is missing.
+    null: derived from the times above if there is a slew limit (ArduPilot), else 0 (PX4)."""
 
     @property
     def known(self) -> bool:
@@ -117,27 +115,28 @@ class VehicleConfig(Section):
 
 
 class ThrustConfig(Section):
-    """From specific thrust in m/s² to the 0..1 that MAVLink carries."""
+    """Conversion of specific thrust in m/s² to the normalised thrust 0..1 of MAVLink."""
 
     hover_thrust: Annotated[float, Field(gt=0.05, lt=0.95)] = 0.5
     """Normalised thrust at which the vehicle hovers (PX4: MPC_THR_HOVER, ArduPilot:
     MOT_THST_HOVER)."""
     correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
-    """By which share flight may correct hover_thrust at most: up to 1.8 times, down to 1/1.8."""
+    """Largest correction of hover_thrust in flight: with 0.8 up to 1.8 times, down to 1/1.8."""
     correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
-    """Time constant with which flight follows a slow change; what is wrong at first is put right at
+    """Time constant with which the correction follows a slow change. An initial error is
+    corrected at
     once."""
     curve_factor: Share = 0.0
-    """f in thrust = f·u² + (1 − f)·u; 0 where the autopilot makes up for the curve itself, by an f
-    of its own (PX4: THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
+    """f in thrust = f·u² + (1 − f)·u. 0 where the autopilot linearises the thrust itself (PX4:
+    THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
     battery_exponent: Annotated[float, Field(ge=0.0, le=3.0)] = 2.0
-    """Thrust goes with the battery's voltage to this power; 0: the autopilot sees to it, or its
-    voltage means nothing."""
+    """Thrust is proportional to the battery voltage to this power. 0: the autopilot compensates the
+    voltage, or does not measure it."""
     lag_ms: Milliseconds | None = None
-    """Time constant of the rotors' thrust, which is then led; null: not known."""
+    """Time constant of the rotors' thrust, which guidance compensates. null: unknown."""
     autopilot_compensates_tilt: StrictBool = False
-    """Whether it divides thrust by cos(tilt) itself, so that we must not (ArduPilot:
-    ATC_ANGLE_BOOST; PX4 does not)."""
+    """Whether the autopilot divides thrust by cos(tilt) itself (ArduPilot: ATC_ANGLE_BOOST). PX4
+    does not."""
 
     @property
     def lag(self) -> float:

@@ -1,16 +1,15 @@
-"""Jumps of the autopilot's estimate: the vehicle did not move, so what it is to do moves along.
+"""Resets of the autopilot's estimator: the estimate jumps while the vehicle does not move.
 
-A jump is what neither the body rates nor the velocity explain between two samples (PX4's estimator
-resets position and heading when it no longer believes them, and counts it in ODOMETRY's
-`reset_counter`, which comes later and tells of no size). What is anchored to the estimate goes on
-in a frame without jumps:
+A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets
+position and heading when it rejects them, and counts resets in ODOMETRY's `reset_counter`, which
+comes later and has no size. Guidance and control work in a frame without these jumps:
 
-- positions are given on with all jumps taken out;
-- headings of poses, references and targets are those without jumps: an attitude is turned back by
-  all jumps before its heading is compared with them.
+- All position jumps are subtracted from a position.
+- Poses, references and targets have headings without jumps. An attitude is turned back by all
+  heading jumps before its heading is compared with them.
 
-Horizontal accelerations are left in the frame of the estimate, in which position is measured: a
-heading that was put right serves them at once.
+Horizontal accelerations stay in the estimator's frame, in which position is measured: they profit
+from a corrected heading at once.
 """
 
 from collections import deque
@@ -18,34 +17,32 @@ from math import asin, atan2, cos, hypot, radians, sin, sqrt
 
 from companion.attitude import BodyRates, Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned
-from companion.guidance.horizontal import rotated
-from companion.guidance.reference import Vector
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.guidance.reference import Vector, rotated
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
-"""Between two attitudes, s: further apart the rates say too little of what happened between."""
+"""Attitudes further apart than this are not compared, s: the rates between them are unknown."""
 _ANGLE = radians(4.0)
-"""Smaller jumps of the attitude are followed: it costs less than to tell them from noise."""
+"""Smaller attitude jumps are not separated from noise; the controller follows them, rad."""
 _DISTANCE = 0.2
-"""The same of the position, m."""
-_LONGEST_WAY = 0.5
-"""Between two positions, s."""
+"""Smaller position jumps are not separated from noise, m."""
+_LONGEST_POSITIONS = 0.5
+"""Positions further apart than this are not compared, s."""
 _ACCELERATION_CHANGE = 10.0
-"""Within the time between two positions, m/s²."""
+"""Largest change of the acceleration between two positions, m/s²."""
 _ONE_RESET = 0.5
-"""What jumps within so long, s, does so at one reset; the counter comes at 10 Hz."""
+"""Jumps within this time belong to one reset, s; the counter comes at 10 Hz."""
 
 
 class EstimatorResets:
     """Finds the jumps, adds them up and counts them.
 
     Attributes:
-        turn: sum of the jumps in heading, rad.
-        shift: sum of the jumps in position, m NED.
-        largest_tilt: largest jump of the thrust axis, rad; no reference can make up for it.
+        turn: sum of the heading jumps, rad.
+        shift: sum of the position jumps, m NED.
+        largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
-        times: when the latest resets were, s on our clock.
+        times: times of the latest resets, s on our clock.
     """
 
     def __init__(self) -> None:
@@ -58,7 +55,7 @@ class EstimatorResets:
         self._counter: int | None = None
 
     def on_attitude(self, sample: AttitudeSample) -> bool:
-        """Compare a sample that is newer than the last; whether the thrust axis jumped."""
+        """Compare a newer sample with the last one; returns whether the thrust axis jumped."""
         if not is_unit(sample.q):
             return False
         before, self.newest = self.newest, sample
@@ -67,9 +64,9 @@ class EstimatorResets:
         dt = sample.vehicle_time - before.vehicle_time
         if not 0.0 < dt <= _LONGEST:
             return False
-        yaw, tilt, unsure = _attitude_jump(before, sample, dt)
-        jumped = tilt > unsure
-        if abs(yaw) > unsure:
+        yaw, tilt, threshold = _attitude_jump(before, sample, dt)
+        jumped = tilt > threshold
+        if abs(yaw) > threshold:
             self.turn = short_way(self.turn + yaw)
         elif not jumped:
             return False
@@ -78,24 +75,24 @@ class EstimatorResets:
         return jumped
 
     def without_jumps(self, position: LocalPosition) -> LocalPosition:
-        """The position in the frame without jumps; finds the jump of one that is new."""
+        """The position in the frame without jumps; a new position is first checked for a jump."""
         before, self._raw = self._raw, position
         if before is not None:
-            self._find_way(before, position)
+            self._find_position_jump(before, position)
         return position._replace(position_ned=_less(position.position_ned, self.shift))
 
     def forget(self) -> None:
-        """Nothing is anchored to the estimate yet, as on the ground: what it says now is true."""
+        """Start the frame without jumps at the present estimate, as on the ground."""
         self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
 
     def on_counter(self, counter: int | None, now: float) -> None:
-        """Take ODOMETRY's `reset_counter`: it also tells of resets too small to be found."""
+        """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
         if counter is not None and self._counter not in (None, counter):
             self._count(now)
         self._counter = counter
 
     def attitude(self, q: Quaternion) -> Quaternion:
-        """The attitude as it would be without the jumps in heading."""
+        """The attitude without the heading jumps."""
         if self.turn == 0.0:
             return q
         c, s = cos(0.5 * self.turn), -sin(0.5 * self.turn)
@@ -103,15 +100,15 @@ class EstimatorResets:
         return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
 
     def target(self, target: Target, turn: float) -> Target:
-        """A target without the jumps; it was made when their sum was `turn`, rad."""
+        """A target in the frame without jumps; `turn` is `self.turn` when it was made, rad."""
         if turn == 0.0:
             return target
         north, east = rotated(target.north, target.east, -turn)
         return target._replace(north=north, east=east)
 
-    def _find_way(self, before: LocalPosition, position: LocalPosition) -> None:
+    def _find_position_jump(self, before: LocalPosition, position: LocalPosition) -> None:
         dt = position.vehicle_time - before.vehicle_time
-        if not 0.0 < dt <= _LONGEST_WAY:
+        if not 0.0 < dt <= _LONGEST_POSITIONS:
             return
         jump = [
             new - old - 0.5 * dt * (v_old + v_new)
@@ -136,12 +133,12 @@ class EstimatorResets:
 def _attitude_jump(
     before: AttitudeSample, now: AttitudeSample, dt: float
 ) -> tuple[float, float, float]:
-    """Jump in heading and of the thrust axis, and how large both may seem without one; rad."""
+    """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
     old, new = before.body_rates, now.body_rates
     mean = BodyRates(*(0.5 * (a + b) for a, b in zip(old, new, strict=True)))
     w, x, y, z = turned(before.q, mean, dt)
     a, b, c, d = now.q
-    # now ⊗ foreseen⁻¹: the rotation, about axes of the world, that nothing explains.
+    # now ⊗ predicted⁻¹: the unexplained rotation, about world axes.
     r_w = a * w + b * x + c * y + d * z
     r_x = -a * x + b * w - c * z + d * y
     r_y = -a * y + b * z + c * w - d * x

@@ -1,31 +1,31 @@
-"""Whether the vehicle stands on the ground: by more than the autopilot's flag."""
+"""Whether the vehicle stands on the ground, judged by more than the autopilot's flag."""
 
 from collections.abc import Callable
 
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
 _STILL = 0.5
-"""Vertical speed that may be read on the ground, m/s."""
+"""Largest vertical speed estimated while the vehicle stands, m/s."""
 _LIFTED = 1.0
-"""A climb of this much since take-off was commanded leaves the ground, m."""
+"""A vehicle that climbed higher since the take-off command has left the ground, m."""
 _SPEED_LASTS = 0.5
-"""An older vertical speed says nothing, s."""
+"""An older vertical speed is ignored, s."""
 _SETTLED = 0.5
-"""The flag must say so for this long after a landing, s."""
+"""The landed flag must be set for this long after a landing, s."""
 
 
 class GroundContact:
-    """Weighs EXTENDED_SYS_STATE against height, vertical speed and what we commanded.
+    """Compares EXTENDED_SYS_STATE with height, vertical speed and our own commands.
 
-    One wrong "on ground" in flight must not stop the motors, and a vehicle of which flag and
-    height disagree is neither treated as standing nor as flying.
+    One wrong "on ground" in flight must not stop the motors. A vehicle whose flag and height
+    disagree counts neither as standing nor as flying.
 
     Attributes:
-        takeoff_commanded: whether a take-off was commanded in this flight. It stays so: from then
-            on no setpoint may be an idle one.
+        takeoff_commanded: whether a take-off was commanded in this flight; after that no setpoint
+            may be idle.
 
     Args:
-        state: what the vehicle tells.
+        state: the vehicle's telemetry.
         clock: ours, s.
     """
 
@@ -37,12 +37,12 @@ class GroundContact:
         self._landed_since: float | None = None
 
     def command_takeoff(self) -> None:
-        """A take-off is about to be commanded."""
+        """Note that a take-off is about to be commanded."""
         self.takeoff_commanded = True
         self._start_height = self._state.height
 
     def look(self) -> None:
-        """Remember what the newest telemetry says; called at every look of the watch."""
+        """Take the newest telemetry; the watch calls this 50 times a second."""
         state = self._state
         if not state.landed:
             self._landed_since = None
@@ -53,18 +53,18 @@ class GroundContact:
 
     @property
     def may_idle(self) -> bool:
-        """Whether thrust 0 is right: it stands, by every account, and no take-off was commanded."""
+        """Whether zero thrust is safe: it stands by all signs and no take-off was commanded."""
         return self.standing and not self.takeoff_commanded and self._plausible()
 
     @property
     def standing(self) -> bool:
-        """Whether it says that it stands on the ground, and never left it in this flight."""
-        rises = self.takeoff_commanded and self._vertical_speed() < -_STILL
-        return self._state.landed and not self._left and not rises
+        """Whether the flag says landed and the vehicle never left the ground in this flight."""
+        rising = self.takeoff_commanded and self._vertical_speed() < -_STILL
+        return self._state.landed and not self._left and not rising
 
     @property
     def touched_down(self) -> bool:
-        """Whether it stands again: told for a while, and without vertical speed."""
+        """Whether it has landed: the flag is set for a while and the vertical speed is small."""
         since = self._landed_since
         if not self._state.landed or since is None or self._clock() - since < _SETTLED:
             return False
@@ -80,7 +80,7 @@ class GroundContact:
         return height is not None and start is not None and height - start > _LIFTED
 
     def _vertical_speed(self) -> float:
-        """Downwards, m/s; 0 where it is not told any more."""
+        """Vertical speed downwards, m/s; 0 where it is not received any more."""
         position = self._state.position
         if position is None or self._clock() - position.received > _SPEED_LASTS:
             return 0.0

@@ -1,27 +1,28 @@
-"""What the hover thrust is learned from: motion, whose thrust it was, and the voltage."""
+"""Learns the hover thrust from the motion, the thrust that was flown, and the voltage."""
 
-from companion.attitude import Quaternion
+from math import sin
+
+from companion.attitude import Quaternion, Target
 from companion.guidance import GRAVITY, HoverThrust
+from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt
 from companion.vehicle.state import VehicleState
 
 _CLEAR = 1.0
-"""Height above home from which the ground neither carries the vehicle nor helps its rotors, m."""
+"""Above this height over home there is neither ground contact nor ground effect, m."""
 
 _THRUST_STALE = 0.3
-"""The autopilot tells its thrust at 10 Hz; what is older was not what it flew by, s."""
+"""An older ATTITUDE_TARGET does not tell the present thrust, s; it is sent at 10 Hz."""
 
-
-_WORTH_TELLING = 0.15
-"""A configured hover thrust that is off by a larger share of itself is told."""
+_MISMATCH = 0.15
+"""A larger relative error of the configured hover thrust is reported."""
 
 
 class HoverLearning:
-    """Feeds the hover thrust with telemetry, before we are in control, too.
+    """Feeds the hover-thrust estimate with telemetry, before and during our control.
 
-    While the autopilot itself climbs and holds, ATTITUDE_TARGET tells the thrust it does this with.
-    So what the configuration says is put right before the vehicle hangs on it. After our control
-    nothing is learned any more.
+    While the autopilot climbs and holds by itself, ATTITUDE_TARGET reports its thrust. So a wrong
+    configured hover thrust is corrected before the takeover. After our control nothing is learned.
     """
 
     def __init__(self, hover_thrust: HoverThrust, state: VehicleState) -> None:
@@ -31,24 +32,30 @@ class HoverLearning:
 
     @property
     def thrust_limits(self) -> tuple[float, float]:
-        """Smallest and largest specific thrust there is, as far as is known, m/s²."""
+        """Smallest and largest available specific thrust, as far as known, m/s²."""
         return self._hover_thrust.smallest, self._hover_thrust.largest
 
     @property
     def hover(self) -> float:
-        """Normalised thrust at hover, as far as is known."""
+        """Normalised thrust at hover, as learned so far, 0..1."""
         return self._hover_thrust.learned
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
-        """Largest tilt at which the thrust there is still gives a vertical acceleration, rad."""
+        """Largest tilt at which full thrust still gives `acceleration_down` (m/s²), rad."""
         return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted)
 
+    def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
+        """The target with its tilt limited to `largest_tilt`."""
+        most = sin(self.largest_tilt(acceleration_down))
+        north, east = limited(target.north, target.east, most)
+        return target._replace(north=north, east=east)
+
     def stand(self) -> None:
-        """The vehicle stands on the ground."""
+        """Note that the vehicle stands on the ground."""
         self._hover_thrust.stand()
 
     def pause(self) -> None:
-        """Nothing can be learned just now."""
+        """Stop learning until the next `step`."""
         self._hover_thrust.pause()
 
     def step(self, now: float, q: Quaternion, *, offboard_active: bool, steady: bool) -> None:
@@ -58,14 +65,16 @@ class HoverLearning:
             now: s on our clock.
             q: newest attitude.
             offboard_active: whether the autopilot obeys our setpoints.
-            steady: whether our thrust is steady; the rotors run after one that is not.
+            steady: whether our thrust is steady; the rotors lag behind a changing one.
         """
         battery, position = self._state.battery, self._state.position
         if battery is not None:
             self._hover_thrust.note_voltage(battery.received, battery.voltage_v)
         self._had_control = self._had_control or offboard_active
         learns = (
-            steady if offboard_active else not self._had_control and self._note_autopilots(now, q)
+            steady
+            if offboard_active
+            else not self._had_control and self._note_autopilot_thrust(now, q)
         )
         if learns and position is not None:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
@@ -73,17 +82,17 @@ class HoverLearning:
             self._hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
-        """In words, where the vehicle hovered at another thrust than the configuration says."""
+        """The advice to set thrust.hover_thrust, where the learned one differs; else None."""
         configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
-        if not self._had_control or abs(learned - configured) <= _WORTH_TELLING * configured:
+        if not self._had_control or abs(learned - configured) <= _MISMATCH * configured:
             return None
         return (
-            f"the vehicle hovers at a thrust of {learned:.2f}, and thrust.hover_thrust says "
+            f"the vehicle hovers at a thrust of {learned:.2f}, but thrust.hover_thrust is "
             f"{configured:.2f}; set it to {learned:.2f}"
         )
 
-    def _note_autopilots(self, now: float, q: Quaternion) -> bool:
-        """Note the thrust that the autopilot flies by; False if it is not known or not flown by."""
+    def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
+        """Note the autopilot's own thrust; False if it is unknown or the vehicle does not fly."""
         told, height = self._state.attitude_target_thrust, self._state.height
         if told is None or now - told.received > _THRUST_STALE:
             return False

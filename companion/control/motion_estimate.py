@@ -1,38 +1,37 @@
-"""What guidance knows of the motion: measured positions, carried on by the measured attitude."""
+"""Estimates the motion: measured positions, propagated by the measured attitude."""
 
 from collections.abc import Callable
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY, DragEstimate, GuidanceInput, MotionObserver, VehicleMotion
-from companion.guidance.horizontal import Horizontal
+from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
-from companion.guidance.slope_history import SlopeHistory
+from companion.guidance.reference import Horizontal
 from companion.nmpc import Vehicle
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COSINE = 0.2
-"""Of the tilt; beyond 78° the thrust is not what height hold asked for."""
+"""Lower limit for the cosine of the tilt: beyond 78° the thrust does not hold the height."""
 _LONGEST = 0.2
-"""Between two positions, s: further apart they say nothing of what happened between."""
-_WORTH_TELLING = 0.15
-"""By so much the drag must be off to be told, 1/s."""
+"""Positions further apart than this do not give the acceleration between them, s."""
+_MISMATCH = 0.15
+"""A larger error of the assumed drag is reported, 1/s."""
 
 
 class MotionEstimate:
-    """Feeds the observer, on the vehicle's clock; and says how the motion goes on.
+    """Feeds the motion observer on the vehicle's clock, and predicts the motion.
 
     Attributes:
-        vertical: upward part of the specific thrust that is asked for, m/s².
-        drag: its estimate.
+        vertical: upward part of the commanded specific thrust, m/s².
+        drag: the drag estimate.
 
     Args:
         observer: of position, velocity and disturbance.
         correction: of the measured positions.
         drag: of the vehicle.
-        offset: the vehicle's clock minus ours, s, None before the first attitude: it tells how old
-            a position was when it came.
+        offset: returns the vehicle's clock minus ours, s, or None before the first attitude. It
+            tells how old a position was when it arrived.
     """
 
     def __init__(
@@ -54,14 +53,14 @@ class MotionEstimate:
         self._turn = 0.0
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Take an attitude; it tells where the thrust points."""
+        """Take an attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
-        """The estimate's jumps in heading come to `turn`, rad; attitudes before are not counted."""
+        """Take the sum of the heading resets, rad; a new one discards the attitudes before it."""
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
             self._slopes.forget()
@@ -71,7 +70,7 @@ class MotionEstimate:
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; the same one twice counts once.
 
-        Drag is learned only while the autopilot obeys, since only then our thrust is known.
+        Drag is learned only while the autopilot obeys us, because only then we know the thrust.
         """
         before, self._position = self._position, position
         if before is not None and position.vehicle_time == before.vehicle_time:
@@ -86,15 +85,15 @@ class MotionEstimate:
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 
-    def situation(
+    def guidance_input(
         self, now: float, ahead: float, thrust_limits: tuple[float, float]
     ) -> GuidanceInput:
-        """The vehicle now (s on our clock), and `ahead` seconds later.
+        """The motion at `now` and `ahead` seconds later, with thrust, disturbance and drag.
 
         Args:
             now: s on our clock.
-            ahead: s.
-            thrust_limits: smallest and largest specific thrust there is, m/s².
+            ahead: prediction time, s.
+            thrust_limits: smallest and largest available specific thrust, m/s².
 
         Raises:
             RuntimeError: no position came yet.
@@ -112,31 +111,31 @@ class MotionEstimate:
         disturbance, drag = self._observer.disturbance, self.drag.drag
         return GuidanceInput(motion, later, thrust, disturbance, drag, thrust_limits)
 
-    def vehicle(self, now: float, situation: GuidanceInput) -> Vehicle:
-        """The same, as predictive control takes it; its time is `now`, s on our clock."""
+    def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
+        """`inputs` with attitude and rates, for predictive control; `now` is s on our clock."""
         return Vehicle(
             now,
-            situation.now.position_ned,
-            situation.now.velocity_ned,
+            inputs.now.position_ned,
+            inputs.now.velocity_ned,
             self._q,
             self._body_rates,
-            (*situation.disturbance, 0.0),
-            situation.drag,
+            (*inputs.disturbance, 0.0),
+            inputs.drag,
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """Our time `now` as the vehicle's, s."""
+        """`now` (s on our clock) on the vehicle's clock, s."""
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)
 
     def mismatch_warning(self) -> str | None:
-        """In words, where the drag is another than the configuration says."""
+        """The advice to set the drag keys, where the learned drag differs; else None."""
         told, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
         off = learned.per_velocity(speed) - told.per_velocity(speed)
-        if not self.drag.certain or abs(off) <= _WORTH_TELLING:
+        if not self.drag.certain or abs(off) <= _MISMATCH:
             return None
         return (
-            f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, and "
+            f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, but "
             f"{told.per_velocity(speed):.2f} was assumed; set guidance.drag_per_s to "
             f"{learned.linear:.2f} and guidance.quadratic_drag_per_m to {learned.quadratic:.3f}"
         )
@@ -147,7 +146,7 @@ class MotionEstimate:
             return
         old, new = before.velocity_ned, now.velocity_ned
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
-        # Of the thrust that there was, not of the one asked for.
+        # By the measured acceleration: the thrust that was there, not the commanded one.
         vertical = GRAVITY - down
         self.drag.observe(
             dt,
@@ -156,6 +155,6 @@ class MotionEstimate:
         )
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
-        """Horizontal acceleration by thrust and drag, m/s²."""
+        """Horizontal acceleration due to thrust and drag, m/s²."""
         slowed = self.drag.drag.deceleration(motion.velocity_ned)
         return self.vertical * slope[0] - slowed[0], self.vertical * slope[1] - slowed[1]

@@ -1,12 +1,17 @@
-"""The outer loop put together from the configuration."""
+"""The outer loop from the configuration: guidance, motion estimate and predictive control."""
 
 from collections.abc import Callable
 from math import tan
 
-from companion.attitude.planner import MODEL_FOLLOWING
-from companion.attitude.reference_model import model_lag, model_response
+from companion.attitude.reference_model import model_lag
 from companion.config import Config
 from companion.config.known_drag import drag_prior
+from companion.control.inner_loop import (
+    heading_response,
+    slower_tilt,
+    thrust_limits,
+    tilt_response,
+)
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.files.yaml_file import ConfigError
@@ -15,7 +20,6 @@ from companion.guidance import (
     IMMEDIATE,
     DragEstimate,
     HeightGains,
-    InnerResponse,
     LinearGuidance,
     LinearSettings,
     MotionObserver,
@@ -28,67 +32,34 @@ from companion.guidance.position_correction import CorrectionSettings, PositionC
 from companion.nmpc import Settings, Solver
 
 _CALM = Weights(position=1.0, velocity=1.5)
-_LOCKSTEP_DEADLINE = 1.0
-"""The vehicle waits for the answer, s of wall time."""
+"""Weights of the hold between doublets: its own commands must not disturb the identification."""
 _CALM_BANDWIDTH = 1.0
-"""Of the hold between doublets, rad/s: what they tell must not drown in the hold's own commands."""
+"""Disturbance bandwidth of the same hold, rad/s."""
+_LOCKSTEP_DEADLINE = 1.0
+"""Deadline of the solver in lockstep, where the vehicle waits, s of wall time."""
 _USUAL_RATE_LOOP = 0.12
-"""Lag and dead time of a rate loop that nobody identified, s: a heavy vehicle's."""
+"""Lag and dead time of a heavy vehicle's rate loop, used where no response is identified, s."""
 _QUICK, _SLOW = 0.065, 0.08
-"""Up to the first dead time with half the lag, s, the hold is stiffer; from the second on not."""
+"""Dead time plus half the lag: up to _QUICK the hold is stiffer, from _SLOW on it is not, s."""
 _POSITION_TIME = 0.1
-"""With which the position follows the measured one, s."""
+"""Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
-"""How much a position tells of the velocity, 1/s, behind a slow and behind a quick rate loop: the
-velocities of real estimators are off by 0.05 m/s for seconds, measured on PX4 and ArduPilot against
-truth."""
+"""Gain from the position error to the velocity behind a slow and a quick rate loop, 1/s. Velocities
+of real estimators are off by 0.05 m/s for seconds (measured on PX4 and ArduPilot against truth)."""
 _CORRECTS_WITHIN = 0.65
-"""Measured on PX4's and ArduPilot's estimators, which correct their positions this slowly, s."""
+"""Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_WINDOW = 0.1
-"""Over which their corrections are averaged, twice, s."""
+"""These corrections are averaged twice over this time, s."""
 _LARGEST_CORRECTION = 0.2
-"""Of what they still have to correct, m: the noise of a bad GPS must not move the vehicle."""
-
-
-def tilt_response(config: Config) -> InnerResponse:
-    """How the coefficients answer their targets: the planner behind the vehicle's rate loop."""
-    gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
-    follows = config.planner_name == MODEL_FOLLOWING
-    if follows:
-        gain, lag = model_response(gain, model_lag(gain, lag))
-    return InnerResponse(gain, lag, dead_time, follows)
-
-
-def slower_tilt(config: Config) -> tuple[float, float]:
-    """Lag and dead time of roll or pitch, whichever is longer, s; 0 where it is not known.
-
-    The quicker axis waits for the slower one, so that the coefficients answer like this.
-    """
-    axes = config.vehicle.axes
-    tilt = axes["roll"], axes["pitch"]
-    return (
-        max(axis.lag or 0.0 for axis in tilt),
-        max(axis.dead_time or 0.0 for axis in tilt),
-    )
-
-
-def heading_response(config: Config) -> InnerResponse:
-    """How the heading answers its target."""
-    yaw = config.vehicle.axes["yaw"]
-    return InnerResponse(
-        config.planner.yaw_gain_per_s,
-        yaw.lag or 0.0,
-        yaw.dead_time or 0.0,
-        config.planner_name == MODEL_FOLLOWING,
-    )
+"""Largest outstanding correction used, m: the noise of a bad GPS must not move the vehicle."""
 
 
 def hold_weights(config: Config) -> Weights:
-    """The weights of the hold; those that are not told follow from the attitude's delay T.
+    """The weights of the hold; those not configured follow from the delay T of the attitude.
 
-    With 1/T⁴ and 1/T² the hold is as quick as the attitude: poles at 1/T but for the attitude's
-    own. A quick rate loop allows twice the first of them. `tests/control/test_margins.py` shows
-    what may be wrong with T and with the thrust then.
+    The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
+    position weight. `tests/control/test_margins.py` shows the margins against errors of T and of
+    the thrust.
     """
     guidance, delay = config.guidance, hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
@@ -99,7 +70,7 @@ def hold_weights(config: Config) -> Weights:
 
 
 def _quickness(config: Config) -> float:
-    """Of the rate loop: 1 up to `_QUICK`, 0 from `_SLOW` on and where nobody identified it."""
+    """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop."""
     if not config.vehicle.known:
         return 0.0
     lag, dead_time = slower_tilt(config)
@@ -112,24 +83,24 @@ def _position_pull(config: Config) -> float:
 
 
 def disturbance_bandwidth(config: Config) -> float:
-    """How quickly wind is found, rad/s: as is told, or half as quick again as the hold."""
+    """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
     told = config.guidance.disturbance_bandwidth_rad_s
     return 1.5 / hold_delay(config) if told is None else told
 
 
 def hold_delay(config: Config) -> float:
-    """T, s: with a usual rate loop where the vehicle's is not known."""
+    """The delay T of `hold_weights`, s; assumes a usual rate loop where none is identified."""
     delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 
 def _feedback_delay(config: Config) -> float:
-    """Of the attitude, s, and half a period of guidance, for which the feedback is held."""
+    """Delay of the attitude plus half a period of guidance, for which feedback is held, s."""
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
 def linear_guidance(config: Config) -> LinearGuidance:
-    """Linear guidance; in a hover it asks for no more than the tilt limit gives."""
+    """Linear guidance; its horizontal acceleration is limited to that of the tilt limit."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
     drag = drag_prior(config).drag.linear
@@ -157,11 +128,11 @@ def linear_guidance(config: Config) -> LinearGuidance:
 def motion_estimate(
     config: Config, offset: Callable[[], float | None] = lambda: None
 ) -> MotionEstimate:
-    """The observer of the motion, with the drag that is fed forward.
+    """The motion observer with the drag for the feedforward.
 
     Args:
-        config: as it is flown.
-        offset: the vehicle's clock minus ours, s, if it is known.
+        config: of the flight.
+        offset: returns the vehicle's clock minus ours, s, or None.
     """
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
@@ -182,17 +153,11 @@ def motion_estimate(
     )
 
 
-def thrust_limits(config: Config) -> tuple[float, float]:
-    """Smallest and largest specific thrust, as far as the configuration tells, m/s²."""
-    per_thrust = GRAVITY / config.thrust.hover_thrust
-    return config.limits.min_thrust * per_thrust, config.limits.max_thrust * per_thrust
-
-
 def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
     """Predictive control of one trajectory; starts its process.
 
     Raises:
-        ConfigError: the planner's response is too quick for the horizon's steps.
+        ConfigError: the planner's response is too fast for the steps of the horizon.
         MissingExtraError: the solver is not installed.
     """
     settings = predictive_settings(config)
@@ -205,10 +170,10 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
 
 
 def predictive_settings(config: Config) -> Settings:
-    """What predictive control is told of the vehicle.
+    """The settings of predictive control: response and limits of the vehicle.
 
     Raises:
-        ConfigError: the planner's response is too quick for the horizon's steps.
+        ConfigError: the planner's response is too fast for the steps of the horizon.
     """
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     response = tilt_response(config)

@@ -1,4 +1,4 @@
-"""Predictive control beside linear guidance: what it does not answer in time, linear flies."""
+"""Predictive control beside linear guidance, which flies every step that it misses."""
 
 from array import array
 from collections import Counter, deque
@@ -14,19 +14,19 @@ from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
 _LONGEST_START = 30.0
-"""In lockstep the vehicle waits so long for the solver to be warm, s of wall time."""
+"""In lockstep, longest wait for the solver to start, s of wall time."""
 _LONGEST_WAIT = 1.0
-"""In lockstep, for an answer, s of wall time."""
+"""In lockstep, longest wait for an answer, s of wall time."""
 
 
 class Following(NamedTuple):
-    """What is followed just now.
+    """The trajectory that is followed now.
 
     Attributes:
         part: the trajectory as a maneuver.
-        time: since it began, s.
-        pose: where it began.
-        turn: jumps of the estimate's heading, which its headings move along with, rad.
+        time: since the maneuver began, s.
+        pose: where the maneuver began.
+        turn: sum of the heading resets, rad; the solver works in the estimator's own frame.
     """
 
     part: Follow
@@ -37,12 +37,12 @@ class Following(NamedTuple):
 
 @dataclass
 class PredictiveRecord:
-    """What came of it in one flight.
+    """What predictive control did in one flight.
 
     Attributes:
-        flown: answers that were flown.
-        troubles: how many answers were not, by their trouble.
-        seconds: that each flown answer took in the solver's process.
+        flown: number of answers that were flown.
+        troubles: number of answers that were not flown, by cause.
+        seconds: computation time of each flown answer in the solver's process.
     """
 
     flown: int = 0
@@ -51,16 +51,16 @@ class PredictiveRecord:
 
 
 class Predictive:
-    """Asks the solver at each step of guidance for the next one, and flies its answer then.
+    """Requests at each step of guidance the solver's answer for the next step.
 
-    Linear guidance makes its own command at every step: what is late, failed or absurd is passed
-    over without a pause. The first trouble of each kind is told when it happens.
+    Linear guidance makes its own command at every step, so it replaces an answer that is late,
+    failed or implausible without a pause. The first trouble of each kind is reported.
 
     Args:
-        solver: makes the solver's process for a trajectory.
+        solver: starts the solver's process for a trajectory.
         period: of guidance, s.
-        lockstep: wait for the solver as the vehicle does for us.
-        note: takes what happened, in words.
+        lockstep: wait for the solver, as the vehicle waits for us.
+        note: takes messages for the user.
     """
 
     def __init__(
@@ -86,12 +86,12 @@ class Predictive:
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """The answer for now, or what linear guidance says; and ask for the next.
+        """The solver's answer for now, else `linear`; also requests the next answer.
 
         Args:
             linear: target and downward acceleration (m/s²) by linear guidance.
-            vehicle: what is known of it; its time is now.
-            following: None where no trajectory is followed.
+            vehicle: state of the vehicle now.
+            following: the trajectory, or None.
         """
         chosen = linear
         if following is not None:
@@ -109,7 +109,7 @@ class Predictive:
         if self._lockstep:
             self._wait_until_ready()
         answer = self._solver.take(_LONGEST_WAIT if self._lockstep else 0.0)
-        # It is for now, or for a step that guidance has missed.
+        # An answer for a step that guidance has missed is too old.
         if answer is None or abs(answer.time - now) > self._period:
             return None
         return answer
@@ -142,7 +142,10 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """Its thrust's vertical part at its tilt; the tilt there is differs, and height is held."""
+    """The target, and the vertical acceleration of its thrust at the answer's own tilt.
+
+    The present tilt differs, and the thrust map corrects for it to hold the height.
+    """
     cosine = sqrt(max(0.0, 1.0 - answer.north**2 - answer.east**2))
     target = Target(answer.north, answer.east, answer.heading)
     return target, GRAVITY - answer.thrust * cosine

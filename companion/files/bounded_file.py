@@ -1,4 +1,4 @@
-"""Reading a file that a user names: a regular one, and no larger than it may be."""
+"""Reads a file that a user names: a regular file of limited size."""
 
 import os
 import stat
@@ -6,20 +6,20 @@ from pathlib import Path
 
 
 class FileRefusedError(Exception):
-    """A file cannot be taken; the message is the end of a sentence that begins with its name."""
+    """A file cannot be used; the message completes a sentence that begins with its name."""
 
 
 def read_text(path: Path, most: int) -> str:
-    """The text of a regular file in UTF-8, with or without a byte order mark.
+    """Read a regular UTF-8 file, with or without a byte order mark.
 
-    A device or a pipe may never end, or never begin: it is not opened to wait for.
+    Devices and pipes are refused: they may block or never end.
 
     Args:
         path: of the file.
-        most: bytes that it may have.
+        most: largest size, bytes.
 
     Raises:
-        FileRefusedError: it cannot be read, is no regular file, is larger, or is no text.
+        FileRefusedError: the file cannot be read, is not regular, too large, or not text.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)

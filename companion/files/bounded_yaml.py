@@ -77,16 +77,16 @@ def dump(data: dict[str, Any]) -> str:
 
 
 def dump_value(value: Any) -> str:
-    """The same of one value, on one line, as it stands behind a key."""
+    """YAML of one value on one line, as it stands behind a key."""
     text = yaml.dump([value], Dumper=_Dumper, default_flow_style=True, width=inf)
     return str(text).strip()[1:-1]
 
 
 class _Dumper(yaml.SafeDumper):
-    """Puts into quotes what is a number to YAML 1.1 or 1.2, but was a text: 12e5, 0o17."""
+    """Quotes texts that YAML 1.1 or 1.2 would read as numbers: 12e5, 0o17."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """`parse` reads none."""
+        """Write no aliases: `parse` refuses them."""
         return True
 
 
@@ -97,7 +97,7 @@ for _pattern, _tag in ((_INTEGER, "int"), (_FLOAT, "float")):
 
 
 class _Builder:
-    """Makes values of a parser's events; nothing is called recursively, however deep they nest.
+    """Builds values from parser events, without recursion, however deep they nest.
 
     Attributes:
         root: the document so far.
@@ -111,7 +111,7 @@ class _Builder:
         self._documents = 0
 
     def take(self, event: yaml.Event) -> None:
-        """The next event."""
+        """Take the next event."""
         line = event.start_mark.line + 1 if event.start_mark else 1
         match event:
             case yaml.DocumentStartEvent():
@@ -180,7 +180,7 @@ def _scalar(event: yaml.ScalarEvent, line: int) -> Any:
 
 
 def _plain(text: str, line: int) -> Any:
-    """What a value without quotation marks means in YAML 1.2's core schema."""
+    """The meaning of an unquoted value in YAML 1.2's core schema."""
     if text in _WORDS:
         return _WORDS[text]
     whole = _INTEGER.fullmatch(text)

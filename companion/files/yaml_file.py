@@ -18,7 +18,7 @@ _FAULTS_TOLD = 5
 _LONGEST_TOLD = 60
 
 PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
-"""A key that names a file or a folder; `Section` sees to its length."""
+"""A key that names a file or a folder; `Section` checks its length."""
 
 
 def is_path(text: str) -> bool:
@@ -27,12 +27,12 @@ def is_path(text: str) -> bool:
 
 
 class Section(BaseModel):
-    """Keys that belong together: immutable, unknown ones refused, every one described.
+    """A section of the configuration: immutable; unknown keys are refused; every key is described.
 
     Attributes:
         former_keys: keys that were renamed or removed, dotted, as the file writes them
             (`section.key`) → what became of them, as the end of a sentence that begins with the
-            key. Only those of the model of the whole file are read.
+            key. Only the table of the file's top level is used.
     """
 
     former_keys: ClassVar[Mapping[str, str]] = {}
@@ -44,7 +44,7 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_boolean_number(cls, value: Any, field: ValidationInfo) -> Any:
-        """`true` counts as 1 to pydantic, and `yes` as true; to YAML 1.2 neither does."""
+        """Refuse booleans as numbers and words as booleans: pydantic would accept both."""
         wanted = bool in _kinds(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, bool) and not wanted:
             raise ValueError("must not be true or false")
@@ -55,7 +55,7 @@ class Section(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
-        """An empty path would be the folder itself, and no path holds a null character."""
+        """Refuse empty paths (they would name the folder itself) and null characters."""
         kinds = _kinds(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, str) and Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
@@ -63,16 +63,16 @@ class Section(BaseModel):
 
 
 def _kinds(annotation: Any) -> set[Any]:
-    """A type and, of a union or an annotated one, those in it."""
+    """A type and the types inside it, for unions and annotated types."""
     return {annotation}.union(*(_kinds(part) for part in get_args(annotation)))
 
 
 class ConfigError(Exception):
-    """What the user configured cannot be used; the message is complete and meant for the user."""
+    """The configuration cannot be used; the message is complete and written for the user."""
 
 
 class UnreadableFileError(ConfigError):
-    """There is no such file, or it is none that could be read."""
+    """The file is missing or cannot be read."""
 
 
 def load(path: Path, model: type[Model]) -> Model:
@@ -122,7 +122,7 @@ def _keys(text: str, name: str, model: type[Section]) -> dict[str, Any]:
 
 
 def _filled(key: Any, value: Any, model: type[Section]) -> Any:
-    """`value`, or an empty section where nothing but the section's name was written."""
+    """The value; an empty section for a section name without keys."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
         return value
@@ -144,7 +144,7 @@ def validated(
         data: keys and values.
         name: of the file.
         model: to check against.
-        sources: the file in which a section, or a key of it, stands, if that is another one.
+        sources: the file of each section or key that stands in another file.
 
     Raises:
         ConfigError: an unknown key or a bad value.
@@ -164,19 +164,19 @@ def validated(
 
 
 def _joined(faults: list[str]) -> str:
-    """The first faults of a file; a thousand of them help nobody."""
+    """The first faults of a file as one sentence, and how many more there are."""
     more = len(faults) - _FAULTS_TOLD
     return "; ".join(faults[:_FAULTS_TOLD]) + (f"; and {more} more" if more > 0 else "")
 
 
 def shortened(value: Any) -> str:
-    """A value as it is told to whoever wrote it."""
+    """A value as an error message shows it."""
     text = repr(value)
     return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
 
 
 def _without_consequences(details: list[Any]) -> list[Any]:
-    """Without "too short" of a list whose only fault is that an item of it was refused."""
+    """Drop "too short" for a list that is short only because an item was refused."""
     places = [detail["loc"] for detail in details]
     return [
         detail

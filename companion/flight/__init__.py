@@ -1,1 +1,1 @@
-"""One flight: its phases, the control loop, the watch over both, and how it ends."""
+"""One flight: its phases, the watch beside them, and its exits."""

@@ -1,31 +1,27 @@
-"""Puts a flight together from the configuration: the one place where YAML's units become SI."""
+"""Assembles a flight from the configuration: link, loops, monitors, watch and phases."""
 
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.attitude import Limits, Planner, make_planner
-from companion.attitude.planner import MODEL_FOLLOWING
 from companion.config import Config
-from companion.config.known_drag import drag_prior
 from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
+from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
-from companion.flight.asking_again import AskingAgain
 from companion.flight.context import FlightContext
-from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
+from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.flight import AskLanding, Flight
-from companion.flight.judgement import Preflight
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
-from companion.flight.same_vehicle import SameVehicle
-from companion.flight.snapshot_builder import SnapshotBuilder
-from companion.flight.vehicle_memory import VehicleMemory
-from companion.flight.watch import Watch
-from companion.guidance import HoverThrust, ManeuverSequence, ThrustSettings
+from companion.flight.preflight_checks import PreflightChecks
+from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
+from companion.flight.watch import RateRequester, Watch
+from companion.guidance import ManeuverSequence
 from companion.guidance.follow import Follow
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
@@ -34,7 +30,7 @@ from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
-from companion.vehicle.inbox import Notice
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 
 
@@ -57,7 +53,7 @@ def link_settings(config: Config) -> LinkSettings:
 
 
 def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
-    """The link that `link.backend` names, not open yet; `tap` and `notice` as of `Link`.
+    """The link of `link.backend`, still closed; `tap` and `notice` as in `Link`.
 
     Raises:
         SigningError: the key cannot be used.
@@ -72,7 +68,7 @@ def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
 
 
 def realtime_wishes(config: Config) -> Wishes:
-    """What to ask of the operating system."""
+    """The real-time settings to request from the operating system."""
     section = config.realtime
     return Wishes(
         fifo_priority=section.priority if section.scheduler == "fifo" else None,
@@ -90,61 +86,9 @@ def _signing(key_file: Path | None) -> Signing | None:
     return Signing(key, file=StampFile(key))
 
 
-def planner(config: Config) -> Planner:
-    """The planner with its limits, and with the vehicle's response if it plans with that."""
-    following = config.planner_name == MODEL_FOLLOWING
-    return make_planner(
-        config.planner_name,
-        gain=config.planner.gain_per_s,
-        yaw_gain=config.planner.yaw_gain_per_s,
-        limits=rate_limits(config),
-        recovery_angle=config.limits.recovery_angle,
-        **(config.vehicle.response if following else {}),
-    )
-
-
-def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
-    """What `vehicle` says of roll, pitch and yaw."""
-    roll, pitch, yaw = (
-        RateLoop(axis.lag, axis.dead_time, axis.acceleration_limit, axis.damping)
-        for axis in config.vehicle.axes.values()
-    )
-    return roll, pitch, yaw
-
-
-def rate_limits(config: Config) -> Limits:
-    """What we never ask of the vehicle, whoever asks."""
-    limits = config.limits
-    return Limits(
-        max_tilt=limits.max_tilt,
-        max_tilt_rate=limits.max_tilt_rate,
-        max_yaw_rate=limits.max_yaw_rate,
-        shape=limits.rate_limit,
-    )
-
-
-def hover_thrust(config: Config) -> HoverThrust:
-    """The map from specific thrust to 0..1."""
-    thrust = config.thrust
-    return HoverThrust(
-        ThrustSettings(
-            hover=thrust.hover_thrust,
-            correction_limit=thrust.correction_limit,
-            correction_time=thrust.correction_time_s,
-            lowest=config.limits.min_thrust,
-            highest=config.limits.max_thrust,
-            curve_factor=thrust.curve_factor,
-            battery_exponent=thrust.battery_exponent,
-            lag=thrust.lag,
-            tilt_compensated=thrust.autopilot_compensates_tilt,
-            drag=drag_prior(config).drag.linear,
-        )
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class Assembled:
-    """A flight ready to run over an open link, and what is read from it afterwards."""
+    """A flight ready to run over an open link, and its figures afterwards."""
 
     flight: Flight
     context: FlightContext
@@ -153,12 +97,12 @@ class Assembled:
     memory: VehicleMemory
 
     def close(self) -> None:
-        """End what runs beside the flight."""
+        """End the process of predictive control."""
         if self.context.guidance_loop.predictive is not None:
             self.context.guidance_loop.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
-        """What came of predictive control; None where it did not fly."""
+        """The figures of predictive control; None where it did not fly."""
         predictive = self.context.guidance_loop.predictive
         if predictive is None:
             return None
@@ -167,15 +111,15 @@ class Assembled:
         return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
 
     def counts(self) -> LoopCounts:
-        """What the control loop counted."""
-        loop = self.context.loop
+        """The counters of the control loop."""
+        record = self.context.loop.record
         return LoopCounts(
-            samples=loop.samples,
-            setpoints=loop.setpoints,
-            missed_deadlines=loop.missed_deadlines,
-            stale=loop.stale,
-            refused=loop.refused,
-            unanswered={reason.value: count for reason, count in loop.unanswered.items()},
+            samples=record.samples,
+            setpoints=record.setpoints,
+            missed_deadlines=record.missed_deadlines,
+            stale=record.stale,
+            refused=record.refused,
+            unanswered={reason.value: count for reason, count in record.unanswered.items()},
             rate_hz=self.context.rate_hz,
         )
 
@@ -188,10 +132,7 @@ def assemble(
     folder: Path,
     maneuvers: ManeuverSequence,
 ) -> Assembled:
-    """Wire the rooms together over an open link, to fly `maneuvers`.
-
-    What is noted in flight waits in `folder`.
-    """
+    """Assemble a flight of `maneuvers` over an open link; its records are written to `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
     thrust = hover_thrust(config)
@@ -229,8 +170,8 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    loop.attitude_target = lambda: link.state.attitude_target
-    preflight = Preflight(config, link, same_vehicle, unbegun(maneuvers))
+    loop.planner.attitude_target = lambda: link.state.attitude_target
+    preflight = PreflightChecks(config, link, same_vehicle, unbegun(maneuvers))
     context = FlightContext(
         config,
         link,
@@ -243,12 +184,12 @@ def assemble(
         same_vehicle,
     )
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
-    asking_again = AskingAgain(link, config.link)
-    watch = Watch(context, ladder, asking_again, clock)
+    rate_requester = RateRequester(link, config.link)
+    watch = Watch(context, ladder, rate_requester, clock)
     loop.ask_mode = watch.ask_mode
     flight = Flight(context, watch, observer, ask_landing)
     ladder.note = context.note = preflight.note = flight.note
-    link.clock.on_event = asking_again.note = flight.note
+    link.clock.on_event = rate_requester.note = flight.note
     drag_is_told = config.guidance.drag is not None
     memory = VehicleMemory(folder.parent, guidance_loop.estimate.drag, drag_is_told, flight.note)
     preflight.meet = memory.meet

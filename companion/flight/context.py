@@ -1,48 +1,48 @@
-"""What every phase and the watch work with."""
+"""The flight context: the parts of one flight that every phase and the watch use."""
 
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 from companion.config import Config
 from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
-from companion.flight.judgement import Preflight
-from companion.flight.same_vehicle import SameVehicle
-from companion.flight.snapshot_builder import SnapshotBuilder
+from companion.flight.preflight_checks import PreflightChecks
+from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
 SLOWEST_HEARTBEAT = 3.0
-"""A mode older than this, s, is not known any more, until it is known how often heartbeats come."""
+"""An older mode is unknown, s; applies until the checks have measured the heartbeat rate."""
 
 _POLL = 0.02
-"""How often a condition is looked at, s; telemetry that changes it is slower."""
+"""Period with which a condition is checked, s; telemetry is slower."""
 
 _BACKLOG = 0.5
-"""What waited to be read while we stood still has been read so long, s, after we go on."""
+"""After a stall the backlog is drained within this time, s."""
 
 _HEARTBEAT = 0.0
-"""Number of the message."""
+"""Message id of HEARTBEAT."""
 
 
 @dataclass(slots=True)
 class FlightContext:
-    """The parts of one flight, and the little that its phases tell each other.
+    """The parts of one flight, and the state that its phases share.
 
     Attributes:
-        detail: what the running phase waits for just now, for the user.
-        rate_hz: setpoints a second while the maneuver was flown.
-        heartbeat_limit: a mode older than this, in s, is not known any more; set by the checks
-            from the rate at which heartbeats really come.
-        mode_at_checks: the mode when the checks were over; another one before arming is somebody's.
-        arm_sent: whether we asked the autopilot to arm.
-        note: writes down and shows that something happened.
+        detail: what the running phase waits for now, shown to the user.
+        rate_hz: rate of setpoints over the maneuvers, Hz.
+        heartbeat_limit: an older mode is unknown, s; the checks set it from the heartbeat rate.
+        mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
+        arm_sent: whether we commanded arming.
+        note: records and shows an event.
     """
 
     config: Config
@@ -52,7 +52,7 @@ class FlightContext:
     snapshot_builder: SnapshotBuilder
     maneuvers: ManeuverSequence
     ground: GroundContact
-    preflight: Preflight
+    preflight: PreflightChecks
     same_vehicle: SameVehicle
     detail: str = ""
     rate_hz: float = 0.0
@@ -62,13 +62,13 @@ class FlightContext:
     note: Callable[[str], None] = lambda _: None
 
     def release(self) -> None:
-        """Stop answering samples: from here on nothing is sent that steers."""
+        """Stop answering samples: from here on no setpoint is sent."""
         self.loop.on = False
         self.loop.offboard_active = self.loop.taking_over = False
         self.guidance_loop.stand_by()
 
     async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
-        """Wait for a condition of the telemetry."""
+        """Wait until `condition` holds; `detail` tells the user what the phase waits for."""
         if detail is not None:
             self.detail = detail
         while not condition():  # noqa: ASYNC110 - telemetry sets no events
@@ -77,9 +77,8 @@ class FlightContext:
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.
 
-        What we read now may have waited long, if we stood still. The answer to a question does not
-        come before what was sent before it was asked, so the next heartbeat after it is fresh; and
-        so is one that comes when all that waited must have been read, should no answer come.
+        After a stall of ours, frames from the backlog look new. So we request a heartbeat: the one
+        after the answer is fresh. Without an answer, one that comes after `_BACKLOG` is fresh.
         """
         loop = asyncio.get_running_loop()
         since = loop.time() + _BACKLOG
@@ -88,7 +87,7 @@ class FlightContext:
         async def ask() -> None:
             nonlocal since
             with suppress(LinkError):
-                for _ in range(2):  # PX4 sends it before its answer, so only the second one counts
+                for _ in range(2):  # PX4 sends it before its answer, so the second one is fresh
                     await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT, retries=0)
                     since = min(since, loop.time())
 
@@ -106,9 +105,17 @@ class FlightContext:
             unsubscribe()
 
     def fresh_position(self) -> LocalPosition | None:
-        """The newest position, unless guidance finds it stale."""
+        """The newest position, or None if it is stale."""
         return self.guidance_loop.fresh_position()
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""
         return self.link.state.armed is True
+
+
+async def cancel(task: asyncio.Task[Any]) -> None:
+    """Cancel a task and wait until it has ended; its result was read elsewhere."""
+    task.cancel()
+    await asyncio.wait({task})
+    if not task.cancelled():
+        task.exception()

@@ -1,38 +1,43 @@
-"""What is done under our control and after it, one coroutine a phase."""
+"""The phases under our control and the endings, one coroutine each."""
 
 import asyncio
 from math import degrees
 
+from companion.flight.commands import (
+    change_mode,
+    command_if_ours,
+    in_role,
+    in_roles,
+    leave_offboard,
+    require_role,
+)
 from companion.flight.context import FlightContext
-from companion.flight.left_in_offboard import leave_offboard
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import change_mode, command_if_ours
-from companion.safety.ending import FlightEnded, internal
+from companion.safety.actions import FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM = 8.0
-"""How long the autopilot may take to disarm itself after landing, s."""
+"""Time allowed for the autopilot to disarm itself after landing, s."""
 
 _LEAST_TILT = 5.0
-"""A vehicle whose thrust allows less, °, cannot be held against a breeze."""
+"""Smallest tilt that the thrust must allow to hold against a breeze, °."""
 
 _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
-    """Fly the maneuver to its end, or until it is given up."""
+    """Fly the maneuvers to their end, or until they are given up."""
     now = asyncio.get_running_loop().time
-    began, sent = now(), context.loop.setpoints
-    thrust = _ThrustForTilt(context)
-    thrust.look()
+    began, sent = now(), context.loop.record.setpoints
+    tilt_margin = _TiltMargin(context)
+    tilt_margin.check()
     context.guidance_loop.follow(context.maneuvers)
 
     def over() -> bool:
         elapsed = now() - began
-        context.rate_hz = (context.loop.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+        context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         if context.guidance_loop.given_up is not None:
             raise FlightEnded(context.guidance_loop.given_up)
-        thrust.look()
+        tilt_margin.check()
         part, _ = context.maneuvers.part_at(elapsed)
         context.detail = f"{part.name}, {elapsed:.0f} of {context.maneuvers.duration:.0f} s flown"
         return context.guidance_loop.finished
@@ -40,18 +45,18 @@ async def maneuvers(context: FlightContext) -> None:
     await context.until(over)
 
 
-class _ThrustForTilt:
-    """Tells when the vehicle's thrust allows less tilt than the configuration does."""
+class _TiltMargin:
+    """Checks that the learned hover thrust leaves thrust for the configured tilt."""
 
     def __init__(self, context: FlightContext) -> None:
         self._context = context
-        self._told = False
+        self._reported = False
 
-    def look(self) -> None:
-        """Tell it once; end the flight where there is no thrust to tilt with at all.
+    def check(self) -> None:
+        """Report a smaller tilt limit once.
 
         Raises:
-            FlightEnded: the hover takes all of the thrust.
+            FlightEnded: hovering takes all of the thrust.
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
         tilt, hover = degrees(learning.largest_tilt()), learning.hover
@@ -60,8 +65,8 @@ class _ThrustForTilt:
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
                 f"{limits.max_thrust:g} leaves nothing to steer with"
             )
-        if tilt < limits.max_tilt_deg and not self._told:
-            self._told = True
+        if tilt < limits.max_tilt_deg and not self._reported:
+            self._reported = True
             self._context.note(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
                 f"{limits.max_thrust:g} holds the height up to {tilt:.0f}° of tilt: no more is "
@@ -70,7 +75,7 @@ class _ThrustForTilt:
 
 
 async def hand_back(context: FlightContext) -> None:
-    """Stop moving, and stream until the autopilot holds by itself."""
+    """Stop the motion, and send setpoints until the autopilot holds by itself."""
     _stop_moving(context)
     context.detail = "the autopilot to hold"
     ours = in_roles(context.link, _OURS)
@@ -81,7 +86,7 @@ async def hand_back(context: FlightContext) -> None:
 
 
 async def land(context: FlightContext) -> None:
-    """Let the autopilot land; if we still steer, until it has taken over."""
+    """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
     _stop_moving(context)
     context.detail = "the autopilot to accept the landing"
 
@@ -103,7 +108,7 @@ async def land(context: FlightContext) -> None:
 
 
 async def disarm(context: FlightContext) -> None:
-    """Wait until the autopilot disarmed itself, or ask it to; leave it fit to be armed again."""
+    """Wait until the autopilot disarms, else command it; leave a mode in which it cannot arm."""
     context.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:
@@ -124,9 +129,9 @@ async def disarm(context: FlightContext) -> None:
 
 
 def _require_landing(context: FlightContext) -> None:
-    """The landing under way is ours until a pilot ends it; disarmed, any mode is.
+    """Release control if the pilot ends the landing; a disarmed vehicle may be in any mode.
 
-    PX4 goes to another mode when it disarms, and tells of that before it tells that it disarmed.
+    PX4 changes its mode when it disarms, and reports the mode before it reports disarmed.
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})
@@ -136,8 +141,8 @@ def _stop_moving(context: FlightContext) -> None:
     if not context.loop.offboard_active:
         return
     try:
-        context.loop.plan_anew()  # the estimator may have jumped
+        context.loop.planner.restart()  # the estimator may have been reset
         context.guidance_loop.hold_here()
-    except Exception as error:  # whatever is wrong with guidance, the autopilot must be asked
+    except Exception as error:  # the exit must go on whatever fails in guidance
         context.note(internal(error))
         context.release()

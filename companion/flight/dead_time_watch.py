@@ -1,4 +1,4 @@
-"""How long the vehicle takes to answer, measured all the time: in flight, and over all of it."""
+"""Measures the dead time of the body rates during the flight and over all of it."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,32 +8,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.config import Config
 from companion.identification import dead_time_by_correlation
 from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
-from companion.safety.ending import internal
+from companion.safety.actions import internal
 
 _PERIOD = 2.0
-"""Between two looks, s. Each is at one axis, so every axis has its turn after three."""
-_LOOKS = 4
-"""A look is at what was flown within so many periods; the first one is a period early."""
+"""Time between two measurements, s; each is of one axis, in turn."""
+_PERIODS = 4
+"""Each measurement is over this number of periods; the first one is a period shorter."""
 _UNSURE = 1.5
-"""So long before the last row the autopilot may have taken over, s: its heartbeat says so later."""
+"""The autopilot may have taken over in this time before the last row without our knowing, s."""
 _LONGEST = 75_000
-"""The measurement at the end is over so many rows at most, the newest: 5 min at 250 Hz."""
+"""Largest number of rows, the newest, in the measurement at the end: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED, _AGE = 2, 6, 9
-"""Columns of `FlightTrace.rates`: where roll, pitch and yaw begin, twice, and the sample's age."""
+"""Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""
 
 
 class RateLoop(NamedTuple):
-    """What the configuration says of how one axis answers body rates; None where it does not.
+    """Configured response of one axis to body rates; None where not configured.
 
     Attributes:
         lag: s.
         dead_time: s.
         acceleration_limit: rad/s².
-        damping: of a lag of second order; None: first order.
+        damping: of a second-order lag; None: first order.
     """
 
     lag: float | None = None
@@ -42,12 +43,21 @@ class RateLoop(NamedTuple):
     damping: float | None = None
 
 
-class DeadTimeWatch:
-    """Compares commands with the rates that follow, and warns once if the configuration is wrong.
+def rate_loops(config: Config) -> tuple[RateLoop, RateLoop, RateLoop]:
+    """The configured responses of roll, pitch and yaw."""
+    roll, pitch, yaw = (
+        RateLoop(axis.lag, axis.dead_time, axis.acceleration_limit, axis.damping)
+        for axis in config.vehicle.axes.values()
+    )
+    return roll, pitch, yaw
 
-    It looks right after an answer has left, when the longest pause until the next sample begins: a
-    look takes about 1 ms (2 to 3 ms behind an acceleration limit), while Python may let what runs
-    in a thread hold up a sample for 5 ms.
+
+class DeadTimeWatch:
+    """Correlates commanded and measured rates, and warns once if the configuration is wrong.
+
+    It measures right after an answer has left, when the pause until the next sample is longest. A
+    measurement takes 1 ms (2 to 3 ms with an acceleration limit); in a thread it could delay a
+    sample by 5 ms.
 
     Args:
         trace: the flight's rows.
@@ -66,34 +76,34 @@ class DeadTimeWatch:
         self._note = note
         self._due = -inf
         self._looks = 0
-        # How many rows there were at each of the latest looks.
-        self._rows = deque([0], maxlen=_LOOKS + 1)
+        # Number of rows at each of the latest measurements.
+        self._rows = deque([0], maxlen=_PERIODS + 1)
         self._suspected: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Look, if it is time to; `now` is our clock, s."""
+        """Measure one axis, if `_PERIOD` is over; `now` in s on our clock."""
         if now < self._due:
             return
         self._due = now + _PERIOD
         try:
             self._look()
-        except Exception as error:  # what only watches must not end a flight
+        except Exception as error:  # a mere measurement must not end a flight
             self._due = inf
-            self._note(f"the dead time is watched no more: {internal(error)}")
+            self._note(f"the dead time is no longer measured: {internal(error)}")
 
     def _look(self) -> None:
         self._rows.append(len(self._trace.rates))
-        if len(self._rows) > _LOOKS:
+        if len(self._rows) > _PERIODS:
             first = self._rows[0]
             name = _AXES[self._looks % len(_AXES)]
             self._looks += 1
             self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:
-        """Measure over all that was flown, and warn if that is still to be done."""
+        """Measure over the whole flight, and warn if no warning was given yet."""
         first = max(0, len(self._trace.rates) - _LONGEST)
         rows = self._trace.rates_rows(first)
         ages = rows[:, _AGE]
@@ -107,7 +117,7 @@ class DeadTimeWatch:
         return measured
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
-        """What the rows say of one axis."""
+        """Measured and configured dead time of one axis."""
         loop, axis = self._rate_loops[name], _AXES.index(name)
         measured = None
         if loop.lag is not None:
@@ -125,7 +135,7 @@ class DeadTimeWatch:
         return AxisDeadTime(measured, loop.dead_time)
 
     def _judge(self, name: str, found: AxisDeadTime) -> None:
-        """Warn at the second look in a row that finds the axis wrong: one may be a gust's doing."""
+        """Warn at the second wrong measurement in a row; a gust may cause a single one."""
         if not found.is_wrong:
             self._suspected.discard(name)
         elif name in self._suspected:

@@ -1,8 +1,8 @@
-"""Whether a maneuver stays inside the fence, judged before the flight by the monitor's own formula.
+"""Checks before the flight that a maneuver stays inside the fence, as the braking monitor will.
 
-`Fence.stop_breach` judges each moment of the reference as the braking monitor will judge the
-vehicle. The vehicle is not exactly on its reference: `MARGIN` is kept for that. So a reference that
-is accepted is not stopped by the monitor, as long as it is followed within the margin.
+`Fence.stop_breach` judges each moment of the reference with the monitor's formula. `MARGIN` allows
+for the tracking error. So the monitor does not stop an accepted reference that is followed within
+the margin.
 """
 
 from dataclasses import dataclass, replace
@@ -15,24 +15,23 @@ from companion.guidance.trajectory.demand import Floats, Motion
 from companion.guidance.trajectory.feasibility import Violation
 
 MARGIN = 0.5
-"""Kept between the reference and the fence, m: for the tracking error, that of the speed included,
-and for the quarter of a metre between two looks."""
+"""Margin between reference and fence, m: for errors of position and speed, and for `_APART`."""
 
 _APART = 0.25
-"""Between two looks at a polygon, m."""
+"""Distance between two checked points of a polygon fence, m."""
 
 _SHOWN = 4000
-"""Moments that are looked at to tell where a breach begins."""
+"""Number of moments checked to find where a breach begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class FenceCheck:
-    """Judges motions that begin where control begins.
+    """Checks motions that begin where control begins.
 
     Attributes:
-        fence: as it is watched in flight.
-        height: of where control begins, above home, m.
-        origin: where control begins, or None: a fence on the map is not judged then.
+        fence: the fence that the monitors watch in flight.
+        height: where control begins, above home, m.
+        origin: where control begins, or None; without it a fence on the map is not checked.
     """
 
     fence: Fence
@@ -40,7 +39,7 @@ class FenceCheck:
     origin: Place | None = None
 
     def __call__(self, motion: Motion) -> Violation | None:
-        """What the motion breaks; slowing it down helps only where braking breaks it."""
+        """The worst violation, or None; slowing down helps only if the braking distance is it."""
         worst = self._worst(motion)
         if worst is None:
             return None
@@ -67,7 +66,7 @@ class FenceCheck:
         return float(time), found
 
     def _candidates(self, stops: Floats) -> list[int]:
-        """Among which moments the worst one is: the farthest, the highest, the lowest."""
+        """Indices that contain the worst moment: farthest, highest, lowest, and along a polygon."""
         distance = np.hypot(stops[:, 0], stops[:, 1])
         found = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
         if self.fence.polygon or (self.fence.places and self.origin):
@@ -86,7 +85,7 @@ class FenceCheck:
         return fence.stop_breach(offset, velocity, self.height - offset[2], self.origin, MARGIN)
 
     def _begins(self, motion: Motion, worst: float) -> float:
-        """When the first breach is, s."""
+        """Time of the first breach, s."""
         stride = max(1, motion.times.size // _SHOWN)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst or self._breach(motion, k) is not None:

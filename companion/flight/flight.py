@@ -1,38 +1,38 @@
-"""One flight from the first heartbeat to the last: runs the phases, and sees to every ending."""
+"""One flight from the first heartbeat to the last: runs the phases and the exit after a failure."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from typing import Any
 
-from companion.flight.context import FlightContext
+from companion.flight.context import FlightContext, cancel
 from companion.flight.observer import Observer
 from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
-from companion.flight.same_vehicle import ChecksVoid
+from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
-from companion.safety.ending import Exit, FlightEnded, internal
+from companion.safety.actions import Exit, FlightEnded, internal
 
-AskLanding = Callable[[], Awaitable[bool]]
+AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
 _WATCH_PERIOD = 0.02
 _TELL_PERIOD = 1.0
-_CHECKED_ANEW = 5
-"""How often a flight may begin anew because another vehicle may have come, before it gives up."""
+_ATTEMPTS = 5
+"""Number of times the checks run, when another vehicle may have come meanwhile."""
 
 
 class Flight:
-    """Runs the phases in order; the first failure ends the flight and decides how it is left.
+    """Runs the phases in order; the first failure ends the flight and selects the exit.
 
     Attributes:
-        phase: the phase it is in.
+        phase: the running phase.
         failed_in: the phase that failed, or None.
-        events: what happened, as (time in s since the flight began, text).
+        events: each as (time in s since the flight began, text).
 
     Args:
-        context: the parts of the flight.
+        context: of the flight.
         watch: judges while the phases run.
-        observer: is told what happens.
-        ask_landing: asked after the user interrupted and the vehicle holds: land it?
+        observer: receives phases and events.
+        ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
     """
 
     def __init__(
@@ -47,16 +47,14 @@ class Flight:
         self._observer = observer
         self._ask_landing = ask_landing
         self._clock = asyncio.get_running_loop().time
-        self._began = self._clock()
-        self._entered = self._began
-        self._interrupted = False
-        self._asking = False
+        self._began = self._entered = self._clock()
+        self._interrupted = self._asking = False
         self._end = self._new_end()
 
     async def run(self) -> str:
-        """Fly; returns "ok" or the reason for which the flight ended."""
+        """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
-            asyncio.create_task(self._offboard_active(work))
+            asyncio.create_task(self._guarded(work))
             for work in (self._context.guidance_loop.run, self._judge, self._tell)
         ]
         try:
@@ -69,20 +67,20 @@ class Flight:
         finally:
             self._context.release()
             for task in helpers:
-                await _cancelled(task)
+                await cancel(task)
         return "ok"
 
     def end(self, ended: FlightEnded) -> None:
-        """End the running phase from outside it; only the first reason counts."""
+        """End the running phase from outside; only the first reason counts."""
         if ended.exit is Exit.RELEASE:
             self._context.release()
         if not self._end.done():
             self._end.set_result(ended)
 
     def fail(self, error: Exception) -> None:
-        """A fault of ours beside the phases ends the flight; an ending under way goes on.
+        """End the flight after an exception beside the phases.
 
-        It then goes on without our stream, which may be what is at fault.
+        An exit that is under way continues without our stream, which may have caused the fault.
         """
         reason = internal(error)
         if self.failed_in is None:
@@ -93,10 +91,10 @@ class Flight:
             self.note(reason)
 
     def interrupt(self, reason: str) -> None:
-        """The user wants out: hold if we fly, else whatever the phase needs.
+        """End the flight for the user: hold if we fly, else exit as the phase requires.
 
-        An ending that is under way goes on: it does what the vehicle needs. While the user is asked
-        whether to land, it is a no.
+        An exit that is under way continues. While the user is asked whether to land, an interrupt
+        answers no.
         """
         self._interrupted = True
         if self.failed_in is None:
@@ -106,47 +104,47 @@ class Flight:
             self.end(FlightEnded(reason))
 
     def on_heartbeat(self) -> None:
-        """Judge at once what the heartbeat that just came says."""
-        self._heed(self._watch.on_heartbeat)
+        """Judge a new HEARTBEAT at once."""
+        self._judge_message(self._watch.judge)
 
     def on_current_mode(self) -> None:
-        """Judge at once what the CURRENT_MODE that just came says."""
-        self._heed(self._watch.on_current_mode)
+        """Judge a new CURRENT_MODE at once."""
+        self._judge_message(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
-        """Write down and show that something happened."""
+        """Record an event and show it."""
         time = self._clock() - self._began
         self.events.append((time, text))
         self._observer.event(time, text)
 
-    def _heed(self, judge: Callable[[Phase], None]) -> None:
+    def _judge_message(self, judge: Callable[[Phase], None]) -> None:
         try:
             judge(self.phase)
         except FlightEnded as ended:
             self.end(ended)
 
     async def _fly_all(self) -> None:
-        """Run all phases; from the first again if another vehicle may stand there than was checked.
+        """Run all phases; start again if another vehicle may have replaced the checked one.
 
         Raises:
             FlightEnded: the first failure.
         """
-        for _ in range(_CHECKED_ANEW):
+        for _ in range(_ATTEMPTS):
             try:
                 for phase in self._phases():
                     await self._fly(phase)
             except ChecksVoid as void:
-                self.note(f"{void.reason}; the checks are made anew")
+                self.note(f"{void.reason}; the checks are repeated")
                 self._context.release()
                 self._context.link.state.forget()
                 self._context.same_vehicle.begin()
                 self._end = self._new_end()
             else:
                 return
-        raise FlightEnded(f"the vehicle changed {_CHECKED_ANEW} times before it was armed")
+        raise FlightEnded(f"the vehicle changed {_ATTEMPTS} times before it was armed")
 
     def _phases(self) -> Iterator[Phase]:
-        """All phases, in order; what follows the ground's depends on the autopilot met there."""
+        """All phases in order; those after the ground phases depend on the autopilot."""
         yield from self._ground
         context = self._context
         yield from flight_phases(
@@ -154,7 +152,7 @@ class Flight:
         )
 
     async def _fly(self, phase: Phase) -> None:
-        """Run one phase to its end; whatever goes wrong becomes a `FlightEnded`."""
+        """Run one phase; every failure becomes a `FlightEnded`."""
         self.phase, self._entered = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
         if not self._end.done():
@@ -165,7 +163,7 @@ class Flight:
             raise self._end.result()
 
     async def _race(self, work: Coroutine[Any, Any, Any], seconds: float | None) -> Any:
-        """Run `work` until it is done, the flight is ended, or the time is over."""
+        """Run `work` until it is done, the flight is ended, or `seconds` are over."""
         task = asyncio.create_task(work)
         either: set[asyncio.Future[Any]] = {task, self._end}
         try:
@@ -184,16 +182,13 @@ class Flight:
         except Exception as error:
             raise FlightEnded(internal(error)) from error
         finally:
-            await _cancelled(task)
+            await cancel(task)
 
     def _usual_exit(self) -> Exit:
-        phase = self.phase
-        if phase.on_failure_landed is not None and self._context.ground.standing:
-            return phase.on_failure_landed
-        return phase.on_failure
+        return self.phase.exit_on_failure(standing=self._context.ground.standing)
 
     async def _leave(self, exit_: Exit) -> None:
-        """Do with the vehicle what the ending asks for; what fails here is told, not raised."""
+        """Fly the exit; a failure in it is noted, not raised."""
         try:
             await self._exit(exit_)
             if exit_ is Exit.HOLD and self._interrupted and await self._told_to_land():
@@ -202,7 +197,7 @@ class Flight:
             self.note(ended.reason)
 
     async def _exit(self, exit_: Exit) -> None:
-        """Fly an ending; where a phase of it fails, the ending which that phase says for that."""
+        """Fly the phases of an exit; if one fails, fly the exit of that phase."""
         self.note(exit_.value)
         self._end = self._new_end()
         try:
@@ -216,15 +211,15 @@ class Flight:
             await self._exit(then)
 
     async def _told_to_land(self) -> bool:
-        """Ask the user; somebody else may take the vehicle while the answer is thought over."""
+        """Ask the user whether to land; somebody else may take over meanwhile."""
         self._asking = True
         try:
-            return bool(await self._race(_called(self._ask_landing), None))
+            return bool(await self._race(self._ask_landing(), None))
         finally:
             self._asking = False
 
-    async def _offboard_active(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run what runs beside the phases; a fault of ours there must not go unseen."""
+    async def _guarded(self, work: Callable[[], Awaitable[None]]) -> None:
+        """Run a task beside the phases; an exception in it ends the flight."""
         try:
             await work()
         except Exception as error:
@@ -240,29 +235,16 @@ class Flight:
             self._watch.judge(phase)
         except FlightEnded as ended:
             self.end(ended)
-        except Exception as error:  # the watch goes on: an ending needs it, too
+        except Exception as error:  # the watch goes on, because an exit needs it, too
             self.fail(error)
 
     async def _tell(self) -> None:
         while True:
             await asyncio.sleep(_TELL_PERIOD)
             elapsed = self._clock() - self._entered
-            self._observer.waiting(
-                self.phase.name, self._context.detail, elapsed, self.phase.timeout
-            )
+            phase = self.phase
+            self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
 
     @staticmethod
     def _new_end() -> asyncio.Future[FlightEnded]:
         return asyncio.get_running_loop().create_future()
-
-
-async def _called(ask: AskLanding) -> bool:
-    return await ask()
-
-
-async def _cancelled(task: asyncio.Task[Any]) -> None:
-    """Cancel a task and wait until it is gone; its outcome was read elsewhere."""
-    task.cancel()
-    await asyncio.wait({task})
-    if not task.cancelled():
-        task.exception()

@@ -1,4 +1,4 @@
-"""The maneuvers that the configuration asks for, checked before anything flies."""
+"""The configured maneuvers, checked against limits and fence before the flight."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -9,22 +9,20 @@ import numpy as np
 from companion.config import Config, trajectory_file
 from companion.config.flight import IdentifyConfig
 from companion.config.known_drag import assumption, least_drag, most_drag
-from companion.control.outer_loop import thrust_limits
+from companion.control.inner_loop import thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
 from companion.guidance import (
     GRAVITY,
-    Circle,
     Corners,
     Doublets,
-    Hover,
     Maneuver,
     ManeuverSequence,
     Steps,
 )
 from companion.guidance.fence import Place
-from companion.guidance.follow import Follow
+from companion.guidance.follow import Follow, circle, hover
 from companion.guidance.predicted import predicted
 from companion.guidance.trajectory import (
     Envelope,
@@ -41,7 +39,7 @@ _SLOWER = "make it slower or smaller, or change the limit"
 
 
 def configured_maneuvers(config: Config) -> ManeuverSequence:
-    """The maneuvers of `flight.maneuvers`, one after the other.
+    """The sequence of maneuvers from `flight.maneuvers`.
 
     Raises:
         ConfigError: a trajectory cannot be read, or a maneuver cannot be flown within the limits
@@ -51,7 +49,7 @@ def configured_maneuvers(config: Config) -> ManeuverSequence:
 
 
 def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
-    """The same, as if nobody had asked it for a reference yet: `Follow` keeps where it began."""
+    """A copy without state: `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
@@ -61,15 +59,15 @@ def unbegun(sequence: ManeuverSequence) -> ManeuverSequence:
 
 
 def require_inside(config: Config, parts: Iterable[Maneuver], origin: Place | None) -> None:
-    """See that all maneuvers stay inside the fence, with a polygon on the map if there is one.
+    """Check that all maneuvers stay inside the fence, a polygon on the map included.
 
     Args:
-        config: as it is flown.
+        config: of the flight.
         parts: the maneuvers.
-        origin: where control begins, or None where that is not known.
+        origin: where control begins, or None where unknown.
 
     Raises:
-        ConfigError: one of them leaves it, or could not stop inside.
+        ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
     check = _fence_check(config, origin)
     for part in parts:
@@ -81,8 +79,11 @@ def _part(config: Config, name: str) -> Maneuver:
     if name == "trajectory":
         return _follow(config)
     part = _simple(config, name)
-    require_inside(config, [part], None)
-    if isinstance(part, Circle):
+    try:
+        require_inside(config, [part], None)
+    except TrajectoryError as error:
+        raise ConfigError(f"{name}: {error}") from error
+    if name == "circle":
         (motion,) = _motions(part, least_drag(config))
         for broken in judge(motion, replace(_envelope(config), max_tilt_rate=None, fence=None)):
             _refuse(part.name, broken, assumption(config))
@@ -90,14 +91,14 @@ def _part(config: Config, name: str) -> Maneuver:
 
 
 def _simple(config: Config, name: str) -> Maneuver:
-    corners, steps, circle = config.corners, config.steps, config.circle
+    corners, steps = config.corners, config.steps
     match name:
         case "hover":
-            return Hover(config.hover.duration_s)
+            return hover(config.hover.duration_s)
         case "steps":
             return Steps(steps.coefficient, steps.duration_s, steps.settle_s)
         case "circle":
-            return Circle(circle.radius_m, circle.speed_m_s, circle.laps)
+            return circle(config.circle.radius_m, config.circle.speed_m_s, config.circle.laps)
         case "corners":
             return Corners(
                 corners.north_coefficient,
@@ -110,7 +111,7 @@ def _simple(config: Config, name: str) -> Maneuver:
 
 
 def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
-    """How the vehicle moves in it; with rates of the body, whatever its heading is."""
+    """Predicted motions of a maneuver; for body-rate doublets, at eight initial headings."""
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
         moments = list(predicted(part, tau * k / turns, drag))
@@ -124,7 +125,7 @@ def _motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
 def _refuse(name: str, broken: Violation | None, drag: str = "") -> None:
     if broken is None:
         return
-    # Only a trajectory is slowed down by us.
+    # `--slow-down` applies to trajectories only.
     remedy = _SLOWER if broken.slowing_helps else broken.remedy
     raise ConfigError(f"{name}: {broken}; {remedy}{drag}")
 
@@ -142,7 +143,7 @@ def _doublets(identify: IdentifyConfig) -> Doublets:
 
 
 def _follow(config: Config) -> Follow:
-    """The trajectory of `flight.trajectory`, slowed down if it has to be and may be."""
+    """The trajectory of `flight.trajectory`, slowed down if needed and allowed."""
     path = config.flight.trajectory
     if path is None:
         raise ConfigError("flight.trajectory: name a file, or fly with --trajectory FILE")
@@ -161,7 +162,7 @@ def _follow(config: Config) -> Follow:
 
 
 def _envelope(config: Config) -> Envelope:
-    """What the vehicle may be asked for, from where the maneuver begins."""
+    """The limits for a trajectory, relative to where the maneuver begins."""
     limits, (min_thrust, max_thrust) = config.limits, thrust_limits(config)
     return Envelope(
         max_tilt=limits.max_tilt,

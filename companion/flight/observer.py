@@ -1,32 +1,74 @@
-"""Whom a flight tells what happens: the terminal, a test, later the live page."""
+"""Who is told about a flight, and the log of the vehicle's state changes."""
 
+from collections.abc import Callable
 from typing import Protocol
+
+from companion.mavlink.texts import StatusText
+from companion.vehicle.state import VehicleState
 
 
 class Observer(Protocol):
-    """Is told what happens, in the order in which it happens; must return at once."""
+    """Receives what happens, in order; every method must return at once."""
 
     def phase(self, name: str, waits_for: str) -> None:
         """A phase began."""
         ...
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Once a second: what the phase waits for, since when and for how long at most (s)."""
+        """Once a second: the phase, the condition it waits for, elapsed time and timeout (s)."""
         ...
 
     def event(self, time: float, text: str) -> None:
-        """Something happened, `time` s after the flight began."""
+        """An event, `time` s after the flight began."""
         ...
 
 
 class Silent:
-    """An observer that tells nobody."""
+    """An observer that ignores everything."""
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Say nothing."""
+        """Ignore it."""
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Say nothing."""
+        """Ignore it."""
 
     def event(self, time: float, text: str) -> None:
-        """Say nothing."""
+        """Ignore it."""
+
+
+class StateLogger:
+    """Notes each change of mode, arming state and STATUSTEXT as an event.
+
+    Args:
+        state: of the vehicle.
+        note: takes each change as a sentence.
+    """
+
+    def __init__(self, state: VehicleState, note: Callable[[str], None]) -> None:
+        self._state = state
+        self._note = note
+        self._mode: str | None = None
+        self._armed: bool | None = None
+        self._last_text: StatusText | None = None
+
+    def look(self) -> None:
+        """Note every change since the last call."""
+        state = self._state
+        for text in self._new_texts():
+            self._note(f"autopilot: {text.text}")
+        if state.mode != self._mode:
+            self._mode = state.mode
+            self._note(f"mode {state.mode}")
+        if state.armed != self._armed:
+            self._armed = state.armed
+            self._note("armed" if state.armed else "disarmed")
+
+    def _new_texts(self) -> list[StatusText]:
+        new: list[StatusText] = []
+        for text in reversed(self._state.texts):
+            if text is self._last_text:
+                break
+            new.insert(0, text)
+        if new:
+            self._last_text = new[-1]
+        return new

@@ -1,4 +1,4 @@
-"""The flight as a table: its phases in order, how long each may take, and how each is left."""
+"""The table of phases: order, timeouts, allowed modes, and the exit if a phase fails."""
 
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
@@ -7,32 +7,32 @@ from typing import Any
 from companion.config.flight import FlightConfig
 from companion.flight import control_phases, preflight_phases, takeoff
 from companion.flight.context import FlightContext
-from companion.safety.ending import Exit
+from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _SHORT = 10.0
-"""For what the autopilot does at once or not at all, s."""
+"""Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKE_OVER = 15.0
-"""The same, and the judgement before it, whose parameters a bad link may lose, s."""
+"""Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """One phase.
+    """One phase of a flight.
 
     Attributes:
-        name: what the user sees.
-        waits_for: what the user is told it waits for.
-        work: what is done in it.
-        timeout: s; then the phase has failed.
-        on_failure: what is done with the vehicle if the phase fails.
-        on_failure_landed: the same while the vehicle still stands on the ground, if that differs.
-        modes: the modes that the autopilot may be in; any other one means that someone else has
-            taken the vehicle, and one that is not known any more is as bad. Empty: any.
-        monitored: whether silence and the safety monitors end it; what follows a breach must not
-            be ended by the same breach.
+        name: shown to the user.
+        waits_for: the condition it waits for, shown to the user.
+        work: the coroutine of the phase.
+        timeout: after this time the phase has failed, s.
+        on_failure: the exit if the phase fails.
+        on_failure_landed: the exit while the vehicle still stands on the ground, if it differs.
+        modes: roles of the allowed modes; any other mode is a takeover, and an unknown mode counts
+            like one. Empty: any mode.
+        monitored: whether the safety monitors may end it. An exit is not monitored, because the
+            breach that caused it would end it too.
     """
 
     name: str
@@ -44,11 +44,17 @@ class Phase:
     modes: frozenset[Role] = frozenset()
     monitored: bool = False
 
+    def exit_on_failure(self, *, standing: bool) -> Exit:
+        """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
+        if self.on_failure_landed is not None and standing:
+            return self.on_failure_landed
+        return self.on_failure
+
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases before anything is asked of the vehicle but its telemetry, in order."""
+    """The phases in which the vehicle is asked for nothing but telemetry, in order."""
     return (
-        # A second more than the link waits: its own words on why nothing came are the better ones.
+        # A second longer than the link waits, because the link's error message says more.
         Phase("connect", "a heartbeat", preflight_phases.connect, config.connect_timeout_s + 1.0),
         Phase("checks", "the vehicle to be ready", preflight_phases.checks, config.ready_timeout_s),
     )
@@ -75,7 +81,7 @@ def flight_phases(
         ),
         Phase(
             "offboard",
-            "the autopilot to take our rates",
+            "the autopilot to obey our rates",
             takeoff.offboard,
             _TAKE_OVER,
             Exit.LAND,
@@ -98,7 +104,7 @@ def flight_phases(
 
 
 def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
-    """What is flown to leave the vehicle as `exit_` says."""
+    """The phases that an exit flies."""
     return {
         Exit.LEAVE: (),
         Exit.RELEASE: (),
@@ -130,7 +136,7 @@ def _land(config: FlightConfig) -> Phase:
 
 
 def _undo_arming() -> Phase:
-    """Where it is refused, the vehicle flies after all; on the ground a landing does no harm."""
+    """A refused disarming means that the vehicle flies, so the exit of this phase is to land."""
     return Phase("disarm", "the motors to stop", preflight_phases.undo_arming, _SHORT, Exit.LAND)
 
 

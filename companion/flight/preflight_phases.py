@@ -1,18 +1,22 @@
-"""What is done on the ground, one coroutine a phase, and how arming is undone."""
+"""The phases on the ground, one coroutine each, and how arming is undone."""
 
 from companion.files.yaml_file import ConfigError
+from companion.flight.commands import (
+    command_if_ours,
+    in_role,
+    in_roles,
+    leave_offboard,
+    require_role,
+)
 from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
-from companion.flight.left_in_offboard import leave_offboard
 from companion.flight.maneuvers import require_inside
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import command_if_ours
 from companion.guidance.fence import Place
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Stage
 from companion.preflight.finding import Finding
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
-from companion.vehicle.parameter_rules import Values, Verdict
+from companion.vehicle.parameter_rules import CheckResult, Values
 
 _HEARTBEATS_MISSED = 3
 _SHORTEST_HEARTBEAT_LIMIT = 0.8
@@ -25,37 +29,37 @@ async def connect(context: FlightContext) -> None:
 
 
 async def checks(context: FlightContext) -> None:
-    """Ask for the telemetry we fly on, wait for readiness, and let the doctor look at it all."""
+    """Request telemetry, wait until the vehicle is ready, and run the preflight checks."""
     context.same_vehicle.begin()
     context.heartbeat_limit = SLOWEST_HEARTBEAT
-    context.detail = "asking for telemetry"
+    context.detail = "requesting telemetry"
     await context.preflight.ask_for_telemetry()
-    if context.config.flight.arm:  # else the pilot, who may have chosen the mode by a switch
+    if context.config.flight.arm:  # a pilot who arms may have chosen the mode by a switch
         await leave_offboard(context, context.link.autopilot.cannot_arm_in)
     else:
         await leave_offboard(context)
     await context.until(lambda: _ready(context))
-    # Counted only now: a position is not sent before the estimator has one.
-    context.detail = "counting the telemetry that arrives, reading the autopilot's parameters"
+    # Positions are sent only once the estimator has one, so the rates are counted now.
+    context.detail = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(Stage.GROUND)
-    heartbeats = evidence.streams.get("HEARTBEAT")  # PX4's is not asked for: its rate is fixed
+    heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
         context.heartbeat_limit = limit
     _require_inside_map(context)
-    _tell_dead_man(context, evidence.survey.values)
+    _report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode
 
 
 async def stream(context: FlightContext) -> None:
-    """Begin to answer samples, idle, and see that setpoints really flow."""
+    """Start to answer samples with idle setpoints, and wait until enough were sent."""
     context.loop.on = True
-    enough = context.loop.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.setpoints >= enough, "setpoints to flow")
+    enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:
-    """Arm if we were told to; else wait for the pilot to do it, and to hand the vehicle over."""
+    """Arm if `flight.arm` says so; else wait until the pilot arms and hands the vehicle over."""
     if context.config.flight.arm:
         await _arm(context)
         return
@@ -73,12 +77,12 @@ async def arm(context: FlightContext) -> None:
 
 
 async def undo_arming(context: FlightContext) -> None:
-    """Disarm if it was us who armed; an arming of the pilot's is the pilot's."""
+    """Disarm if we armed; a vehicle that the pilot armed is left alone."""
     context.release()
     if not context.arm_sent:
         return
     context.detail = "the autopilot to accept disarming"
-    # The heartbeat may be older than our arming, so it is not asked whether this is needed.
+    # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
     ours = in_roles(context.link, {Role.READY, Role.TAKEOFF})
     await command_if_ours(
         context, context.link.autopilot.disarm(), ours, lambda: not context.armed()
@@ -88,7 +92,7 @@ async def undo_arming(context: FlightContext) -> None:
 
 
 async def _arm(context: FlightContext) -> None:
-    """Arm; what was good at the checks may not be so any more."""
+    """Arm, after the checks are repeated."""
     state = context.link.state
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     context.detail = "the autopilot to accept arming"
@@ -117,7 +121,7 @@ async def _arm(context: FlightContext) -> None:
 
 
 def _untouched(context: FlightContext) -> None:
-    """Raise `FlightEnded` if somebody armed it or chose another mode since the checks."""
+    """Raise `FlightEnded` if somebody armed the vehicle or changed its mode since the checks."""
     state = context.link.state
     _refuse(vehicle_checks.armed(state))
     if state.mode != context.mode_at_checks:
@@ -127,10 +131,10 @@ def _untouched(context: FlightContext) -> None:
 
 
 def _require_inside_map(context: FlightContext) -> None:
-    """See that all maneuvers stay inside a fence on the map, which needs the vehicle's place."""
+    """Raise `FlightEnded` if a maneuver leaves a fence given in latitude and longitude."""
     told = context.link.state.global_position
     if not context.config.safety.fence_polygon_deg or told is None:
-        return  # without a place the checks have refused already
+        return  # the checks refuse a vehicle without a position
     try:
         place = Place(told.latitude_deg, told.longitude_deg)
         require_inside(context.config, context.maneuvers.parts, place)
@@ -141,30 +145,26 @@ def _require_inside_map(context: FlightContext) -> None:
 def _ready(context: FlightContext) -> bool:
     state = context.link.state
     _refuse(vehicle_checks.armed(state))
-    _check_battery(context)
+    _refuse(vehicle_checks.battery(context.config, state))
     missing = context.link.autopilot.not_ready(state.readiness)
     context.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 
 
-def _check_battery(context: FlightContext) -> None:
-    _refuse(vehicle_checks.battery(context.config, context.link.state))
-
-
 def _refuse(finding: Finding) -> None:
-    if finding.verdict is Verdict.UNSAFE:
+    if finding.result is CheckResult.UNSAFE:
         raise FlightEnded(finding.sentence())
 
 
-def _tell_dead_man(context: FlightContext, values: Values) -> None:
-    """Tell what the autopilot would do without our setpoints."""
+def _report_offboard_loss(context: FlightContext, values: Values) -> None:
+    """Report what the autopilot does when our setpoints stop."""
     autopilot = context.link.autopilot
-    offboard_loss_failsafe = autopilot.offboard_loss_failsafe
-    seconds = values.get(offboard_loss_failsafe.parameter)
-    how_long = "a time that is not known" if seconds is None else f"{seconds:g} s"
+    failsafe = autopilot.offboard_loss_failsafe
+    seconds = values.get(failsafe.parameter)
+    how_long = "an unknown time" if seconds is None else f"{seconds:g} s"
     context.note(
-        f"should our setpoints stop, {autopilot.name} holds the last rates for {how_long} "
-        f"({offboard_loss_failsafe.parameter}); then {offboard_loss_failsafe.then}"
+        f"offboard loss: if our setpoints stop, {autopilot.name} holds the last rates for "
+        f"{how_long} ({failsafe.parameter}); then {failsafe.then}"
     )
 
 

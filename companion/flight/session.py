@@ -1,4 +1,4 @@
-"""A flight with everything about it: its folder, its recording, its link, its summary."""
+"""A session: one flight with its folder, recording, link and summary."""
 
 import asyncio
 import time
@@ -11,24 +11,23 @@ from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.flight import AskLanding
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.observer import Observer
-from companion.flight.state_logger import StateLogger
+from companion.flight.observer import Observer, StateLogger
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample
 
 
 class Session:
     """Flies once. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
 
-    They end the flight, not the session: whatever comes meanwhile, what was recorded is written.
+    They end the flight, but not the session, so that the recorded data are always written.
 
     Args:
-        config: what to fly.
+        config: of the flight.
         folder: an existing folder for this flight's files.
-        observer: is told what happens.
-        ask_landing: asked after an interrupt, when the vehicle holds.
+        observer: receives phases and events.
+        ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
     """
 
     def __init__(
@@ -54,12 +53,12 @@ class Session:
         return True
 
     def leave(self) -> None:
-        """Send nothing any more, and end the flight at once; where none is under way, nothing."""
+        """Stop sending and end the flight at once; without a flight, do nothing."""
         if self._flying is not None and not self._flying.cancelling():
             self._flying.cancel()
 
     def note(self, text: str) -> None:
-        """Write down and show that something happened."""
+        """Record an event and show it."""
         if self._assembled is None:
             self._early_notes.append(text)
         else:
@@ -69,14 +68,14 @@ class Session:
         """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
 
         Raises:
-            ConfigError: what is to be flown cannot be; nothing was sent.
+            ConfigError: a maneuver cannot be flown; nothing was sent.
             LinkError: the link could not be opened; nothing was sent.
             OSError: the folder cannot be written; nothing was sent.
-            RealtimeError: what `realtime` requires is not granted; nothing was sent.
+            RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
         flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
-        # Judged before the link is opened: it takes up to a second, and the link must be read.
+        # This takes up to a second, during which an open link would not be read.
         maneuvers = configured_maneuvers(self._config)
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
@@ -103,7 +102,7 @@ class Session:
                     result = await self._run(link, self._assembled)
                 finally:
                     self._assembled.close()
-        await asyncio.sleep(0)  # a last word of the writing thread
+        await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return self._finish(link, self._assembled, result, tlog.dropped, grants)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
@@ -135,7 +134,7 @@ class Session:
 
         link.subscribe("HEARTBEAT", on_heartbeat)
         link.subscribe("CURRENT_MODE", on_current_mode)
-        # A task of its own, which `leave` can end without ending what writes the record.
+        # In a task of its own, so that `leave` ends the flight but not the writing of the files.
         self._flying = asyncio.ensure_future(flight.run())
         try:
             return await self._flying
@@ -187,5 +186,5 @@ class Session:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
             trace.save(self._folder)
         except OSError as error:
-            flight.note(f"{self._folder}: not everything was written: {error.strerror}")
+            flight.note(f"{self._folder}: some files were not written: {error.strerror}")
         return summary

@@ -1,25 +1,24 @@
-"""From the ground to control by our rates; each returns when its phase is at its end."""
+"""The phases from the ground to control by our body rates, one coroutine each."""
 
 import asyncio
 
+from companion.flight.commands import change_mode, command_if_ours, in_role, in_roles, require_role
 from companion.flight.context import FlightContext
-from companion.flight.mode_roles import in_role, in_roles, require_role
-from companion.flight.orders import change_mode, command_if_ours
 from companion.preflight.evidence import Stage
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
 
-_SETTLING = 1.0
-"""Hold in offboard before the maneuver begins, s: the take-over is not part of it."""
+_SETTLE_TIME = 1.0
+"""Hold in offboard before the maneuvers begin, s, so that the takeover does not disturb them."""
 
-_REACHED = 0.5
-"""Height below the wanted one at which a climb that has ended counts as done, m."""
+_BELOW = 0.5
+"""A climb may end this far below the commanded height, m."""
 
-_PAST = 3.0
-"""Height above the wanted one at which a climb has gone wrong, m; PX4 overshoots by some tenths."""
+_ABOVE = 3.0
+"""A climb further above the commanded height has failed, m; PX4 overshoots by some tenths."""
 
-_ARRIVES = 2.0
-"""So long a climb that has become a hold may still take to arrive, s; else somebody stopped it."""
+_ARRIVAL_TIME = 2.0
+"""Time allowed to reach altitude after the mode shows hold, s; then the climb was stopped."""
 
 
 async def takeoff(context: FlightContext) -> None:
@@ -34,9 +33,9 @@ async def takeoff(context: FlightContext) -> None:
     height = context.config.flight.takeoff_height_m
     command = context.link.autopilot.take_off(height, _home_altitude(context))
     context.ground.command_takeoff()
-    context.loop.command = None  # an idle one, which nothing may send from here on
+    context.loop.command = None  # drops the idle command, which must not be sent from here on
     context.guidance_loop.step()
-    # Asked again right before it is sent: PX4 that is told so disarmed takes off once a pilot arms.
+    # Checked again before each try: a disarmed PX4 stores the command and takes off once armed.
     await command_if_ours(
         context, command, lambda: _require_ground(context), lambda: not state.landed
     )
@@ -45,15 +44,15 @@ async def takeoff(context: FlightContext) -> None:
 
 
 async def offboard(context: FlightContext) -> None:
-    """Hand control over to our stream, and settle."""
-    context.detail = "the vehicle to be as it was at the checks"
+    """Check the vehicle again, take over, and settle."""
+    context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time())
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
-    await asyncio.sleep(_SETTLING)
+    await asyncio.sleep(_SETTLE_TIME)
 
 
 class _Climb:
@@ -65,7 +64,7 @@ class _Climb:
         self._held_at: float | None = None
 
     def over(self) -> bool:
-        """Whether it has arrived; raises `FlightEnded` if somebody ended it."""
+        """Whether the height is reached; raises `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
         if not context.armed():
             raise FlightEnded("the vehicle disarmed in the take-off, not by us", Exit.RELEASE)
@@ -73,45 +72,45 @@ class _Climb:
         if height is None or position is None:
             return False
         context.detail = f"{self._height:g} m, now {height:.1f} m"
-        if height > self._height + _PAST:
+        if height > self._height + _ABOVE:
             raise FlightEnded(
-                f"the vehicle climbed to {height:.1f} m, and flight.takeoff_height_m is "
+                f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
-        near = height > self._height - _REACHED
+        near = height > self._height - _BELOW
         if not near and self._stopped():
             raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
         return near and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
 
     def _stopped(self) -> bool:
-        """Whether what was a climb has been a hold for a while."""
+        """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIME` ago."""
         now = asyncio.get_running_loop().time()
         if in_role(self._context.link, Role.TAKEOFF):
             self._begun, self._held_at = True, None
         elif self._begun and self._held_at is None:
             self._held_at = now
-        return self._held_at is not None and now - self._held_at > _ARRIVES
+        return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
 
 
 def _require_ground(context: FlightContext) -> None:
-    """See that it stands ready for the take-off."""
+    """Raise `FlightEnded` unless the vehicle stands armed on the ground in a ready mode."""
     state = context.link.state
     require_role(context.link, {Role.READY})
     if not context.armed() or state.flying:
-        raise FlightEnded("the vehicle does not stand armed on the ground any more", Exit.RELEASE)
+        raise FlightEnded("the vehicle is no longer armed on the ground", Exit.RELEASE)
     if not state.landed:
-        raise FlightEnded("the autopilot does not say any more that it stands on the ground")
+        raise FlightEnded("the autopilot no longer reports that it is on the ground")
 
 
 async def _take_over(context: FlightContext) -> None:
-    """Have our setpoints obeyed: by a command, or by the first of them."""
-    # An idle one of the time on the ground, obeyed in the air, would let the vehicle fall.
+    """Take over, by a command or by the first setpoint, as the autopilot needs."""
+    # An idle command from the ground, obeyed in the air, would let the vehicle fall.
     await context.until(lambda: _commands_flight(context), "a target from guidance")
     context.detail = "the autopilot to obey our rates"
     context.loop.taking_over = True
     autopilot = context.link.autopilot
     if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
-        # The mode we know may be a second old; never take the vehicle from a pilot who took it.
+        # The known mode may be a second old, and a pilot may have taken over since.
         await context.fresh_heartbeat()
         require_role(context.link, {Role.READY})
         context.loop.on = True

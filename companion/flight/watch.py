@@ -1,32 +1,76 @@
-"""The pilot's right, and the safety ladder's look: on a timer and at every heartbeat."""
+"""The watch: checks mode, heartbeat and safety monitors, on a timer and at every heartbeat."""
 
 import asyncio
 from collections.abc import Callable
 from math import inf
 
-from companion.flight.asking_again import AskingAgain
+from companion.config.computer import LinkConfig
+from companion.flight.commands import require_role, roles_of
 from companion.flight.context import FlightContext
-from companion.flight.mode_roles import require_role, roles_of
 from companion.flight.phases import Phase
-from companion.safety import Action, SafetyLadder
-from companion.safety.ending import Exit, FlightEnded
-from companion.safety.monitor import EXITS
+from companion.mavlink.errors import LinkError
+from companion.safety import SafetyLadder
+from companion.safety.actions import EXITS, Action, Exit, FlightEnded
+from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
+from companion.vehicle.link import Link
 from companion.vehicle.records import outdated
 
 _STATUS_PERIOD = 0.45
-"""PX4 sends CURRENT_MODE every 0.5 s while nothing changes; one that comes sooner is news."""
+"""PX4 sends CURRENT_MODE every 0.5 s; one that comes earlier than this reports a change, s."""
 _QUESTION_PERIOD = 0.15
-"""An autopilot that sends CURRENT_MODE as often as asked is not asked back as often, s."""
+"""Shortest time between two requests for a heartbeat, s."""
+_COUNTED = 0.1
+"""`set_rates` counts arriving messages for this long, s; nothing waits for it."""
+
+
+class RateRequester:
+    """Requests a telemetry rate again that has become too low: another station may have lowered it.
+
+    It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
+
+    Attributes:
+        note: takes requests and their errors as messages.
+
+    Args:
+        link: to the vehicle.
+        section: the configured rates.
+    """
+
+    def __init__(self, link: Link, section: LinkConfig) -> None:
+        self.note: Callable[[str], None] = lambda _: None
+        self._link = link
+        self._section = section
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+
+    def look(self, health: Health) -> None:
+        """Request each message whose rate is too low now."""
+        section = self._section
+        answers, positions = health.answer_rate, health.position_rate
+        if health.gaps or (answers is not None and answers < section.min_attitude_rate_hz):
+            self._request_once("ATTITUDE_QUATERNION", section.attitude_rate_hz)
+        if positions is not None and positions < section.min_position_rate_hz:
+            self._request_once("LOCAL_POSITION_NED", section.position_rate_hz)
+
+    def _request_once(self, message: str, rate: float) -> None:
+        if message not in self._tasks:
+            self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
+            self._tasks[message] = asyncio.create_task(self._request(message, rate))
+
+    async def _request(self, message: str, rate: float) -> None:
+        try:
+            await self._link.set_rates({message: rate}, window_s=_COUNTED)
+        except LinkError as error:
+            self.note(str(error))
 
 
 class Watch:
-    """Notices what the control loop cannot: that nothing comes, or that others fly the vehicle.
+    """Detects what the control loop cannot: silence, takeovers and breaches of the monitors.
 
     Args:
-        context: the parts of the flight.
-        ladder: judges what it sees while the autopilot obeys us.
-        asking_again: asks for telemetry that has become too rare.
+        context: of the flight.
+        ladder: judges the snapshots while the autopilot obeys us.
+        rate_requester: requests telemetry rates that have become too low.
         clock: our clock, s.
     """
 
@@ -34,13 +78,13 @@ class Watch:
         self,
         context: FlightContext,
         ladder: SafetyLadder,
-        asking_again: AskingAgain,
+        rate_requester: RateRequester,
         clock: Callable[[], float],
     ) -> None:
         self._context = context
         self._ladder = ladder
         self._clock = clock
-        self._asking_again = asking_again
+        self._rate_requester = rate_requester
         self._status_at = self._status_asked_at = -inf
         self._status_question: asyncio.Task[None] | None = None
         self._question: asyncio.Task[None] | None = None
@@ -49,7 +93,7 @@ class Watch:
         """Judge once.
 
         Raises:
-            FlightEnded: the phase must end, with the reason and what is to be done.
+            FlightEnded: the phase must end; says why and how to exit.
         """
         now = self._clock()
         self._context.snapshot_builder.listen(now)
@@ -59,23 +103,15 @@ class Watch:
         if phase.modes:
             require_role(self._context.link, phase.modes)
         if phase.monitored and self._context.loop.offboard_active:
-            self._climb(now)
+            self._judge_snapshot(now)
         if phase.modes:
             self._judge_heartbeat()
 
-    def on_heartbeat(self, phase: Phase) -> None:
-        """A heartbeat came: judge what it says.
-
-        Raises:
-            FlightEnded: as `judge`.
-        """
-        self.judge(phase)
-
     def on_current_mode(self, phase: Phase) -> None:
-        """CURRENT_MODE came: twice a second, and at once when the vehicle's status changes.
+        """Judge a CURRENT_MODE, which comes twice a second and at once after a status change.
 
-        One that comes early may mean that it disarmed, or is in a failsafe. Only a heartbeat tells
-        of those, so one is asked for; not more often, where an autopilot sends all that is asked.
+        An early one may mean that the vehicle disarmed or is in a failsafe. Only a heartbeat tells,
+        so one is requested, at most every `_QUESTION_PERIOD`.
 
         Raises:
             FlightEnded: as `judge`.
@@ -89,25 +125,25 @@ class Watch:
         self.judge(phase)
 
     def ask_mode(self) -> None:
-        """Ask for the mode now, and go on after a gap if the vehicle still obeys us."""
-        # Without an answer the silence limit decides.
+        """Request the mode, and let the loop resume after a gap if the vehicle still obeys us."""
+        # Without an answer the silence monitor ends the flight.
         self._question = asyncio.create_task(self._confirm())
 
     async def _confirm(self) -> None:
-        """Wait for a heartbeat that is fresh: one that waited to be read may say what was."""
+        """Wait for a fresh heartbeat: one from the backlog may carry an old mode."""
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
         roles = roles_of(self._context.link)
-        # While we take over, the stream is needed before offboard is entered; in a failsafe that
-        # came in between it would end the failsafe.
+        # The takeover needs the stream before offboard is entered. During a failsafe the stream
+        # must not resume, because it would end the failsafe.
         entering = loop.taking_over and Role.READY in roles and not state.failsafe
         if loop.awaiting_mode and (Role.OFFBOARD in roles or entering):
             loop.resume()
 
-    def _climb(self, now: float) -> None:
-        """Let the ladder look, and do what it says."""
+    def _judge_snapshot(self, now: float) -> None:
+        """Give the ladder a snapshot and carry out its verdict."""
         snapshot = self._context.snapshot_builder.snapshot(now)
-        self._asking_again.look(snapshot.health)
+        self._rate_requester.look(snapshot.health)
         verdict = self._ladder.step(snapshot)
         if verdict is None:
             return

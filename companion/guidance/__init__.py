@@ -2,12 +2,11 @@
 
 from companion.guidance.doublets import Doublets
 from companion.guidance.drag_estimate import DragEstimate
-from companion.guidance.height import HeightGains
+from companion.guidance.feedback import HeightGains, Weights, chain_gains
 from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
 from companion.guidance.linear import GuidanceInput, LinearCommand, LinearGuidance, LinearSettings
-from companion.guidance.lqr import Weights, chain_gains
-from companion.guidance.maneuvers import Circle, Corners, Hover, Maneuver, ManeuverSequence, Steps
+from companion.guidance.maneuvers import Corners, Maneuver, ManeuverSequence, Steps
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
 from companion.guidance.thrust import height_first, specific_thrust
@@ -15,13 +14,11 @@ from companion.guidance.thrust import height_first, specific_thrust
 __all__ = [
     "GRAVITY",
     "IMMEDIATE",
-    "Circle",
     "Corners",
     "Doublets",
     "DragEstimate",
     "GuidanceInput",
     "HeightGains",
-    "Hover",
     "HoverThrust",
     "InnerResponse",
     "LinearCommand",

@@ -6,8 +6,7 @@ from math import hypot, isfinite, sqrt
 import numpy as np
 
 from companion.drag import Drag
-from companion.guidance.horizontal import Horizontal
-from companion.guidance.reference import Vector
+from companion.guidance.reference import Horizontal, Vector
 
 _WINDOW = 0.2
 """Of one measurement, s: a velocity's noise counts less against a longer change."""

@@ -1,10 +1,61 @@
-"""A trajectory as a maneuvers: from the pose where control holds, with the vehicle's own limits."""
+"""Trajectories as maneuvers: flown from the pose where the maneuver begins."""
 
 from dataclasses import dataclass
-from math import tau
+from math import inf, tau
 
-from companion.guidance import Pose, Reference
-from companion.guidance.trajectory import Trajectory, turned_first
+from companion.guidance.reference import Pose, Reference
+from companion.guidance.trajectory import Hover, Sample, Trajectory, steady_circle, turned_first
+
+
+def hover(duration: float) -> "HeldFigure":
+    """Maneuver `hover`: stay for `duration` seconds."""
+    return HeldFigure(Hover(duration))
+
+
+def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
+    """Maneuver `circle`: laps of a circle that begins and ends at rest where the vehicle is.
+
+    Args:
+        radius: m.
+        speed: between the ramps, m/s.
+        laps: how often round, with the ramps.
+    """
+    return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
+
+
+@dataclass(frozen=True, slots=True)
+class HeldFigure:
+    """A trajectory that holds its heading and is flown as configured, without slowing it down.
+
+    Linear guidance flies it, whichever guidance flies the trajectories of files (`Follow`).
+
+    Attributes:
+        trajectory: with `holds_heading`.
+    """
+
+    trajectory: Trajectory
+
+    @property
+    def name(self) -> str:
+        """Name of the trajectory."""
+        return self.trajectory.name
+
+    @property
+    def duration(self) -> float:
+        """Duration of the trajectory, s."""
+        return self.trajectory.duration
+
+    def check_times(self) -> list[float]:
+        """Check times of the trajectory, s.
+
+        Raises:
+            TrajectoryError: it is too long to be checked.
+        """
+        return list(self.trajectory.check_times())
+
+    def at(self, time: float, start: Pose) -> Reference:
+        """The reference `time` seconds after the maneuver began at `start`."""
+        return _from(start, self.trajectory.at(time), start.heading)
 
 
 @dataclass(slots=True)
@@ -50,13 +101,17 @@ class Follow:
         if self._turned is None or start is not self._pose:
             self._pose = start
             self._turned = turned_first(self.trajectory, start.heading, self.yaw_rate)
-        sample = self._turned.at(time)
-        north, east, down = start.position_ned
         held = start.heading if self.trajectory.holds_heading else 0.0
-        return Reference(
-            (north + sample.position[0], east + sample.position[1], down + sample.position[2]),
-            sample.velocity,
-            sample.acceleration,
-            held + sample.heading,
-            sample.heading_rate,
-        )
+        return _from(start, self._turned.at(time), held)
+
+
+def _from(start: Pose, sample: Sample, heading: float) -> Reference:
+    """A sample of a trajectory that begins at `start`; its heading counts from `heading`, rad."""
+    north, east, down = start.position_ned
+    return Reference(
+        (north + sample.position[0], east + sample.position[1], down + sample.position[2]),
+        sample.velocity,
+        sample.acceleration,
+        heading + sample.heading,
+        sample.heading_rate,
+    )

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY
-from companion.guidance.thrust import cos_tilt_ahead, specific_thrust
-from companion.guidance.thrust_curve import BatterySag, ThrustCurve
+from companion.guidance.thrust import BatterySag, ThrustCurve, cos_tilt_ahead, specific_thrust
 from companion.guidance.thrust_filter import SHORTEST, ThrustFilter
 
 _LONGEST_WINDOW = 0.5

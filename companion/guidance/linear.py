@@ -7,11 +7,9 @@ from typing import NamedTuple
 
 from companion.attitude import Coefficients, Target
 from companion.drag import Drag
-from companion.guidance.height import HeightGains, acceleration_down
-from companion.guidance.horizontal import Horizontal, limited
+from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
-from companion.guidance.lqr import ChainGains
-from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+from companion.guidance.reference import GRAVITY, Horizontal, Reference, VehicleMotion, limited
 from companion.guidance.thrust import height_first
 
 ReferenceAt = Callable[[float], Reference]

@@ -8,8 +8,6 @@ from typing import Protocol
 from companion.attitude import Coefficients
 from companion.guidance.reference import Pose, Reference
 
-_RAMP_ACCELERATION = 1.0
-"""Mean acceleration along the path while a circle gathers or loses speed, m/s²."""
 _REST = 1.0
 """Before open-loop steps the vehicle drifts this long, s: a step is measured from an attitude at
 rest, and a hold that still corrects is not."""
@@ -41,22 +39,6 @@ def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
     """Times from `begin` to `end`, both included, about `step` apart, s."""
     count = max(1, math.ceil((end - begin) / step))
     return [begin + (end - begin) * k / count for k in range(count + 1)]
-
-
-@dataclass(frozen=True, slots=True)
-class Hover:
-    """Stay at the pose where it began, for `duration` seconds."""
-
-    duration: float
-    name: str = "hover"
-
-    def check_times(self) -> list[float]:
-        """Its beginning and its end."""
-        return [0.0, self.duration]
-
-    def at(self, time: float, start: Pose) -> Reference:
-        """The reference: the starting pose at rest."""
-        return Reference(start.position_ned, heading=start.heading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,81 +143,6 @@ class Corners:
             return rest
         north, east = self.CORNERS[which]
         return rest._replace(coefficients=Coefficients(self.north * north, self.east * east))
-
-
-@dataclass(frozen=True, slots=True)
-class Circle:
-    """Laps of a circle that begins and ends, at rest, where the vehicle is; heading held.
-
-    The centre lies `radius` north of the start, and the vehicle sets off eastwards. Speed rises and
-    falls as a raised cosine.
-
-    Attributes:
-        radius: m.
-        speed: m/s, once gathered.
-        laps: how often round, the gathering and the braking included.
-    """
-
-    radius: float
-    speed: float
-    laps: float
-    name: str = "circle"
-
-    @property
-    def _length(self) -> float:
-        return math.tau * self.radius * self.laps
-
-    @property
-    def _ramp(self) -> float:
-        return min(self.speed / _RAMP_ACCELERATION, self._length / self.speed)
-
-    @property
-    def duration(self) -> float:
-        """The way at full speed, and half of each ramp more, s."""
-        return self._length / self.speed + self._ramp
-
-    def check_times(self) -> list[float]:
-        """The ramps and one lap between: the others are like it."""
-        ramp, lap = self._ramp, math.tau * self.radius / self.speed
-        begin, brake = ramp, self.duration - ramp
-        step = max(min(lap, ramp) / 720.0, ramp / 10_000.0)
-        return [
-            *spread(0.0, begin, step),
-            *spread(begin, min(begin + lap, brake), step),
-            *spread(brake, self.duration, step),
-        ]
-
-    def at(self, time: float, start: Pose) -> Reference:
-        """The reference on the circle, with its velocity and acceleration."""
-        way, speed, gain = self._along(min(max(time, 0.0), self.duration))
-        angle = way / self.radius
-        sine, cosine = math.sin(angle), math.cos(angle)
-        north, east, down = start.position_ned
-        inward = speed * speed / self.radius
-        return Reference(
-            (north + self.radius * (1.0 - cosine), east + self.radius * sine, down),
-            (speed * sine, speed * cosine, 0.0),
-            (gain * sine + inward * cosine, gain * cosine - inward * sine, 0.0),
-            start.heading,
-        )
-
-    def _along(self, time: float) -> tuple[float, float, float]:
-        """Way (m), speed (m/s) and acceleration (m/s²) along the circle."""
-        ramp, left = self._ramp, self.duration - time
-        if time < ramp:
-            return self._gathered(time)
-        if left < ramp:
-            way, speed, gain = self._gathered(left)
-            return self._length - way, speed, -gain
-        return self.speed * (time - 0.5 * ramp), self.speed, 0.0
-
-    def _gathered(self, time: float) -> tuple[float, float, float]:
-        phase = math.pi * time / self._ramp
-        return (
-            0.5 * self.speed * (time - self._ramp / math.pi * math.sin(phase)),
-            0.5 * self.speed * (1.0 - math.cos(phase)),
-            0.5 * self.speed * math.pi / self._ramp * math.sin(phase),
-        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from math import exp
 
-from companion.guidance.horizontal import Horizontal, limited
-from companion.guidance.reference import VehicleMotion
+from companion.guidance.reference import Horizontal, VehicleMotion, limited
 
 _LONGEST = 0.5
 """Between two positions, s: further apart they do not tell what was corrected in between."""

@@ -9,9 +9,8 @@ from math import sqrt, tan
 from typing import NamedTuple
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.horizontal import Horizontal, rotated
 from companion.guidance.maneuvers import Maneuver
-from companion.guidance.reference import GRAVITY, Pose, Reference, Vector
+from companion.guidance.reference import GRAVITY, Horizontal, Pose, Reference, Vector, rotated
 
 _LARGEST_TILT = 1.4
 """Rates that turn farther, rad, are nothing that is flown."""

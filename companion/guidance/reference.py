@@ -1,5 +1,6 @@
 """The words of guidance. World NED, SI units, radians; headings are tilt-yaw headings."""
 
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 from companion.attitude import BodyRates, Coefficients
@@ -57,3 +58,21 @@ class Reference(NamedTuple):
     def height_is_steady(self) -> bool:
         """Whether thrust changes no faster than the rotors follow: in no doublet."""
         return not self.thrust_steps and self.body_rates is None
+
+
+Horizontal = tuple[float, float]
+"""(north, east)."""
+
+
+def limited(north: float, east: float, most: float) -> Horizontal:
+    """The vector, shortened along its direction where it is longer than `most`."""
+    length = hypot(north, east)
+    if length <= most:
+        return north, east
+    return north * most / length, east * most / length
+
+
+def rotated(north: float, east: float, angle: float) -> Horizontal:
+    """The vector turned clockwise, seen from above, by an angle in rad."""
+    c, s = cos(angle), sin(angle)
+    return c * north - s * east, s * north + c * east

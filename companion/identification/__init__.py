@@ -14,9 +14,8 @@ from companion.identification.response import (
     RateResponse,
     fit_rate_response,
 )
-from companion.identification.table import vehicle_table
 from companion.identification.thrust_map import ThrustMap, fit_thrust_map
-from companion.identification.vehicle import IdentifiedVehicle, identify_vehicle
+from companion.identification.vehicle import IdentifiedVehicle, identify_vehicle, vehicle_table
 
 __all__ = [
     "BadFitError",

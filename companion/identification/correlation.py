@@ -8,7 +8,7 @@ loop best. In slow turns an autopilot's rate integrator makes up for the lag: PX
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.identification.first_order_lag import held, lagged, slewed, value_at
+from companion.identification.lags import held, lagged, slewed, value_at
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
 Floats = NDArray[np.float64]

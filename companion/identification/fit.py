@@ -9,11 +9,16 @@ from math import exp, log
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.fitting import Solution
-from companion.identification.delayed_model import DelayedModel
-from companion.identification.models import FirstOrder, Model, SecondOrder, frequency_damping
+from companion.identification.delayed_model import (
+    DelayedModel,
+    FirstOrder,
+    Model,
+    SecondOrder,
+    frequency_damping,
+)
 from companion.identification.record import Stretch, most_excited
 from companion.identification.residual_analysis import Residuals, analyse
+from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.fitting import project
+from companion.least_squares import project
 
 Floats = NDArray[np.float64]
 

@@ -95,20 +95,26 @@ class FrameScanner:
     def _version_2(self, data: bytes, at: int, frames: list[Frame]) -> int:
         if len(data) - at < _V2_HEADER_LENGTH:
             return _INCOMPLETE
-        fields: tuple[int, ...] = _V2_HEADER.unpack_from(data, at)
-        _, size, incompatible, _, sequence, system, component, low, high = fields
+        # Byte by byte: for a cold start this is quicker than `struct`.
+        incompatible = data[at + 2]
         if incompatible & ~SIGNED:
             return _NOT_A_FRAME
-        message_id = low | high << 16
-        check_at = at + _V2_HEADER_LENGTH + size
+        message_id = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16
+        check_at = at + _V2_HEADER_LENGTH + data[at + 1]
         end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
         fault = self._fault(data, at, check_at, end, message_id)
         if fault is not None:
             return fault
-        payload = data[at + _V2_HEADER_LENGTH : check_at]
-        raw = data[at:end]
         frames.append(
-            Frame(message_id, system, component, sequence, payload, raw, bool(incompatible))
+            Frame(
+                message_id,
+                data[at + 5],
+                data[at + 6],
+                data[at + 4],
+                data[at + _V2_HEADER_LENGTH : check_at],
+                data[at:end],
+                incompatible != 0,
+            )
         )
         return end - at
 
@@ -134,16 +140,11 @@ class FrameScanner:
             return self._unknown_frame(data, at, end)
         if end > len(data):
             return _INCOMPLETE
-        if not self._intact(data, at, check_at, extra):
-            return _NOT_A_FRAME
-        return None
-
-    def _intact(self, data: bytes, at: int, check_at: int, extra: bytes) -> bool:
         stated = data[check_at] | data[check_at + 1] << 8
         if crc16.mcrf4xx(data[at + 1 : check_at] + extra) == stated:
-            return True
+            return None
         self._stats.bad_crc += 1
-        return False
+        return _NOT_A_FRAME
 
     def _unknown_frame(self, data: bytes, at: int, end: int) -> int:
         # Without a checksum only what follows can tell a frame from garbage: another frame, or

@@ -15,9 +15,9 @@ from pathlib import Path
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamp_judge import StampJudge, Stamps, Verdict
+from companion.mavlink.stamp_judge import SignatureResult, StampJudge, Stamps
 
-__all__ = ["Signing", "Verdict", "key_from_hex", "key_from_passphrase_file"]
+__all__ = ["SignatureResult", "Signing", "key_from_hex", "key_from_passphrase_file"]
 
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
@@ -106,20 +106,20 @@ class Signing:
         tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
-    def judge(self, frame: Frame) -> Verdict:
+    def check(self, frame: Frame) -> SignatureResult:
         """Judge a frame; only a good one moves what is kept of its stream."""
         self._unproven = 0
         if not frame.signed:
-            return Verdict.UNSIGNED
+            return SignatureResult.UNSIGNED
         signature = frame.raw[-SIGNATURE_LENGTH:]
         if not hmac.compare_digest(signature[-_HASH_BYTES:], self._hash(frame.raw[:-_HASH_BYTES])):
-            return Verdict.WRONG_KEY
+            return SignatureResult.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
         verdict = self._judge.judge(stream, stamp, answers=self._answers(frame))
-        if verdict is Verdict.GOOD:
+        if verdict is SignatureResult.GOOD:
             self._stamp = max(self._stamp, stamp)
-        elif verdict is Verdict.AHEAD and self._judge.awaits_answer(stamp):
+        elif verdict is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
             # A question that is older than what the vehicle knows it would not answer.
             self._stamp = max(self._stamp, stamp)
             self._unproven = stamp

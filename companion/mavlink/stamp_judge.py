@@ -29,7 +29,7 @@ Stream = tuple[int, int, int]
 SET_CLOCK = "set this computer's clock (NTP, or by hand)"
 
 
-class Verdict(Enum):
+class SignatureResult(Enum):
     """What a signature is worth."""
 
     GOOD = "signed with our key, and newer than all before it on its stream"
@@ -111,7 +111,7 @@ class StampJudge:
         # Once somebody in our own time was heard, nobody else moves us.
         return in_reach and not self._answered and not self._newest[False]
 
-    def judge(self, stream: Stream, stamp: int, *, answers: bool) -> Verdict:
+    def judge(self, stream: Stream, stamp: int, *, answers: bool) -> SignatureResult:
         """Judge a stamp; only a good one moves anything.
 
         Args:
@@ -123,7 +123,7 @@ class StampJudge:
         ahead = stamp > date + _DAY
         if stamp > date + _FURTHEST:
             self._remark_ahead(stamp - date, f"and not believed; {SET_CLOCK}, or the vehicle's")
-            return Verdict.AHEAD
+            return SignatureResult.AHEAD
         if stamp <= self._oldest(stream, ahead, date):
             if date - stamp > _MINUTE and not self._newest[ahead]:
                 self._remark(
@@ -131,14 +131,14 @@ class StampJudge:
                     "that is a recording, or the vehicle lacks its date (GPS), or this computer's "
                     "clock is ahead"
                 )
-            return Verdict.REPLAYED
+            return SignatureResult.REPLAYED
         if ahead and not self._answered:
             if not answers:
                 self._remark_ahead(
                     stamp - date,
                     f"and refused until the vehicle answers a question of ours; {SET_CLOCK}",
                 )
-                return Verdict.AHEAD
+                return SignatureResult.AHEAD
             self._answered = True
             self._remark(
                 f"this computer's clock is not to be trusted: it is {_days(stamp - date)} behind "
@@ -148,7 +148,7 @@ class StampJudge:
             self.changed.set()
         self._heard[stream, ahead] = stamp
         self._newest[ahead] = max(self._newest[ahead], stamp)
-        return Verdict.GOOD
+        return SignatureResult.GOOD
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
         """The newest stamps of each stream heard in this run."""

@@ -78,3 +78,34 @@ class SequenceTracker:
     def reset(self) -> None:
         """Start anew, after a reconnect."""
         self._last = None
+
+
+class FrameCounter:
+    """Counts the vehicle's accepted frames and the gaps in its running numbers.
+
+    Args:
+        stats: Holds the counts.
+    """
+
+    def __init__(self, stats: LinkStats) -> None:
+        self._stats = stats
+        self._sequence = SequenceTracker()
+        self._explained = 0
+
+    def count(self, message_id: int, sequence: int) -> None:
+        """Count one accepted frame."""
+        stats = self._stats
+        missing = self._sequence.missing(sequence)
+        if missing < 0:
+            stats.repeated += 1
+        else:
+            # A message that the dialect does not know has a number too; it came, and is no loss.
+            explained = min(missing, stats.unknown - self._explained)
+            self._explained += explained
+            stats.lost += missing - explained
+        stats.frames += 1
+        stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
+
+    def reset(self) -> None:
+        """Start anew, after a reconnect."""
+        self._sequence.reset()

@@ -12,10 +12,10 @@ import logging
 
 from companion.mavlink.endpoint import Endpoint, UdpIn
 from companion.mavlink.errors import LinkError
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport import Lost, Receiver, Tap, Transport
 from companion.mavsdk_link.transport import MavsdkTransport
-from companion.vehicle.inbox import Notice
 from companion.vehicle.link import Link
 
 _LOG = logging.getLogger(__name__)

@@ -6,10 +6,10 @@ from math import inf
 from companion.config import Config
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.clock_rate import MOST_DRIFT
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.clock_estimates import MOST_DRIFT
+from companion.vehicle.parameter_rules import CheckResult
 
-SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _MANY_NOT_NEWER = 0.2
 _SAMPLES_NEEDED = 10

@@ -11,10 +11,10 @@ from companion.config.guidance import AUTO
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.recording.dead_time import AxisDeadTime, DeadTimes
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.registry import AUTOPILOTS
 
-SAFE, INEFFECTIVE = Verdict.SAFE, Verdict.INEFFECTIVE
+SAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.INEFFECTIVE
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
@@ -43,7 +43,7 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
             Key.DEAD_TIME,
             SAFE,
             f"no flight in {config.recording.directory} measured the dead time yet",
-            mend="it can be measured in the air alone: the flight tells it at its end",
+            fix="it can be measured in the air alone: the flight tells it at its end",
             source="summary.json",
         )
         return
@@ -54,13 +54,13 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
         found = f"the dead time of {folder.name} was as configured"
         yield Finding(Key.DEAD_TIME, SAFE, found, source=str(folder))
         return
-    found, _semicolon, mend = warning.partition("; ")
+    found, _semicolon, fix = warning.partition("; ")
     yield Finding(
         Key.DEAD_TIME,
         INEFFECTIVE,
         f"in {folder.name} the {found}",
         "the planner foresees the wrong attitude",
-        mend,
+        fix,
         str(folder),
     )
 

@@ -127,7 +127,7 @@ class Evidence:
         window: How long was counted, s.
         link: How good the link is.
         samples: The attitude samples' times.
-        company: Who else is there.
+        other_nodes: Who else is there.
         resets: How often the estimator jumped meanwhile.
         identity: What the autopilot is.
         stage: What the vehicle is judged for.
@@ -143,7 +143,7 @@ class Evidence:
     window: float
     link: LinkQuality
     samples: SampleTimes
-    company: OtherNodes
+    other_nodes: OtherNodes
     resets: int
     identity: Identity
     stage: Stage = Stage.GROUND

@@ -7,8 +7,8 @@ from companion.preflight import clock_checks, configuration_checks, link_checks,
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding
 from companion.preflight.offboard_loss import offboard_loss
-from companion.preflight.parameter_findings import parameters
-from companion.vehicle.parameter_rules import Verdict
+from companion.preflight.parameters import parameters
+from companion.vehicle.parameter_rules import CheckResult
 
 Check = Callable[[Config, Evidence], Iterator[Finding]]
 
@@ -23,7 +23,7 @@ CHECKS: tuple[Check, ...] = (
     vehicle_checks.attitude,
     vehicle_checks.estimator,
     vehicle_checks.fence,
-    link_checks.company,
+    link_checks.other_nodes,
     link_checks.streams,
     link_checks.losses,
     link_checks.delays,
@@ -56,29 +56,29 @@ def examine(config: Config, evidence: Evidence, *, again: bool = False) -> list[
     ]
 
 
-def forbidding(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+def blocking(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """With any of these nothing is flown: unsafe and not excepted, or not ready."""
     findings = tuple(findings)
-    waiting = (finding for finding in findings if finding.verdict is Verdict.NOT_READY)
-    return [*unexcepted(config, findings), *waiting]
+    waiting = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
+    return [*not_accepted(config, findings), *waiting]
 
 
-def unexcepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """What is unsafe and not excepted by `flight.accept`."""
     return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
 
 
-def result(config: Config, findings: Iterable[Finding]) -> Verdict:
+def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
     """What it comes to: the gravest verdict that `companion fly` would heed, else safe."""
     findings = tuple(findings)
-    verdicts = {finding.verdict for finding in findings}
-    if Verdict.NOT_CONNECTED in verdicts:
-        return Verdict.NOT_CONNECTED
-    if unexcepted(config, findings):
-        return Verdict.UNSAFE
-    return Verdict.NOT_READY if Verdict.NOT_READY in verdicts else Verdict.SAFE
+    verdicts = {finding.result for finding in findings}
+    if CheckResult.NOT_CONNECTED in verdicts:
+        return CheckResult.NOT_CONNECTED
+    if not_accepted(config, findings):
+        return CheckResult.UNSAFE
+    return CheckResult.NOT_READY if CheckResult.NOT_READY in verdicts else CheckResult.SAFE
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
     """Of the findings those by which somebody may be hurt or the vehicle lost."""
-    return [finding for finding in findings if finding.verdict is Verdict.UNSAFE]
+    return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

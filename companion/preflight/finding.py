@@ -1,17 +1,17 @@
-"""What the doctor says: findings, each with what it means, what to do, and where it is known from.
+"""Findings of the preflight checks: what was found, what follows, what to do, and the source.
 
-Findings about a parameter have its name as their key; all other keys stand here.
+A finding about a parameter has its name as key. All other keys are listed here.
 """
 
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 
 
 class Key(StrEnum):
-    """What findings that are not about one parameter are called, in `flight.accept`, say."""
+    """Names of the findings that are not about one parameter, as `flight.accept` uses them."""
 
     HEARTBEAT = "vehicle.heartbeat"
     ANSWERS = "vehicle.answers"
@@ -52,13 +52,13 @@ class Key(StrEnum):
 
 
 class Change(NamedTuple):
-    """A parameter that is to be set.
+    """A parameter to set.
 
     Attributes:
         parameter: Its name, as this autopilot knows it.
         old: Value that it has.
         new: Value that it should have.
-        reboot: Whether it counts only after the autopilot was started anew.
+        reboot: Whether it takes effect only after the autopilot restarts.
     """
 
     parameter: str
@@ -69,28 +69,28 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at.
+    """What one check found.
 
     Attributes:
         key: A `Key`, or a parameter's (newest) name.
         verdict: How much it matters.
-        found: What is so, one clause.
-        because: What comes of it, or, where nothing does, what it decides; may be empty.
-        mend: What to do about it; empty where nothing can or needs to be done.
-        source: Where this is known from: a MAVLink message, a reference, a measurement.
-        change: The parameter to set, if that mends it.
+        found: What was found, one clause.
+        because: What follows from it, or what the parameter decides; may be empty.
+        fix: What to do about it; empty where nothing can or must be done.
+        source: How this is known: a MAVLink message, a reference, a measurement.
+        change: The parameter to set, if that fixes it.
     """
 
     key: str
-    verdict: Verdict
+    result: CheckResult
     found: str
     because: str = ""
-    mend: str = ""
+    fix: str = ""
     source: str = ""
     change: Change | None = None
 
     def sentence(self) -> str:
-        """All of it but the source, for people."""
+        """The finding without its source, for people."""
         because = f": {self.because}" if self.because else ""
-        mend = f"; {self.mend}" if self.mend else ""
-        return f"{self.found}{because}{mend}"
+        fix = f"; {self.fix}" if self.fix else ""
+        return f"{self.found}{because}{fix}"

@@ -7,10 +7,10 @@ from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import SOME_LOST
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.streams import StreamRate
 
-SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _REACHED = 0.7
 """PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
@@ -48,10 +48,10 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 source="counted",
             )
         elif trouble is not None:
-            found, mend = trouble
+            found, fix = trouble
             because = "what hangs on it works late or not at all"
             yield Finding(
-                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, mend, source="counted"
+                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
             )
         else:
             good.append(f"{name} {rate.achieved:.0f} of {rate.asked:g}")
@@ -92,11 +92,11 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """What does not arrive, or not as it was sent."""
     link = evidence.link
     share = link.loss
-    verdict = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
-    bad = verdict is not SAFE
+    result = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
+    bad = result is not SAFE
     yield Finding(
         Key.LOSS,
-        verdict,
+        result,
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
         "so are as many of our setpoints, and the pilot's mode is told late" if bad else "",
         "ask for lower rates, or use a faster or better link" if bad else "",
@@ -150,7 +150,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE,
             f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
             "deadman.telemetry_stale_ms",
-            mend="use a faster link",
+            fix="use a faster link",
             source="TIMESYNC",
         )
     else:
@@ -187,19 +187,21 @@ def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
     yield from signing_findings(evidence.link.notices)
 
 
-def signing_findings(notices: Iterable[str], verdict: Verdict = INEFFECTIVE) -> Iterator[Finding]:
-    """What the link said of signatures and of the peer, as findings of a `verdict`."""
+def signing_findings(
+    notices: Iterable[str], result: CheckResult = INEFFECTIVE
+) -> Iterator[Finding]:
+    """Notices of the link about signatures and the peer, as findings with this `result`."""
     for notice in notices:
         of_peer = notice.startswith(PEER_NOTICE)
-        found, _semicolon, mend = notice.removeprefix(PEER_NOTICE).partition("; ")
+        found, _semicolon, fix = notice.removeprefix(PEER_NOTICE).partition("; ")
         key = Key.ENDPOINT if of_peer else Key.SIGNING
         source = "senders' addresses" if of_peer else "MAVLink 2 signatures"
-        yield Finding(key, verdict, found, mend=mend, source=source)
+        yield Finding(key, result, found, fix=fix, source=source)
 
 
-def company(config: Config, evidence: Evidence) -> Iterator[Finding]:
+def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Who else speaks to the vehicle."""
-    link, others = config.link, evidence.company
+    link, others = config.link, evidence.other_nodes
     ours = link.source_system, link.source_component
     if ours in others.sources:
         yield Finding(

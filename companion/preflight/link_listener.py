@@ -1,4 +1,4 @@
-"""An ear on the link for a while: when samples come, who else speaks, how the estimate jumps."""
+"""Listens to the link for a while: sample times, other nodes on it, jumps of the estimate."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -92,7 +92,7 @@ class LinkListener:
         )
 
     @property
-    def company(self) -> OtherNodes:
+    def other_nodes(self) -> OtherNodes:
         """Who else was heard so far."""
         return OtherNodes(
             frozenset(self._sources),

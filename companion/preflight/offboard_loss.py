@@ -14,7 +14,7 @@ from companion.guidance.reference import Vector
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_hold
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 
 _PERIOD = 0.05
 """The maneuvers are looked at this often, s,"""
@@ -55,13 +55,13 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     )
     source = "worst case of docs/exits.md"
     if worst.breach is None:
-        yield Finding(Key.OFFBOARD_LOSS, Verdict.SAFE, carried, source=source)
+        yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, carried, source=source)
         return
     shortest = shortest_hold(config.deadman.silence_limit)
     shorter = f"set {failsafe.parameter} to {shortest:g}, " if held > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,
-        Verdict.INEFFECTIVE,
+        CheckResult.INEFFECTIVE,
         carried,
         f"{worst.time:.1f} s after control begins that can end {worst.breach}",
         f"{shorter}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther from the "

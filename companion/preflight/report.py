@@ -8,32 +8,32 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.config import Config
-from companion.preflight.apply_fixes import Outcome
-from companion.preflight.examination import result, unexcepted, unsafe
+from companion.preflight.examination import not_accepted, overall_result, unsafe
 from companion.preflight.finding import Finding
-from companion.vehicle.parameter_rules import Verdict
+from companion.preflight.parameter_fixes import Outcome
+from companion.vehicle.parameter_rules import CheckResult
 
 _TITLES = {
-    Verdict.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
-    Verdict.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
-    Verdict.INEFFECTIVE: ("INEFFECTIVE: it will not do what is asked of it", "bold yellow"),
-    Verdict.NOT_READY: ("NOT READY: not to be armed yet", "bold yellow"),
-    Verdict.SAFE: ("SAFE", "bold green"),
+    CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was judged", "bold red"),
+    CheckResult.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
+    CheckResult.INEFFECTIVE: ("INEFFECTIVE: it will not do what is asked of it", "bold yellow"),
+    CheckResult.NOT_READY: ("NOT READY: not to be armed yet", "bold yellow"),
+    CheckResult.SAFE: ("SAFE", "bold green"),
 }
 
 _RESULTS = {
-    Verdict.NOT_CONNECTED: "not connected",
-    Verdict.UNSAFE: "unsafe",
-    Verdict.NOT_READY: "not ready",
-    Verdict.SAFE: "ok",
+    CheckResult.NOT_CONNECTED: "not connected",
+    CheckResult.UNSAFE: "unsafe",
+    CheckResult.NOT_READY: "not ready",
+    CheckResult.SAFE: "ok",
 }
 
 
 def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
     """A table for each verdict that was given, the worst first, and a last line."""
     parts: list[RenderableType] = []
-    for verdict, (title, style) in _TITLES.items():
-        of_it = [finding for finding in findings if finding.verdict is verdict]
+    for result, (title, style) in _TITLES.items():
+        of_it = [finding for finding in findings if finding.result is result]
         if of_it:
             parts.append(_table(title, style, of_it, config.flight.accept))
     return Group(*parts, _last_line(config, findings))
@@ -48,21 +48,21 @@ def _table(
     table.add_column("source", ratio=2, style="dim")
     for finding in findings:
         excepted = "excepted by flight.accept" if finding.key in accepted else ""
-        advice = "; ".join(filter(None, (finding.because, finding.mend, excepted)))
+        advice = "; ".join(filter(None, (finding.because, finding.fix, excepted)))
         table.add_row(*map(Text, (finding.found, advice, finding.source)))
     return table
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
-    forbidden, amiss = unexcepted(config, findings), len(unsafe(findings))
-    verdict = result(config, findings)
-    if verdict is Verdict.NOT_CONNECTED:
+    forbidden, amiss = not_accepted(config, findings), len(unsafe(findings))
+    result = overall_result(config, findings)
+    if result is CheckResult.NOT_CONNECTED:
         return Text("not connected: nothing was judged", style="bold red")
     if forbidden:
         mendable = sum(finding.change is not None for finding in forbidden)
         fix = f"; `companion doctor --fix` mends {mendable} of them" if mendable else ""
         return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
-    if verdict is Verdict.NOT_READY:
+    if result is CheckResult.NOT_READY:
         return Text("not ready: ask again once it is, for not all was judged", style="bold yellow")
     if amiss:
         return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
@@ -81,11 +81,10 @@ def outcome_line(outcome: Outcome) -> str:
 def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:
     """For JSON."""
     counts = {
-        verdict.value: sum(finding.verdict is verdict for finding in findings)
-        for verdict in _TITLES
+        result.value: sum(finding.result is result for finding in findings) for result in _TITLES
     }
     return {
-        "result": _RESULTS[result(config, findings)],
+        "result": _RESULTS[overall_result(config, findings)],
         **counts,
         "findings": [_finding_as_dict(config, finding) for finding in findings],
     }
@@ -99,11 +98,11 @@ def outcome_as_dict(outcome: Outcome) -> dict[str, Any]:
 def _finding_as_dict(config: Config, finding: Finding) -> dict[str, Any]:
     return {
         "key": str(finding.key),
-        "verdict": finding.verdict.value,
+        "verdict": finding.result.value,
         "accepted": finding.key in config.flight.accept,
         "found": finding.found,
         "because": finding.because,
-        "mend": finding.mend,
+        "mend": finding.fix,
         "source": finding.source,
         "change": None if finding.change is None else finding.change._asdict(),
     }

@@ -1,77 +1,192 @@
-"""One visit to the doctor: connect, wait a little for the vehicle to be ready, listen, judge."""
+"""One preflight session: connect, wait for the vehicle to be ready, listen, and judge.
+
+It only reads, and requests message rates. Nothing here arms the vehicle or sends a setpoint.
+"""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 
 from companion.config import Config
-from companion.mavlink.errors import LinkError, LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.errors import CommandRefused, LinkError, LinkTimeout, UnsupportedAutopilot
+from companion.mavlink.frame_filter import Notice
+from companion.mavlink.messages import dialect, message_id
+from companion.mavlink.stats import LinkStats
 from companion.preflight import vehicle_checks
-from companion.preflight.evidence import Evidence
+from companion.preflight.evidence import Evidence, Identity, LinkQuality, Stage
 from companion.preflight.finding import Finding, Key
-from companion.preflight.gathering import gather, wanted_rates
 from companion.preflight.link_checks import signing_findings
-from companion.vehicle.inbox import Notice
+from companion.preflight.link_listener import LinkListener
+from companion.preflight.parameter_survey import Survey, survey
+from companion.vehicle.clock_estimates import DelayUnknown
 from companion.vehicle.link import Link
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
+from companion.vehicle.streams import StreamRate
 
 _LISTENING = 3.0
-"""s; enough to count what comes at 2 Hz."""
+"""Time to listen, s: enough to count messages at 2 Hz."""
 _POLL = 0.05
+_WARNING = 4
+"""MAV_SEVERITY: this and below is a warning or worse."""
+_RELEASES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
+"""FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
 
 
-class Patient:
-    """A vehicle at the other end of an open link.
+def wanted_rates(config: Config, link: Link) -> dict[str, float]:
+    """The message rates that a flight requests, Hz."""
+    return {
+        **link.autopilot.wanted_rates,
+        "ATTITUDE_QUATERNION": config.link.attitude_rate_hz,
+        "LOCAL_POSITION_NED": config.link.position_rate_hz,
+    }
+
+
+async def gather(
+    link: Link,
+    granted: Mapping[str, StreamRate],
+    seconds: float,
+    *,
+    stage: Stage = Stage.GROUND,
+    thorough: bool = False,
+    notices: Sequence[str] = (),
+    known: Survey | None = None,
+) -> Evidence:
+    """Listen for `seconds`, and read the parameters meanwhile.
 
     Args:
-        config: What it is to be flown with.
-        link: To it.
-        notices: What the link says of itself.
+        link: To a vehicle that was heard.
+        granted: The message rates that were requested.
+        seconds: Time to count messages, s.
+        stage: What the vehicle is about to do.
+        thorough: Also run the pre-arm checks, so that the autopilot says what forbids arming.
+        notices: What the link reports about itself; read at the end.
+        known: The same vehicle's parameters, if they were read before.
+
+    Raises:
+        LinkLost: The connection dropped meanwhile.
+    """
+    loop = asyncio.get_running_loop()
+    before, began = replace(link.stats), loop.time()
+    with LinkListener(link, loop.time) as listener:
+        read, achieved, identity = await asyncio.gather(
+            survey(link, link.autopilot.parameters, before=known),
+            link.measure_rates(granted, seconds),
+            _identity_and_words(link) if thorough else identify(link),
+        )
+    counts = link.stats.by_message
+    return Evidence(
+        autopilot=link.autopilot,
+        state=link.state,
+        survey=read,
+        streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
+        received={name: counts.get(message_id(name), 0) for name in granted},
+        window=seconds,
+        link=_quality(link, before, tuple(notices)),
+        samples=listener.samples,
+        other_nodes=listener.other_nodes,
+        resets=listener.resets,
+        identity=identity,
+        stage=stage,
+        words=tuple(
+            text.text
+            for text in link.state.texts
+            if text.severity <= _WARNING and text.time >= began
+        ),
+    )
+
+
+async def identify(link: Link) -> Identity:
+    """Request AUTOPILOT_VERSION; empty if it does not come. Raises `LinkLost`."""
+    try:
+        told = await link.request_message("AUTOPILOT_VERSION")
+    except (CommandRefused, LinkTimeout):
+        return Identity()
+    number = told.flight_sw_version
+    version = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
+    return Identity(
+        version=version + _RELEASES.get(number & 0xFF, ""),
+        capabilities=told.capabilities,
+        uid=bytes(told.uid2).hex() if any(told.uid2) else f"{told.uid:016x}" if told.uid else None,
+    )
+
+
+async def _identity_and_words(link: Link) -> Identity:
+    """Run the pre-arm checks, whose results come as texts, and identify the autopilot."""
+    if not link.state.armed:
+        # ArduPilot sends these texts by itself only every 30 s.
+        with suppress(CommandRefused, LinkTimeout):
+            await link.command(dialect.MAV_CMD_RUN_PREARM_CHECKS, retries=1)
+    return await identify(link)
+
+
+def _quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
+    now = link.stats
+    return LinkQuality(
+        frames=now.frames - before.frames,
+        lost=now.lost - before.lost,
+        damaged=now.bad_crc - before.bad_crc,
+        not_finite=now.non_finite - before.non_finite,
+        reconnects=now.reconnects - before.reconnects,
+        round_trip=link.timesync.round_trip_s,
+        jitter=link.timesync.jitter_s,
+        notices=notices,
+        other_clock=link.clock.delay.unknown is DelayUnknown.OTHER_CLOCK,
+    )
+
+
+class PreflightSession:
+    """Checks one vehicle over an open link.
+
+    Args:
+        config: Of the flight that is checked for.
+        link: To the vehicle.
+        notices: What the link reports about itself.
     """
 
     def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
         self._config, self._notices = config, notices
         self.link = link
 
-    async def met(self) -> list[Finding]:
-        """Wait for the heartbeat; what is found where there is nothing more to be asked."""
+    async def wait_for_vehicle(self) -> list[Finding]:
+        """Wait for the heartbeat; return findings only if there is nobody to check further."""
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:
-            return self.silent(error)
+            return self.unanswered(error)
         except UnsupportedAutopilot as error:
-            return [_met(Key.SUPPORTED, Verdict.UNSAFE, str(error))]
+            return [_from_words(Key.SUPPORTED, CheckResult.UNSAFE, str(error))]
         return []
 
-    def silent(self, error: LinkError) -> list[Finding]:
-        """What is found where nobody answers any more: the likely cause first."""
-        hints = signing_findings(self._notices, Verdict.NOT_CONNECTED)
+    def unanswered(self, error: LinkError) -> list[Finding]:
+        """Findings about a vehicle that does not answer, the likely cause first."""
+        hints = signing_findings(self._notices, CheckResult.NOT_CONNECTED)
         state = self.link.state
         if state.heartbeat is None:
-            return [*hints, _met(Key.HEARTBEAT, Verdict.NOT_CONNECTED, str(error))]
-        unanswered = Finding(
+            return [*hints, _from_words(Key.HEARTBEAT, CheckResult.NOT_CONNECTED, str(error))]
+        silence = Finding(
             Key.ANSWERS,
-            Verdict.NOT_CONNECTED,
+            CheckResult.NOT_CONNECTED,
             f"the vehicle is heard and does not answer: {error}",
-            "what it would do with our setpoints is not known",
-            "see whether what we send reaches it: wiring, ports, a router, signing",
+            "what it would do with our setpoints is unknown",
+            "check that our messages reach it: wiring, ports, a router, signing",
             "COMMAND_ACK",
         )
         alarms = (vehicle_checks.armed(state), *vehicle_checks.failsafe(state))
-        amiss = (finding for finding in alarms if finding.verdict is Verdict.UNSAFE)
-        return [*hints, unanswered, *amiss]
+        amiss = (finding for finding in alarms if finding.result is CheckResult.UNSAFE)
+        return [*hints, silence, *amiss]
 
-    async def evidence(self, patience: float) -> Evidence:
-        """Ask for telemetry, wait up to `patience` s for readiness, listen.
+    async def gather(self, ready_within: float) -> Evidence:
+        """Ask for telemetry, wait up to `ready_within` s for readiness, listen.
 
         Raises:
-            CommandTimeout: It does not answer commands; `silent` says what that means.
-            LinkLost: The connection dropped meanwhile; the same.
+            CommandTimeout: It does not answer commands; see `unanswered`.
+            LinkLost: The connection dropped meanwhile; see `unanswered`.
         """
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
         with suppress(TimeoutError):
-            async with asyncio.timeout(patience):
+            async with asyncio.timeout(ready_within):
                 while self._waits():  # noqa: ASYNC110 - telemetry sets no events
                     await asyncio.sleep(_POLL)
         return await gather(link, granted, _LISTENING, thorough=True, notices=self._notices)
@@ -82,12 +197,14 @@ class Patient:
 
 
 @asynccontextmanager
-async def patient(config: Config, link_to: Callable[[Notice], Link]) -> AsyncIterator[Patient]:
-    """Open the link; nothing but heartbeats and clock requests leaves before something is asked.
+async def open_session(
+    config: Config, link_to: Callable[[Notice], Link]
+) -> AsyncIterator[PreflightSession]:
+    """Open the link. Until the session asks something, only heartbeats and clock requests leave.
 
     Args:
-        config: What the vehicle is to be flown with.
-        link_to: Makes the link, which tells of itself to what it is given.
+        config: Of the flight that is checked for.
+        link_to: Makes the link from what takes its notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.
@@ -95,9 +212,9 @@ async def patient(config: Config, link_to: Callable[[Notice], Link]) -> AsyncIte
     """
     notices: list[str] = []
     async with link_to(notices.append) as link:
-        yield Patient(config, link, notices)
+        yield PreflightSession(config, link, notices)
 
 
-def _met(key: Key, verdict: Verdict, words: str) -> Finding:
-    found, _semicolon, mend = words.partition("; ")
-    return Finding(key, verdict, found, mend=mend, source="HEARTBEAT")
+def _from_words(key: Key, result: CheckResult, words: str) -> Finding:
+    found, _semicolon, fix = words.partition("; ")
+    return Finding(key, result, found, fix=fix, source="HEARTBEAT")

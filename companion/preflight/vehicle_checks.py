@@ -7,11 +7,11 @@ from companion.guidance.fence import Place, inside, local_polygon
 from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
-SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
-NOT_READY = Verdict.NOT_READY
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
+NOT_READY = CheckResult.NOT_READY
 
 _FEW_UNUSABLE = 0.01
 """A larger share than this of the attitude samples is more than one damaged message."""
@@ -24,7 +24,7 @@ def armed(state: VehicleState) -> Finding:
             Key.ARMED,
             UNSAFE,
             "the vehicle is already armed",
-            mend="land and disarm it first",
+            fix="land and disarm it first",
             source="HEARTBEAT",
         )
     return Finding(Key.ARMED, SAFE, "the vehicle is disarmed", source="HEARTBEAT")
@@ -58,7 +58,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
             Key.BATTERY,
             UNSAFE,
             f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent",
-            mend="charge it",
+            fix="charge it",
             source=source,
         )
     return Finding(Key.BATTERY, SAFE, f"battery at {100 * remaining:.0f} %", source=source)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from companion.extras import require
 from companion.recording.response import first_order
-from companion.recording.second_order import nearest_second_order
-from companion.recording.step_run import StepRun, step_runs
+from companion.recording.second_order import StepRun, nearest_second_order, step_runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

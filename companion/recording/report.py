@@ -126,11 +126,15 @@ def _loop(summary: Summary) -> RenderableType:
 
 def _loop_words(summary: Summary) -> Text:
     counts, link = summary.counts, summary.link
+    reasons = [
+        f"{count} {name.replace('_', ' ')}" for name, count in counts.unanswered.items() if count
+    ]
+    unanswered = f"\nunanswered samples: {', '.join(reasons)}" if reasons else ""
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
         f"in the maneuver\n{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
-        f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite"
+        f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )
 
 

@@ -4,9 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.fitting import minimise
-from companion.recording.second_order import SecondOrderFit, nearest_second_order
-from companion.recording.step_run import Floats, StepRun, step_runs
+from companion.least_squares import minimise
+from companion.recording.second_order import (
+    Floats,
+    SecondOrderFit,
+    StepRun,
+    nearest_second_order,
+    step_runs,
+)
 
 _TIME_CONSTANT = (0.02, 2.0)
 """Between what it is searched, s."""

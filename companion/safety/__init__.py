@@ -1,7 +1,7 @@
-"""The safety ladder: what is watched while the autopilot obeys us, and what each breach means."""
+"""The safety ladder: monitors judge snapshots in flight, and each breach leads to an action."""
 
+from companion.safety.actions import Action
 from companion.safety.ladder import SafetyLadder, Verdict
-from companion.safety.monitor import Action
 from companion.safety.table import monitors
 
 __all__ = ["Action", "SafetyLadder", "Verdict", "monitors"]

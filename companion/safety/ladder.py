@@ -1,18 +1,19 @@
-"""The ladder: every monitor looks at the same snapshot, and the gravest breach decides."""
+"""The ladder: every monitor judges the same snapshot, and the most severe breach decides."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from companion.safety.monitor import Action, Alarm, Monitor
+from companion.safety.actions import Action
+from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Snapshot
 
 
 class Verdict(NamedTuple):
-    """What is to be done.
+    """The action that the flight must take now.
 
     Attributes:
         action: HOLD, or one that ends the flight.
-        reason: in words.
+        reason: the breach in words.
         mutes: see `Monitor`.
     """
 
@@ -22,17 +23,17 @@ class Verdict(NamedTuple):
 
 
 class SafetyLadder:
-    """Climbs as far as the gravest breach asks, and never down again.
+    """Escalates to the action of the most severe breach, and never de-escalates.
 
-    A hold that mends what it was called for ends the flight by landing, since the maneuver is
-    given up; one that does not within `hold_time` goes on to the monitor's next rung.
+    A hold that ends its breach is followed by a landing, because the maneuver is given up. A hold
+    that does not end it within `hold_time` is followed by the monitor's `then`.
 
     Attributes:
-        note: takes every transition, in words.
+        note: takes a message for every transition.
 
     Args:
-        monitors: the table; among equals the first one speaks.
-        hold_time: how long a hold may take to mend things, s.
+        monitors: the table; among equally severe breaches the first row decides.
+        hold_time: how long a hold may take to end its breach, s.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:
@@ -43,30 +44,30 @@ class SafetyLadder:
         self._held_for = ""
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
-        """Look once; what is to be done now, if anything."""
-        raised = [alarm for alarm in self._alarms if alarm.step(snapshot) and self._tell(alarm)]
-        gravest = max(raised, key=_rung, default=None)
-        if gravest is not None and gravest.monitor.action.severity > Action.HOLD.severity:
-            return _verdict(gravest, gravest.monitor.action)
+        """Judge one snapshot; returns the action to take now, or None."""
+        raised = [alarm for alarm in self._alarms if alarm.step(snapshot) and self._report(alarm)]
+        worst = max(raised, key=_severity, default=None)
+        if worst is not None and worst.monitor.action.severity > Action.HOLD.severity:
+            return _verdict(worst, worst.monitor.action)
         if self._held_at is not None:
             return self._after_hold(snapshot.now, self._held_at)
-        if gravest is not None and gravest.monitor.action is Action.HOLD:
-            self._held_at, self._held_for = snapshot.now, gravest.reason or ""
-            return _verdict(gravest, Action.HOLD)
+        if worst is not None and worst.monitor.action is Action.HOLD:
+            self._held_at, self._held_for = snapshot.now, worst.reason or ""
+            return _verdict(worst, Action.HOLD)
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """Whether holding has mended it, or has had its time."""
-        wrong = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
-        if not wrong:
+        """The verdict once the hold has ended its breach or its time is over."""
+        breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
+        if not breaches:
             return Verdict(Action.LAND, self._held_for)
         if now - held_at < self._hold_time:
             return None
-        gravest = max(wrong, key=lambda alarm: alarm.monitor.then.severity)
-        return _verdict(gravest, gravest.monitor.then)
+        worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)
+        return _verdict(worst, worst.monitor.then)
 
-    def _tell(self, alarm: Alarm) -> bool:
-        """Tell a transition; whether the alarm was raised by it."""
+    def _report(self, alarm: Alarm) -> bool:
+        """Report a transition; returns whether it raised the alarm."""
         name = alarm.monitor.name
         if alarm.reason is None:
             self.note(f"safety: {name} is over")
@@ -75,7 +76,7 @@ class SafetyLadder:
         return alarm.reason is not None
 
 
-def _rung(alarm: Alarm) -> int:
+def _severity(alarm: Alarm) -> int:
     return alarm.monitor.action.severity
 
 

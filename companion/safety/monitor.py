@@ -1,51 +1,27 @@
-"""One monitor: a judge of snapshots, how long a breach must last, and what it leads to."""
+"""One monitor: a judge of snapshots, how long a breach must last, and the action it leads to."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 
-from companion.safety.ending import Exit
+from companion.safety.actions import Action
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""What is wrong, in words, or None. The flag says that it has been wrong: a judge with a limit then
-asks for a little less than the limit, so that it does not change its mind all the time."""
+"""Returns the breach in words, or None. The flag says whether the alarm is raised already: a judge
+with a limit then uses `released`, so that it does not toggle at the limit."""
 
-RELEASE = 0.9
-"""What is over a limit is within it again only below this share of it."""
+HYSTERESIS = 0.9
+"""A raised alarm is over only below this share of its limit."""
 
 
 def released(limit: float, raised: bool) -> float:
-    """The largest value that is not wrong."""
-    return RELEASE * limit if raised else limit
+    """The largest value that is no breach."""
+    return HYSTERESIS * limit if raised else limit
 
 
-class Action(Enum):
-    """The rungs, from below; the value is the word in YAML."""
-
-    WARN = "warn"
-    """Say so, once, and fly on."""
-    HOLD = "hold"
-    """Give the maneuver up and hold where the vehicle is, still in offboard."""
-    HAND_BACK = "hand_back"
-    """Ask the autopilot to hold; it is left holding."""
-    LAND = "land"
-    """Hand back, and ask the autopilot to land."""
-    RELEASE = "release"
-    """Send nothing any more: the vehicle is its pilot's or its failsafe's."""
-
-    @property
-    def severity(self) -> int:
-        """How far up it is."""
-        return list(Action).index(self)
-
-
-EXITS = {
-    Action.HAND_BACK: Exit.HOLD,
-    Action.LAND: Exit.LAND,
-    Action.RELEASE: Exit.RELEASE,
-}
-"""How a flight ends that an action ends."""
+def released_minimum(limit: float, raised: bool) -> float:
+    """The smallest value that is no breach."""
+    return limit * (1.0 / HYSTERESIS) if raised else limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +32,10 @@ class Monitor:
         name: as in the documentation and in YAML.
         judge: see `Judge`; it has no clock and no memory.
         action: what a breach leads to.
-        lasts: how long it must last before, s.
-        calm: how long it must be away to be over, s.
-        then: what a hold that does not mend it leads to.
-        mutes: setpoints stop at once, since what they are made from is not to be trusted.
+        lasts: how long a breach must last before the alarm is raised, s.
+        calm: how long the breach must be absent before the alarm is over, s.
+        then: what follows a hold that does not end the breach.
+        mutes: whether setpoints stop at once, because their data cannot be trusted.
     """
 
     name: str
@@ -72,11 +48,11 @@ class Monitor:
 
 
 class Alarm:
-    """A monitor at work: debounce and hysteresis.
+    """The state of one monitor in flight: debounce and hysteresis.
 
     Attributes:
-        monitor: whose.
-        reason: what was wrong when it was raised; None while it is not.
+        monitor: the row of the table.
+        reason: the breach when the alarm was raised; None while it is not raised.
     """
 
     def __init__(self, monitor: Monitor) -> None:
@@ -85,15 +61,15 @@ class Alarm:
         self._since: float | None = None
 
     def step(self, snapshot: Snapshot) -> bool:
-        """Look once; whether it was raised or was over just now."""
-        wrong = self.monitor.judge(snapshot, self.reason is not None)
-        if (wrong is None) is (self.reason is None):
+        """Judge one snapshot; returns whether the alarm was raised or is over just now."""
+        breach = self.monitor.judge(snapshot, self.reason is not None)
+        if (breach is None) is (self.reason is None):
             self._since = None
             return False
         if self._since is None:
             self._since = snapshot.now
-        needed = self.monitor.lasts if wrong is not None else self.monitor.calm
+        needed = self.monitor.lasts if breach is not None else self.monitor.calm
         if snapshot.now - self._since < needed:
             return False
-        self.reason, self._since = wrong, None
+        self.reason, self._since = breach, None
         return True

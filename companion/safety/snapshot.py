@@ -1,17 +1,17 @@
-"""All that the monitors judge, as it was at one time. SI; world NED, body FRD."""
+"""The snapshot that all monitors judge, taken at one time. SI; world NED, body FRD."""
 
 from math import inf
 from typing import NamedTuple
 
 from companion.attitude import Quaternion
-from companion.control.unanswered import Unanswered
+from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 
 
 class Autopilot(NamedTuple):
-    """What the autopilot says of itself; None where it said nothing."""
+    """The autopilot's status; None where it was not received."""
 
     armed: bool | None = True
     landed: bool = False
@@ -22,17 +22,17 @@ class Autopilot(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """How the vehicle moves, in the frame without the estimate's jumps.
+    """Motion of the vehicle, in the frame without estimator resets.
 
     Attributes:
         q: attitude, or None.
         body_rates: rad/s.
-        offset: position from where control began, m, or None.
+        offset: position relative to where control began, m, or None.
         velocity: m/s.
-        height: above home, m, or None; as the autopilot tells it, jumps included.
-        off_course: distance from the reference, m; None where none is followed.
-        thrust: as it was last sent, 0..1, or None.
-        origin: where control began, or None where that is not known.
+        height: above home, m, or None; as the autopilot reports it, resets included.
+        off_course: distance from the reference, m; None without a reference.
+        thrust: as last sent, 0..1, or None.
+        origin: where control began, or None where that is unknown.
     """
 
     q: Quaternion | None = None
@@ -46,19 +46,18 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When each stage of a sample's way last ran, s on our clock, and what stops it.
+    """When each stage of the sample path last ran, s on our clock, and what stops it.
 
     Attributes:
-        answered: a setpoint left.
-        sampled: an attitude came.
-        reason: why the newest attitude was not answered, or None.
-        commanded: guidance made a command.
-        placed: a position came, newer than those before.
-        heard: anything at all came from the vehicle.
-        position_fresh: the newest position is one to fly by.
-        clock_change: how the vehicle's clock has jumped or restarted since control began, in
-            words, or None.
-        stood_still: for how long our own timer did not run since a setpoint left, s.
+        answered: last answered sample.
+        sampled: last attitude.
+        reason: why the newest attitude is unanswered, or None.
+        commanded: last command from guidance.
+        placed: last position that was newer than those before.
+        heard: last frame of any kind from the vehicle.
+        position_fresh: whether the newest position is fresh.
+        clock_change: how the vehicle's clock jumped or restarted since control began, or None.
+        stood_still: how long our timer did not run since the last answer, s.
     """
 
     answered: float = inf
@@ -73,16 +72,16 @@ class Control(NamedTuple):
 
 
 class Health(NamedTuple):
-    """Of the link and of this computer, over the last second or two; None where not known.
+    """Link and computer over the last second; None where unknown.
 
     Attributes:
-        lost: share of the vehicle's frames that did not come.
+        lost: share of the vehicle's frames that were lost.
         round_trip: of TIMESYNC, s.
-        missed: share of answers that came after their deadline.
-        starved: share of the time by which our own timer was late.
-        answer_rate: setpoints a second, Hz, bursts counted as what they are (`HeldRates`).
-        gaps: how many gaps in the answers there were within the last few seconds.
-        position_rate: positions a second, Hz.
+        missed: share of answers that missed their deadline.
+        starved: share of the time by which our timer was late.
+        answer_rate: rate of setpoints, Hz; bursts count as the pauses between them (`HeldRates`).
+        gaps: number of gaps in the answers within the last few seconds.
+        position_rate: rate of positions, Hz.
     """
 
     lost: float | None = None
@@ -95,12 +94,12 @@ class Health(NamedTuple):
 
 
 class Resets(NamedTuple):
-    """Of the estimator, since control began.
+    """Estimator resets since control began.
 
     Attributes:
-        recent: how many within the last while.
-        shift: how far the position jumped in sum, m.
-        turn: how far the heading jumped in sum, rad.
+        recent: number of resets within the last 30 s.
+        shift: sum of the position jumps, m.
+        turn: sum of the heading jumps, rad.
         tilt: largest jump of the thrust axis, rad.
     """
 
@@ -111,9 +110,10 @@ class Resets(NamedTuple):
 
 
 class Snapshot(NamedTuple):
-    """One look at everything; `now` in s on our clock.
+    """The state of vehicle, link and computer at one time.
 
     Attributes:
+        now: s on our clock.
         had_gps: whether GPS has had a 3D fix.
         good_flags: ESTIMATOR_STATUS flags that were set when control began.
     """

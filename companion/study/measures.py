@@ -7,7 +7,7 @@ import numpy as np
 
 from companion.attitude import Coefficients
 from companion.attitude.reference import SecondOrderReference
-from companion.fitting import minimise
+from companion.least_squares import minimise
 from companion.study.step import Floats, Response, Step
 
 FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")

@@ -15,8 +15,8 @@ Tick = Callable[[str], None]
 
 Cell = str | float | int
 
-Source = Literal["paper", "asked"]
-"""Of a finding: the paper claims it, or its claim raises the question."""
+Source = Literal["paper", "ours"]
+"""Of a finding: a claim of the paper, or our own statement about one of its claims."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class Finding:
     """A statement, and whether the computed numbers support it.
 
     Attributes:
-        source: who says so.
-        statement: the claim or the question.
+        source: where the statement is from.
+        statement: one sentence that can be true or false.
         holds: whether the numbers support it.
         evidence: the numbers, and the bound they were compared with.
     """

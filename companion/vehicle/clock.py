@@ -1,79 +1,46 @@
-"""The vehicle's clock as we know it: how old a sample is, and what became of the clock itself.
+"""The vehicle's clock as we know it: how old a sample is, and how the clock itself changed.
 
-Attitude samples tell how the vehicle's clock stands to ours, up to the time they were under way:
-the quickest one is the least late. TIMESYNC tells by how much even the quickest one is late.
+Each attitude sample tells the offset between the vehicle's clock and ours, less the time that the
+sample was under way: the quickest sample is the least late. TIMESYNC tells how late that one is.
 """
 
 from collections.abc import Callable
-from enum import Enum
 from math import inf, nan
-from typing import NamedTuple
 
-from companion.vehicle.clock_rate import ClockRate
-from companion.vehicle.telemetry_delay import DelayUnknown, TelemetryDelay
+from companion.vehicle.clock_estimates import ClockRate, DelayUnknown, TelemetryDelay
+from companion.vehicle.clock_jumps import (
+    JUMP,
+    REBOOTED,
+    TOGETHER,
+    Misfit,
+    MisfitRun,
+    Reading,
+    Stamp,
+    described,
+    wrapped,
+)
 
-JUMP = 0.05
-"""A stamp further ahead than this, s, is no drift; the simulators' clocks slip by up to 0.016."""
-_CONFIRMED_BY = 3
-_CONFIRMED_FOR = 0.04
-"""A clock has jumped when this many samples in a row say so, for this long, s. Fewer are strays."""
-_TOGETHER = 0.1
-"""Samples whose delays differ by less than this, s, may be of one clock."""
 _SETTLES_FOR = 2.0
 """What was queued before we listened may come late and make the first offset wrong, for this, s."""
-_REBOOTED = 2.0
-"""A clock that goes back by more than this, s, belongs to an autopilot that restarted; by less, it
-has only jumped."""
 _CERTAINLY_BACK = 0.5
 """TIMESYNC lags the samples' stamps a little; behind the newest by this, s, time has gone back, and
 has not only stood still."""
 _TIMESYNC_LAG = 0.012
 """TIMESYNC lags the samples' stamps by up to this, s, in the simulators (measured)."""
-_WRAP = 2**32 / 1000.0
-"""time_boot_ms is a uint32: it wraps after 49.7 days, s."""
-_NEAR_WRAP = 600.0
 _UNKNOWN_AFTER = 3.0
 """An autopilot that answers TIMESYNC does so within this time, s."""
-
-
-class Misfit(Enum):
-    """Why a sample does not fit the vehicle's clock."""
-
-    NOT_NEWER = "stamped no later than the one before"
-    AHEAD = "stamped far ahead of the vehicle's clock"
-
-
-class Reading(NamedTuple):
-    """One sample's time.
-
-    Attributes:
-        vehicle_time: s on the vehicle's clock; goes on where the clock jumps or restarts.
-        age: s at its arrival, never negative; beyond the quickest sample's where the delay is not
-            known; NaN for a misfit.
-        misfit: Why it must not be used, or None.
-    """
-
-    vehicle_time: float
-    age: float
-    misfit: Misfit | None = None
-
-
-class _Candidate(NamedTuple):
-    time: float
-    ahead: float
-    received: float
 
 
 class VehicleClock:
     """One vehicle's clock, fed by every attitude sample and TIMESYNC exchange.
 
-    All vehicle times it gives are continued over jumps: what computes with them never sees one.
+    All vehicle times that it gives continue over jumps: what computes with them never sees one.
 
     Attributes:
         rate: How fast the clock runs.
         delay: How late even the quickest sample is, by TIMESYNC.
         timeline: Rises whenever the clock jumped, wrapped, stood still or restarted.
-        restarts: Rises whenever the autopilot restarted: the time since boot went back, by seconds,
+        restarts: Rises whenever the autopilot restarted: its time since boot went back by seconds,
             and went on from there.
         last_change: The newest of these changes in words.
         outliers: Samples dropped because they alone were stamped far ahead.
@@ -94,7 +61,7 @@ class VehicleClock:
         self._shift = 0.0
         self._quickest = self._newest = -inf
         self._received = self._late = 0.0
-        self._candidates: list[_Candidate] = []
+        self._misfits = MisfitRun()
         self._told_unknown = False
         self._told_outlier = False
 
@@ -113,9 +80,9 @@ class VehicleClock:
         return time_boot_ms / 1000.0 + self._shift
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """How old what the vehicle stamped so is at `now`, s, never negative.
+        """Age at our time `now` of what the vehicle stamped with `vehicle_time`; both in s.
 
-        None before the first sample.
+        Never negative; None before the first sample.
         """
         offset = self.offset
         return None if offset is None else max(0.0, now + offset - vehicle_time)
@@ -138,12 +105,12 @@ class VehicleClock:
         ahead = time - received
         quickest = self._quickest + self.rate.slowest * (received - self._received)
         if time <= self._newest or ahead > quickest + JUMP:
-            misfit = self._judge_misfit(time_boot_ms, _Candidate(time, ahead, received), quickest)
+            misfit = self._judge_misfit(time_boot_ms, Stamp(time, ahead, received), quickest)
             if misfit is not None:
                 return Reading(time, nan, misfit)
             time = time_boot_ms / 1000.0 + self._shift
             ahead, quickest = time - received, self._quickest
-        elif self._candidates:
+        elif self._misfits.stamps:
             self._end_misfits(time_boot_ms, quickest - ahead)
             time = time_boot_ms / 1000.0 + self._shift
             ahead = time - received
@@ -159,8 +126,8 @@ class VehicleClock:
     def exchange(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
 
-        It also tells when the clock has slipped: simulators lose time on a busy computer and do not
-        catch up. Samples then seem late, and no longer than until the next exchange.
+        It also shows when the clock has slipped: simulators lose time on a busy computer and do not
+        catch up. Samples then seem late until the next exchange.
 
         Args:
             sent: When we asked, s on our clock.
@@ -201,105 +168,75 @@ class VehicleClock:
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
-    def _judge_misfit(
-        self, time_boot_ms: int, sample: _Candidate, quickest: float
-    ) -> Misfit | None:
-        """Why `sample` does not fit; None where it does, or where the clock has changed to fit."""
+    def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
+        """Why `stamp` does not fit; None where it does, or where the clock has changed to fit."""
         if self._began == inf:
-            self._began = self._received = sample.received
-            self._quickest = 0.0 if self._lockstep else sample.ahead
+            self._began = self._received = stamp.received
+            self._quickest = 0.0 if self._lockstep else stamp.ahead
             return None
-        is_ahead = sample.time > self._newest
-        if is_ahead and sample.ahead <= quickest + JUMP + self.rate.spread(
-            sample.received - self._received
-        ):
+        is_ahead = stamp.time > self._newest
+        drift = self.rate.spread(stamp.received - self._received)
+        if is_ahead and stamp.ahead <= quickest + JUMP + drift:
             self._quickest = quickest
-            self._drop_candidates()
+            self._drop_misfits()
             return None
-        if is_ahead and self._ends_lateness(sample, quickest):
+        if is_ahead and self._ends_lateness(stamp, quickest):
             return None
-        if not self._confirms(sample, quickest):
+        if not self._misfits.continued_by(stamp):
+            self._drop_misfits()
+        self._misfits.stamps.append(stamp)
+        if not self._misfits.confirmed(quickest):
             return Misfit.AHEAD if is_ahead else Misfit.NOT_NEWER
-        by = max(candidate.ahead for candidate in self._candidates) - quickest
-        self._candidates.clear()
+        by = self._misfits.most_ahead() - quickest
+        self._misfits.stamps.clear()
         self._quickest = quickest
         self._newest = -inf
         self._change(by, time_boot_ms, restarted=by < 0.0)
         return None
 
-    def _ends_lateness(self, sample: _Candidate, quickest: float) -> bool:
+    def _ends_lateness(self, stamp: Stamp, quickest: float) -> bool:
         """Whether the link is quicker again: TIMESYNC told that even the quickest sample was late.
 
-        The link then brings samples that seem ahead by no more than it was late. What TIMESYNC says
-        after the last sample that fitted does not count: the clock may have jumped before it.
+        Samples then seem ahead by at most as much as the link was late. What TIMESYNC says after
+        the last sample that fitted does not count: the clock may have jumped before it.
         """
-        by = sample.ahead - quickest
-        if by > self.delay.most(before=self._received - _TOGETHER):
+        by = stamp.ahead - quickest
+        if by > self.delay.most(before=self._received - TOGETHER):
             return False
         self._quickest = quickest
-        self.delay.shorten(by, sample.received)
-        self._drop_candidates()
+        self.delay.shorten(by, stamp.received)
+        self._drop_misfits()
         return True
-
-    def _confirms(self, sample: _Candidate, quickest: float) -> bool:
-        """Whether it and the misfits just before it are a clock that goes on elsewhere."""
-        seen = self._candidates
-        if seen and not (
-            sample.time >= seen[-1].time and abs(sample.ahead - seen[-1].ahead) < _TOGETHER
-        ):
-            self._drop_candidates()
-        seen.append(sample)
-        return (
-            len(seen) >= _CONFIRMED_BY
-            and sample.time > seen[0].time
-            and sample.received - seen[0].received >= _CONFIRMED_FOR
-            and abs(max(each.ahead for each in seen) - quickest) >= JUMP
-        )
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
         """A sample fits again, `late` s: the clock stood still if all in between had one stamp."""
-        seen = self._candidates
-        stood_still = seen[0].time == seen[-1].time == self._newest
-        lasted = seen[-1].received - self._received
-        self._drop_candidates()
+        stood_still = self._misfits.stood_still(self._newest)
+        lasted = self._misfits.stamps[-1].received - self._received
+        self._drop_misfits()
         if stood_still and min(lasted, late) >= JUMP:
             self._change(-late, time_boot_ms, restarted=False)
 
-    def _drop_candidates(self) -> None:
+    def _drop_misfits(self) -> None:
         """They were strays: the clock goes on as before, or differently again."""
-        ahead = sum(each.time > self._newest for each in self._candidates)
+        ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._told_outlier:
-            by = max(each.ahead for each in self._candidates) - self._quickest
             self._told_outlier = True
+            by = self._misfits.most_ahead() - self._quickest
             self.on_event(
                 f"a sample stamped {by:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
             )
         self.outliers += ahead
-        self._candidates.clear()
+        self._misfits.stamps.clear()
 
     def _change(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
         """Go on with a clock that has moved by `by` s; vehicle times go on without it."""
         before = self._received + self._quickest - self._shift
         self._shift -= by
-        self.delay.retract(self._received - self.delay.seconds - _TOGETHER)
-        if self._received - self._began < _SETTLES_FOR and by > -_REBOOTED:
+        self.delay.retract(self._received - self.delay.seconds - TOGETHER)
+        if self._received - self._began < _SETTLES_FOR and by > -REBOOTED:
             return
         self.timeline += 1
-        wrapped = by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP
-        self.restarts += restarted and not wrapped and by < -_REBOOTED
-        now = time_boot_ms / 1000.0
-        if wrapped:
-            self.last_change = "the vehicle's time since boot wrapped around after 49.7 days"
-        elif by > 0.0:
-            self.last_change = f"the vehicle's clock jumped ahead by {by:.2f} s"
-        elif not restarted:
-            self.last_change = f"the vehicle's clock stood still for {-by:.2f} s"
-        elif by < -_REBOOTED:
-            self.last_change = (
-                f"the vehicle's time since boot went back from {before:.1f} s to {now:.1f} s: the "
-                "autopilot restarted"
-            )
-        else:
-            self.last_change = f"the vehicle's clock went back by {-by:.2f} s"
+        self.restarts += restarted and not wrapped(by, before) and by < -REBOOTED
+        self.last_change = described(by, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

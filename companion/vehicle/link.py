@@ -8,6 +8,7 @@ from typing import Any
 from companion.attitude.types import BodyRates
 from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import LinkError, LinkTimeout
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.framing import Frame
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
 from companion.mavlink.opening import OpenTransport, open_transport
@@ -15,18 +16,22 @@ from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.silence import no_beacon, no_heartbeat
 from companion.mavlink.stamp_keeper import StampKeeper
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport import Tap
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.connection import Connection
-from companion.vehicle.inbox import Inbox, Notice
-from companion.vehicle.presence import send_heartbeat, send_heartbeats, synchronise
-from companion.vehicle.records import Heartbeat
-from companion.vehicle.samples import AttitudeSample
-from companion.vehicle.timesync import TimeSync
+from companion.vehicle.inbox import Inbox
+from companion.vehicle.presence import (
+    TimeSync,
+    no_beacon,
+    no_heartbeat,
+    send_heartbeat,
+    send_heartbeats,
+    synchronise,
+)
+from companion.vehicle.records import AttitudeSample, Heartbeat
 
 _LOG = logging.getLogger(__name__)
 

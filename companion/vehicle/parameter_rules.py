@@ -1,7 +1,7 @@
-"""Parameters of an autopilot that matter to a flight by body rates, as data and a pure judgement.
+"""Rules for the autopilot parameters that matter to a flight by body rates.
 
-A family lists its rules; `judge` tells what they find in a set of values. Nothing here reads or
-writes a parameter.
+Each autopilot lists its rules as data; `judge` applies them to the values that were read. Nothing
+here reads or writes a parameter.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -11,22 +11,22 @@ from math import isfinite
 from typing import NamedTuple
 
 Values = Mapping[str, float]
-"""Parameters as read, under the newest of their names; those the autopilot has not are absent."""
+"""Parameters as read, by the newest of their names; those the autopilot lacks are absent."""
 
 
-class Setup(NamedTuple):
-    """What our configuration says, as far as the autopilot's parameters have to agree with it.
+class CompanionSettings(NamedTuple):
+    """The part of our configuration that the autopilot's parameters must agree with.
 
     Attributes:
         source_system: Our own system id.
-        attitude_rate_hz: Asked of it for attitude.
+        attitude_rate_hz: Rate of attitude samples that we request.
         silence_limit: After this long without control we hand back, s.
-        hover_thrust: Normalised thrust at hover that the flight begins with.
-        curve_factor: Of the thrust curve that we make up for; 0: none.
-        battery_exponent: Of the battery's voltage that we make up for; 0: none.
-        tilt_compensated: Whether it is to divide thrust by cos(tilt) itself.
-        acceleration_limits: Of `roll`, `pitch` and `yaw`, as the planner has them, rad/s²; `None`:
-            no limit.
+        hover_thrust: Normalised thrust at hover with which the flight begins.
+        curve_factor: Of the thrust curve that we compensate; 0: none.
+        battery_exponent: Of the battery voltage that we compensate; 0: none.
+        tilt_compensated: Whether the autopilot is expected to divide thrust by cos(tilt).
+        acceleration_limits: Of `roll`, `pitch` and `yaw` as the planner assumes them, rad/s²;
+            `None`: no limit.
         max_tilt: Largest tilt of a target, rad.
         signs: Whether we sign what we send, and refuse what is not signed.
     """
@@ -43,8 +43,8 @@ class Setup(NamedTuple):
     signs: bool
 
 
-class Verdict(Enum):
-    """How much a value matters."""
+class CheckResult(Enum):
+    """What a preflight check came to."""
 
     SAFE = "safe"
     UNSAFE = "unsafe"
@@ -52,28 +52,28 @@ class Verdict(Enum):
     INEFFECTIVE = "ineffective"
     """The flight does not do what is asked of it, or a protection does nothing."""
     NOT_READY = "not_ready"
-    """The vehicle is not ready to be armed yet, and this is a consequence of it."""
+    """The vehicle is not ready to be armed yet, and this follows from it."""
     NOT_CONNECTED = "not_connected"
-    """Nobody answers, so nothing was judged."""
+    """Nobody answers, so nothing was checked."""
 
 
-class Complaint(NamedTuple):
+class Problem(NamedTuple):
     """What is wrong with a value.
 
     Attributes:
-        verdict: How much it matters.
-        because: What comes of it, one sentence.
-        set_to: What to set the parameter to; `None` where only the user can know, or where it is
-            our configuration that is to change, and `because` says so.
+        result: How bad it is.
+        because: What follows from it, one sentence.
+        set_to: What to set the parameter to. `None` where only the user can know, or where our
+            configuration must change; `because` then says so.
     """
 
-    verdict: Verdict
+    result: CheckResult
     because: str
     set_to: float | None = None
 
 
-Check = Callable[[float, Values, Setup], Complaint | None]
-"""Judges a parameter's own value; others, which may be absent, and our setup may count."""
+Check = Callable[[float, Values, CompanionSettings], Problem | None]
+"""Judges a parameter by its value, the other values (which may be absent) and our settings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +81,16 @@ class ParameterRule:
     """One parameter that matters.
 
     Attributes:
-        names: Its name, the newest first; older versions know it by the others.
+        names: Its names, the newest first; older versions use the others.
         meaning: What it decides, one clause.
-        check: Judges it; `None` is a value that is as it should be.
-        source: Where this is known from.
-        vital: Without it nobody can know how a setpoint is obeyed, or for how long, so a vehicle
-            that does not tell it is not flown.
-        universal: Every supported version has it, and some value of it is unsafe: where it was not
-            told on a link that loses frames, such a value may have been lost.
-        instead: Another rule's name, of the parameter that other versions have in its place.
-        reboot: A change counts only after the autopilot was started anew.
+        check: Judges its value; returns `None` if the value is right.
+        source: How this is known.
+        vital: Without it the effect of a setpoint, or for how long it is held, is unknown. A
+            vehicle that does not send it is not flown.
+        universal: Every supported version has it, and some value of it is unsafe. If it was not
+            received on a link that loses frames, it may hold such a value.
+        instead: Name of the rule for the parameter that other versions have in its place.
+        reboot: A change takes effect only after the autopilot restarts.
     """
 
     names: tuple[str, ...]
@@ -108,33 +108,35 @@ class ParameterRule:
         return self.names[0]
 
 
-_NO_NUMBER = Complaint(
-    Verdict.UNSAFE, "that is no number, and nobody knows what the autopilot makes of it"
+_NO_NUMBER = Problem(
+    CheckResult.UNSAFE, "that is no number, and what the autopilot makes of it is unknown"
 )
 
 
 class ParameterFinding(NamedTuple):
-    """What a rule says of a vehicle.
+    """What a rule found.
 
     Attributes:
-        rule: Which.
-        value: What the autopilot has.
-        verdict: How much it matters.
-        because: What comes of it; empty where it is safe.
+        rule: Which rule.
+        value: The autopilot's value.
+        result: How bad it is.
+        because: What follows from it; empty if it is safe.
         set_to: What to set it to, or `None`.
     """
 
     rule: ParameterRule
     value: float
-    verdict: Verdict
+    result: CheckResult
     because: str = ""
     set_to: float | None = None
 
 
-def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[ParameterFinding]:
-    """What the rules find, in their order; a parameter that the autopilot has not is left out.
+def judge(
+    rules: Iterable[ParameterRule], values: Values, settings: CompanionSettings
+) -> list[ParameterFinding]:
+    """Apply the rules, in their order; a parameter that the autopilot lacks is left out.
 
-    One that is NaN or infinite is unsafe whatever its rule says, and tells other rules nothing.
+    A value that is NaN or infinite is unsafe under every rule, and hidden from other rules.
     """
     findings = []
     finite = {name: value for name, value in values.items() if isfinite(value)}
@@ -142,9 +144,9 @@ def judge(rules: Iterable[ParameterRule], values: Values, setup: Setup) -> list[
         if rule.name not in values:
             continue
         value = values[rule.name]
-        complaint = rule.check(value, finite, setup) if isfinite(value) else _NO_NUMBER
-        if complaint is None:
-            findings.append(ParameterFinding(rule, value, Verdict.SAFE))
+        problem = rule.check(value, finite, settings) if isfinite(value) else _NO_NUMBER
+        if problem is None:
+            findings.append(ParameterFinding(rule, value, CheckResult.SAFE))
         else:
-            findings.append(ParameterFinding(rule, value, *complaint))
+            findings.append(ParameterFinding(rule, value, *problem))
     return findings

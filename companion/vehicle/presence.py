@@ -1,18 +1,28 @@
-"""What we say without being asked: that we are here, and what our clock reads."""
+"""What the link sends unasked: heartbeats and clock requests; and why no heartbeat came back.
+
+Sources: the MAVLink heartbeat and time synchronisation protocols.
+"""
 
 import asyncio
+from collections import deque
+from collections.abc import Callable
+from typing import NamedTuple
 
-from companion.mavlink.messages import dialect
+from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
+from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.stats import LinkStats
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.timesync import TimeSync
+from companion.vehicle.clock_estimates import LIFETIME
 
 _MAV_AUTOPILOT_INVALID = 8
 _MAV_STATE_ACTIVE = 4
 _MAVLINK_VERSION = 3
 _QUICK_REQUESTS, _QUICK_PERIOD_S = 10, 0.1  # a good clock offset within the first second
 _PERIOD_S = 1.0
+_WINDOW = 16
+_NS = 1e-9
 
 
 def send_heartbeat(settings: LinkSettings, outbox: Outbox) -> None:
@@ -36,6 +46,73 @@ async def send_heartbeats(settings: LinkSettings, outbox: Outbox) -> None:
         await asyncio.sleep(1.0 / settings.heartbeat_rate_hz)
 
 
+class _Exchange(NamedTuple):
+    round_trip_s: float
+    at: float
+
+
+class TimeSync:
+    """Asks for the vehicle's time for `VehicleClock`, and answers the vehicle's own requests.
+
+    Args:
+        outbox: Takes what is sent.
+        router: Brings TIMESYNC.
+        clock: Our time in s (the event loop's).
+        vehicle_clock: Takes each exchange.
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        router: Router,
+        clock: Callable[[], float],
+        vehicle_clock: VehicleClock,
+    ) -> None:
+        self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
+        self._asked: deque[int] = deque(maxlen=_WINDOW)
+        self._exchanges: deque[_Exchange] = deque(maxlen=_WINDOW)
+        router.subscribe("TIMESYNC", self._on_timesync)
+
+    @property
+    def round_trip_s(self) -> float | None:
+        """The shortest round trip of late, s; `None` where none was answered of late."""
+        return min(self._round_trips(), default=None)
+
+    @property
+    def jitter_s(self) -> float | None:
+        """By how much the round trips of late differ, s; `None` where none was answered."""
+        trips = self._round_trips()
+        return max(trips) - min(trips) if trips else None
+
+    def ask(self) -> None:
+        """Send one request."""
+        stamp = self._now_ns()
+        self._asked.append(stamp)
+        self._outbox.message(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
+
+    def reset(self) -> None:
+        """Forget all, after a reconnect: the vehicle may have started anew."""
+        self._asked.clear()
+        self._exchanges.clear()
+
+    def _on_timesync(self, message: Message) -> None:
+        now = self._now_ns()
+        if message.tc1 == 0:
+            self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
+        elif message.ts1 in self._asked:  # anything else answers another station
+            self._asked.remove(message.ts1)
+            self._exchanges.append(_Exchange((now - message.ts1) * _NS, now * _NS))
+            self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
+
+    def _round_trips(self) -> list[float]:
+        oldest = self._clock() - LIFETIME
+        return [each.round_trip_s for each in self._exchanges if each.at >= oldest]
+
+    def _now_ns(self) -> int:
+        # Never 0: a zero in tc1 marks a request.
+        return max(1, round(self._clock() * 1e9))
+
+
 async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
     """Ask for the vehicle's time until cancelled."""
     now = asyncio.get_running_loop().time
@@ -46,3 +123,42 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
         timesync.ask()
         await asyncio.sleep(_PERIOD_S)
         clock.look(now())
+
+
+def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
+    """No heartbeat of the autopilot came within `timeout_s`."""
+    start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
+    refused = _refused(start, stats)
+    if refused is not None:
+        return refused
+    if stats.bad_crc:
+        return f"{start}, but {stats.bad_crc} damaged frames; is the baud rate right?"
+    return f"{start} on {settings.endpoint}; is the vehicle running and sending to this address?"
+
+
+def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
+    """No lockstep beacon came within `first_beacon_timeout_s`."""
+    start = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
+    why = f"{start} on {settings.endpoint}; is the vehicle running, and in lockstep?"
+    return _refused(start, stats) or why
+
+
+def _refused(start: str, stats: LinkStats) -> str | None:
+    """What came instead and was refused, `None` if nothing was."""
+    if stats.unclaimed:
+        return (
+            f"{start}, but {stats.unclaimed} other frames with its ids; no sender is taken for the "
+            "vehicle before its autopilot's heartbeat"
+        )
+    if stats.ignored_foreign:
+        source = "/".join(map(str, min(stats.foreign_sources)))
+        return (
+            f"{start}, but {stats.ignored_foreign} frames from others, such as system/component "
+            f"{source}; is link.target_system right?"
+        )
+    if stats.bad_signature:
+        return (
+            f"{start}, but {stats.bad_signature} frames not signed with our key, or with a time "
+            "stamp that is not believed"
+        )
+    return None

@@ -1,1 +1,1 @@
-"""ArduCopter, as recorded and measured: its numbers, texts and rules."""
+"""ArduCopter, simulated as recorded and measured: its numbers, texts and rules."""

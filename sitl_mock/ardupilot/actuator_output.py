@@ -1,4 +1,4 @@
-"""From attitude or rates, with thrust, to the command of the rate loop and the rotors."""
+"""Converts attitude or rates, with thrust, to the actuator command."""
 
 from collections.abc import Callable
 from math import cos, radians
@@ -15,10 +15,8 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 
 LEARNING_S = 10.0
 """MOT_THST_HOVER follows the thrust of a quiet hover with this time constant."""
-
-
-# The rate loop shapes rates; ArduPilot shapes the attitude that its own modes ask. Yaw's answer is
-# slow to begin, so that more than this would swing.
+# The mock shapes rates, where ArduPilot shapes the attitudes of its own modes. The yaw response is
+# slow, and a higher yaw gain would oscillate.
 _GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
 
 
@@ -26,10 +24,10 @@ class ActuatorOutput:
     """Commands the rate loop and the rotors, and learns the hover thrust.
 
     Args:
-        state: the autopilot's state; the echo of the attitude target is written here.
+        state: the autopilot's state; its ``attitude_target`` is written here.
         parameters: MOT_THST_HOVER is learned.
         guided: during its take-off the rotors turn on the ground.
-        hold: its climb rate tells whether the vehicle hovers.
+        hold: its climb rate shows whether the vehicle hovers.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 
@@ -47,7 +45,7 @@ class ActuatorOutput:
         self._hold = hold
         self._throttle = throttle
         self.thrust = 0.0
-        """Commanded latest, 0..1, without the angle boost."""
+        """Latest command, 0..1, without the angle boost."""
 
     @property
     def taking_off(self) -> bool:
@@ -64,13 +62,13 @@ class ActuatorOutput:
         return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
-        """Return the command for what the position controller asked in the last ``dt`` s."""
+        """Return the command for what the position controller computed for the last ``dt`` s."""
         self.thrust = output.thrust
         self._learn_hover(output, dt)
         return self.attitude(output.q, output.thrust)
 
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
-        """Follow the thrust of a quiet, level hover, as MOT_HOVER_LEARN asks."""
+        """Follow the thrust of a steady, level hover, if MOT_HOVER_LEARN is set."""
         state, parameters = self._state, self._parameters
         quiet = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
         if parameters["MOT_HOVER_LEARN"] and quiet and self.cos_tilt > cos(radians(5.0)):

@@ -1,4 +1,4 @@
-"""How ArduCopter comes up: what it says when (recorded), and what it is capable of by then."""
+"""ArduCopter's boot: its texts over time (recorded), and what is ready when."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,13 +7,13 @@ from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6
-"""From the start to a position estimate that GUIDED can be armed with; times here scale with it."""
+"""Recorded time to a position estimate good enough to arm in GUIDED; the others scale with it."""
 INITIALISED_S = 2.4
 ORIGIN_S = 20.0
 HOME_S = 23.5
-"""From here the pre-arm checks pass, in modes that need no position."""
+"""From now on the pre-arm checks pass in modes that need no position."""
 RUNTIME_PERIOD_US = 30_000_000
-"""STAT_RUNTIME is saved, and told, this often."""
+"""Period at which STAT_RUNTIME is saved and sent."""
 
 _TEXTS = (
     (0.16, "RCInput: decoding UDP (Pulses)"),
@@ -43,11 +43,11 @@ _SAVED = (
     (1.87, "BARO1_GND_PRESS"),
     (INITIALISED_S, "INS_GYR_ID"),
 )
-"""Parameters that it saves on the way, and tells of."""
+"""Parameters that the boot saves and sends, with their times, s."""
 
 
 class Notifier(NamedTuple):
-    """By what the boot makes itself heard."""
+    """Sends texts, the home position and changed parameters to the clients."""
 
     announce: ArduPilotAnnouncer
     send_home: Callable[[], None]
@@ -55,12 +55,12 @@ class Notifier(NamedTuple):
 
 
 class Boot:
-    """Follows the time since the start.
+    """Tracks the boot over the time since the start.
 
     Args:
         state: for the time.
-        notifier: tells of what is reached.
-        ready_us: when the position estimate is good.
+        notifier: sends the texts and messages of the boot.
+        ready_us: vehicle time at which the position estimate is good.
         elevation: of home above sea level, m.
     """
 
@@ -69,42 +69,42 @@ class Boot:
     ) -> None:
         self._state = state
         self._notifier = notifier
-        self._share = ready_us / (RECORDED_READY_S * 1e6)
+        self._scale = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
         self._texts = list(_TEXTS)
         self._saved = list(_SAVED)
-        self._home_told = False
+        self._home_sent = False
         self._next_runtime_us = RUNTIME_PERIOD_US
 
     def reached(self, recorded_s: float) -> bool:
-        """Whether the time of the recording that is called ``recorded_s`` has come, scaled."""
-        return self._state.time_us >= recorded_s * self._share * 1e6
+        """Whether the scaled time of ``recorded_s`` in the recording is reached."""
+        return self._state.time_us >= recorded_s * self._scale * 1e6
 
     @property
     def initialised(self) -> bool:
-        """Whether it is ready for commands."""
+        """Whether it accepts commands."""
         return self.reached(INITIALISED_S)
 
     @property
     def origin_set(self) -> bool:
-        """Whether the estimator has an origin, and so home a place."""
+        """Whether the estimator has an origin, and thus home a position."""
         return self.reached(ORIGIN_S)
 
     @property
     def home_set(self) -> bool:
-        """Whether the estimator has settled on its origin."""
+        """Whether home is set for the pre-arm checks."""
         return self.reached(HOME_S)
 
     def step(self) -> None:
-        """Tell of what is reached by now."""
+        """Send the texts and messages that are due."""
         notifier = self._notifier
         while self._saved and self.reached(self._saved[0][0]):
             notifier.send_parameter(self._saved.pop(0)[1])
         while self._texts and self.reached(self._texts[0][0]):
             text = self._texts.pop(0)[1]
             notifier.announce.say(text.format(elevation=self._elevation), INFO)
-        if self.origin_set and not self._home_told:
-            self._home_told = True
+        if self.origin_set and not self._home_sent:
+            self._home_sent = True
             notifier.send_home()
         if self._state.time_us >= self._next_runtime_us:
             self._next_runtime_us += RUNTIME_PERIOD_US

@@ -1,4 +1,4 @@
-"""ArduCopter's rules of arming, modes and GUIDED, by its measured behaviour."""
+"""ArduCopter's arming, modes and GUIDED, as measured."""
 
 from math import isfinite, isnan
 
@@ -17,10 +17,10 @@ from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
 LANDED_TO_DISARM_US = 500_000
-"""LAND disarms this much after the landing (recorded)."""
+"""LAND disarms this long after the landing (recorded)."""
 _OWN_COMPONENT = 1
 YAW_ALIGNED_M = 2.8
-"""Above this height the estimator aligns its heading anew, once a flight (recorded: 2.7 to 2.9)."""
+"""Above this height the estimator realigns its heading, once per flight (recorded: 2.7 to 2.9)."""
 
 
 class ArduPilotCommander:
@@ -30,11 +30,11 @@ class ArduPilotCommander:
         state: the autopilot's state.
         parameters: its parameters.
         vehicle: for the battery.
-        control: told of every mode entered.
-        guided: told what GUIDED shall do.
-        stream: counts the setpoints that are obeyed.
-        notifier: tells the outside.
-        boot: how far the autopilot has come up.
+        control: begins every mode entered.
+        guided: the task of GUIDED.
+        stream: counts the accepted setpoints.
+        notifier: sends texts and messages.
+        boot: progress of the boot.
     """
 
     def __init__(
@@ -66,13 +66,13 @@ class ArduPilotCommander:
 
     @property
     def under_setpoints(self) -> bool:
-        """Whether it flies in GUIDED what setpoints of attitude ask."""
+        """Whether attitude setpoints control the vehicle in GUIDED."""
         state = self._state
         follows = state.mode is Mode.GUIDED and self._guided.task is Task.ANGLE
         return follows and state.armed and not state.landed
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips the checks but those of the boot."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks but those of boot and crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -91,13 +91,13 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def announce_problem(self) -> None:
-        """Say what forbids arming now, if anything does."""
+        """Announce what forbids arming now, if anything does."""
         problem = self._check()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
     def disarm(self, *, force: bool = False) -> int:
-        """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
+        """Disarm, and return a MAV_RESULT; in the air this needs ``force``."""
         if not self._state.armed:
             return ACCEPTED
         if not self._state.landed and not force:
@@ -106,7 +106,7 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def request_mode(self, mode: Mode) -> int:
-        """Change the mode, and return a MAV_RESULT; before the boot is over it is lost."""
+        """Change the mode, and return a MAV_RESULT; during the boot it has no effect."""
         state = self._state
         if not self._boot.initialised or mode is state.mode:
             return ACCEPTED
@@ -117,7 +117,7 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def take_off(self, height: float) -> int:
-        """Climb to a height above home, m; only armed, in GUIDED, on the ground."""
+        """Climb to a height above home, m; the vehicle must be armed, in GUIDED, on the ground."""
         state = self._state
         ready = state.armed and state.landed and state.mode is Mode.GUIDED
         if not ready or not isfinite(height) or height <= 0.0:
@@ -126,16 +126,16 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot's sticks change the mode (fault injection)."""
+        """Let the pilot take over in a mode (fault injection)."""
         self.pilot = True
         self.request_mode(PILOT_MODES.get(mode, mode))
 
-    def heard(self, heartbeat: Message) -> None:
-        """Note a heartbeat."""
-        self.failsafe.heard(heartbeat)
+    def receive_heartbeat(self, heartbeat: Message) -> None:
+        """Record a heartbeat."""
+        self.failsafe.receive_heartbeat(heartbeat)
 
     def setpoint(self, message: Message) -> None:
-        """Take a setpoint in GUIDED; one that comes from this very autopilot is ignored."""
+        """Accept a setpoint in GUIDED; ignore one with the autopilot's own ids."""
         state = self._state
         own = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
         if state.mode is not Mode.GUIDED:
@@ -145,33 +145,33 @@ class ArduPilotCommander:
         if message.get_type() == "SET_ATTITUDE_TARGET":
             self._attitude_setpoint(message)
             return
-        asked = position_setpoint(message)
-        if asked is not None:
-            self._stream.accept(asked, state.time_us)
-            self._guided.follow_position(asked, state.time_us)
+        setpoint = position_setpoint(message)
+        if setpoint is not None:
+            self._stream.accept(setpoint, state.time_us)
+            self._guided.follow_position(setpoint, state.time_us)
 
     def _attitude_setpoint(self, message: Message) -> None:
         state = self._state
         try:
-            asked = attitude_setpoint(message)
+            setpoint = attitude_setpoint(message)
         except FatalSetpointError:
             state.aborted = True
             return
-        if asked is None:
+        if setpoint is None:
             self._guided.hold()
             return
-        if asked.rates is not None and any(map(isnan, asked.rates)):
-            self._tell_internal_error()
-        self._stream.accept(asked, state.time_us)
-        self._guided.follow_angle(asked, state.time_us)
+        if setpoint.rates is not None and any(map(isnan, setpoint.rates)):
+            self._announce_internal_error()
+        self._stream.accept(setpoint, state.time_us)
+        self._guided.follow_angle(setpoint, state.time_us)
 
-    def _tell_internal_error(self) -> None:
+    def _announce_internal_error(self) -> None:
         if not self._internal_error:
             self._announce.say("Internal Errors 0x400", CRITICAL)
         self._internal_error = True
 
     def step(self, *, crashed: bool) -> None:
-        """Run the rules once; called at 20 Hz of vehicle time."""
+        """Update arming, mode and failsafes; called at 20 Hz of vehicle time."""
         state = self._state
         self._crashed = crashed
         self._boot.step()
@@ -184,7 +184,7 @@ class ArduPilotCommander:
             self._disarm_on_ground()
 
     def _align_yaw(self) -> None:
-        """Say that the heading was aligned in the air, as soon as it is high enough."""
+        """Announce the alignment of the heading in the air, at sufficient height."""
         state = self._state
         height = state.home_ned[2] - state.estimate.position_ned[2]
         if self._yaw_aligned or height < YAW_ALIGNED_M:
@@ -194,7 +194,7 @@ class ArduPilotCommander:
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
     def _check(self) -> str | None:
-        """Look for what forbids arming, note it in the state and return it."""
+        """Return why arming is refused now, None if it is not, and note it in the state."""
         state = self._state
         state.prearm_problem = arming_problem(
             state,
@@ -222,12 +222,12 @@ class ArduPilotCommander:
     def _stop_motors(self, kind: EventKind) -> None:
         self._state.armed = False
         self._announce(kind, "")
-        self._notifier.send_parameter("MOT_THST_HOVER")  # what was learned is saved
+        self._notifier.send_parameter("MOT_THST_HOVER")  # the learned value is saved
         if self._state.mode is Mode.GUIDED:
             self._guided.hold()
 
     def _act(self, mode: Mode) -> None:
-        """Enter a failsafe's mode, LAND where it cannot be; on the ground, disarm."""
+        """Enter a failsafe's mode, or LAND if that needs a position; on the ground, disarm."""
         state = self._state
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)

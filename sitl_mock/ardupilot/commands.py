@@ -1,4 +1,4 @@
-"""What ArduCopter does on each MAV_CMD of its own way, and its result."""
+"""The MAV_CMDs that ArduCopter executes in its own way, and their results."""
 
 from math import isfinite
 
@@ -51,7 +51,7 @@ class ArduPilotCommands(Commands):
         state: the autopilot's state.
         commander: changes arming and modes.
         builders: message id -> builder, for requests.
-        announce: tells why something is refused.
+        announce: sends the reason for a refusal.
     """
 
     def __init__(
@@ -75,9 +75,9 @@ class ArduPilotCommands(Commands):
         }
 
     def data_stream(self, message: Message, link: Link) -> None:
-        """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 is all groups."""
-        asked = message.req_stream_id
-        groups = _GROUPS.values() if asked == 0 else [_GROUPS.get(asked, ())]
+        """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 means all."""
+        requested = message.req_stream_id
+        groups = _GROUPS.values() if requested == 0 else [_GROUPS.get(requested, ())]
         rate = message.req_message_rate
         interval = 1e6 / rate if message.start_stop and rate else -1.0
         for group in groups:

@@ -1,4 +1,9 @@
-"""ArduCopter defaults: its parameters, and what its simulated vehicle is made of."""
+"""ArduCopter's parameters, and the defaults of its simulated vehicle (measured).
+
+Parameters have the types and defaults of its simulated quadrotor, and the names of 4.7 where they
+were recorded. Those marked * have an effect in the mock. The others exist because clients read them
+or users look for them.
+"""
 
 from typing import Any
 
@@ -11,16 +16,9 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 
 _INT8 = dialect.MAV_PARAM_TYPE_INT8
-
-
 _INT16 = dialect.MAV_PARAM_TYPE_INT16
-
-
 _INT32 = dialect.MAV_PARAM_TYPE_INT32
-
-
 _REAL32 = dialect.MAV_PARAM_TYPE_REAL32
-
 
 _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("ANGLE_MAX", 3000, _INT16),  # * centidegrees
@@ -94,21 +92,13 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("WPNAV_SPEED_UP", 250.0, _REAL32),  # * cm/s
 )
 
-
 ARDUPILOT_PARAMETERS = tuple(Parameter(name, value) for name, value, _ in _PARAMETERS)
-
-
 ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
 """MAV_PARAM_TYPE by name."""
-
-
 BURST_MS = 5.6
-"""Time from burst to burst of the simulator's telemetry (measured: 5.4 to 5.8)."""
-
-
+"""Period of the bursts of the simulator's telemetry (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Specific thrust answers with this time constant (measured: 5 ms behind a dead time of 15 ms)."""
-
+"""Time constant of the specific thrust (measured: 5 ms after a dead time of 15 ms)."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
@@ -119,11 +109,10 @@ AIRFRAME: dict[str, Any] = {
     "quadratic_drag_n_s2_per_m2": 0.033,
 }
 
-
 BATTERY: dict[str, Any] = {
     "cells": 3,
     "capacity_ah": 3.3,
-    # Recorded: the voltage never sags, and a hover draws 28 A.
+    # Recorded: the voltage does not sag, and a hover draws 28 A.
     "full_cell_v": 4.2,
     "empty_cell_v": 4.2,
     "resistance_ohm": 0.0,
@@ -133,12 +122,12 @@ BATTERY: dict[str, Any] = {
 }
 
 
-def _behind_rotors(gains: AxisGains, inertia: float) -> AxisGains:
-    """Return gains with the same poles and the same steady share behind ROTOR_LAG_MS.
+def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
+    """Return gains that give the same poles and the same steady state with ROTOR_LAG_MS.
 
     With inertia J, damping b and rotor lag T an axis without a torque filter answers as
-    (P + F) / (J T s^2 + (J + b T + D) s + P + b). Where there is a filter, it makes up for the
-    quicker rotors: two lags in a row answer by their sum, nearly.
+    (P + F) / (J T s^2 + (J + b T + D) s + P + b). An axis with a torque filter gets a slower filter
+    instead: two lags in series respond almost as their sum.
     """
     measured_on = AirframeConfig()
     quicker = measured_on.rotor_lag_ms - ROTOR_LAG_MS
@@ -162,9 +151,9 @@ def _rate_loop() -> RateLoopConfig:
     measured = RateLoopConfig.ardupilot()
     x, y, z = AirframeConfig().inertia_kg_m2
     return RateLoopConfig(
-        roll=_behind_rotors(measured.roll, x),
-        pitch=_behind_rotors(measured.pitch, y),
-        yaw=_behind_rotors(measured.yaw, z),
+        roll=_with_rotor_lag(measured.roll, x),
+        pitch=_with_rotor_lag(measured.pitch, y),
+        yaw=_with_rotor_lag(measured.yaw, z),
     )
 
 
@@ -172,7 +161,7 @@ RATE_LOOP = _rate_loop()
 
 
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings given, what they leave open filled in."""
+    """Return the ``mock:`` section, completed by these defaults."""
     own = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
     filled = {**own, **section}
     if filled["rate_loop"] == "ardupilot":

@@ -1,4 +1,4 @@
-"""What ArduCopter does when the ground station, the position or the battery is lost."""
+"""ArduCopter's failsafes: loss of ground station or position, low battery."""
 
 from typing import Protocol
 
@@ -13,8 +13,8 @@ _GCS_ACTIONS = {1: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL, 5: Mode.LAND, 7: Mode.BRA
 """FS_GCS_ENABLE -> mode."""
 _BATTERY_ACTIONS = {1: Mode.LAND, 2: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL}
 """BATT_FS_LOW_ACT and BATT_FS_CRT_ACT -> mode."""
-_PILOT_GOES_ON = 16
-"""Bit of FS_OPTIONS: a lost ground station does not disturb a pilot."""
+_PILOT_CONTINUES = 16
+"""Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 
 
 class _Act(Protocol):
@@ -22,14 +22,14 @@ class _Act(Protocol):
 
 
 class ArduPilotFailsafe:
-    """Watches and acts while armed; each failsafe acts once, when it begins.
+    """Detects losses, and acts while armed; each failsafe acts once, at its start.
 
     Args:
         state: the autopilot's state.
         parameters: its parameters.
         vehicle: for the battery's voltage.
-        announce: tells of an occasion.
-        act: enters a mode, or disarms a vehicle that stands.
+        announce: sends texts.
+        act: enters a mode, or disarms a vehicle on the ground.
     """
 
     def __init__(
@@ -47,17 +47,17 @@ class ArduPilotFailsafe:
         self._act = act
         self._gcs_us: int | None = None
         self.gcs_lost = False
-        """Whether the ground station's failsafe is on."""
+        """Whether the ground station failsafe is active."""
         self._position_lost = False
         self._voltage_low_since_us: int | None = None
 
-    def heard(self, heartbeat: Message) -> None:
-        """Note a heartbeat: the ground station is whoever has the system id MAV_GCS_SYSID."""
+    def receive_heartbeat(self, heartbeat: Message) -> None:
+        """Record a heartbeat; the ground station has the system id MAV_GCS_SYSID."""
         if heartbeat.get_srcSystem() == self._parameters["MAV_GCS_SYSID"]:
             self._gcs_us = self._state.time_us
 
     def step(self) -> None:
-        """Look once at everything that may be lost."""
+        """Check every failsafe once."""
         self._watch_gcs()
         self._watch_battery()
         self._watch_position()
@@ -78,9 +78,9 @@ class ArduPilotFailsafe:
         elif lost and not self.gcs_lost and state.armed:
             self.gcs_lost = True
             self._announce(EventKind.GCS_LOST, "")
-            goes_on = int(parameters["FS_OPTIONS"]) & _PILOT_GOES_ON and state.mode in PILOTED
+            continues = int(parameters["FS_OPTIONS"]) & _PILOT_CONTINUES and state.mode in PILOTED
             mode = _GCS_ACTIONS.get(enabled)
-            if mode is not None and not goes_on:
+            if mode is not None and not continues:
                 self._act(mode)
 
     def _watch_battery(self) -> None:
@@ -93,7 +93,7 @@ class ArduPilotFailsafe:
         else:
             warning = BatteryWarning.OK
         if warning <= state.battery_warning:
-            return  # a battery's failsafe does not end in flight
+            return  # the battery failsafe does not end in flight
         state.battery_warning = warning
         critical = warning is BatteryWarning.CRITICAL
         used = parameters["BATT_CAPACITY"] - left_mah
@@ -108,7 +108,7 @@ class ArduPilotFailsafe:
         return self._vehicle.battery.voltage_v < self._parameters[limit]
 
     def _voltage_low(self) -> bool:
-        """Whether the voltage is below BATT_LOW_VOLT for as long as BATT_LOW_TIMER."""
+        """Whether the voltage has been below BATT_LOW_VOLT for BATT_LOW_TIMER."""
         now = self._state.time_us
         if not self._voltage_below("BATT_LOW_VOLT"):
             self._voltage_low_since_us = None
@@ -118,7 +118,7 @@ class ArduPilotFailsafe:
         return now - self._voltage_low_since_us >= self._parameters["BATT_LOW_TIMER"] * 1e6
 
     def _watch_position(self) -> None:
-        """Land where the position is lost and needed, if FS_EKF_ACTION asks it."""
+        """Land if the position is lost in a mode that needs it, if FS_EKF_ACTION says so."""
         state = self._state
         lost = state.armed and not state.position_valid
         began = lost and not self._position_lost and state.mode in NEEDS_POSITION

@@ -1,4 +1,4 @@
-"""What GUIDED does now: hold a position, take off, follow setpoints of attitude or of position."""
+"""The task of GUIDED, and the setpoints of attitude that it accepts."""
 
 from enum import Enum, auto
 from math import isnan
@@ -18,17 +18,17 @@ _UNIT_LENGTH_TOLERANCE = 1e-3
 
 
 class FatalSetpointError(Exception):
-    """A setpoint that ends ArduPilot's process: a quaternion of NaN, in use (measured: SIGFPE)."""
+    """A setpoint that crashes ArduPilot: an attitude with NaN (measured: SIGFPE)."""
 
 
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
-    """Return what is asked; None: it cannot be flown, and the vehicle holds its position instead.
+    """Decode a SET_ATTITUDE_TARGET by ArduCopter's type-mask rules (measured).
 
-    The latter with the throttle ignored, with only some of the rates ignored, and with an attitude
-    that is not of unit length. Rates may be NaN or infinite; thrust is as it came.
+    None makes the vehicle hold its position. This is so if the throttle or only some of the rates
+    are ignored, and if the attitude is not of unit length. Rates may be NaN or infinite.
 
     Raises:
-        FatalSetpointError: the attitude asked has a NaN.
+        FatalSetpointError: the attitude has a NaN.
     """
     mask = message.type_mask
     ignored = mask & _ALL_RATES_IGNORED
@@ -48,7 +48,7 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
 
 
 class Task(Enum):
-    """GUIDED's submodes."""
+    """Submodes of GUIDED."""
 
     HOLD = auto()
     TAKE_OFF = auto()
@@ -57,25 +57,25 @@ class Task(Enum):
 
 
 class Guided:
-    """The task, and what it was given. Each new one replaces the last at once, a take-off too."""
+    """The task and its setpoint. A new task replaces the last at once, even a take-off."""
 
     def __init__(self) -> None:
         self.task = Task.HOLD
         self.takeoff_height = 0.0
-        """Where TAKE_OFF ends, m above home."""
+        """Height of TAKE_OFF, m above home."""
         self.angle: AttitudeSetpoint | None = None
         self.position: PositionSetpoint | None = None
         self.since_us = 0
-        """When the latest setpoint came, vehicle time."""
+        """Vehicle time of the latest setpoint."""
         self.changed = True
-        """Whether the task has just begun; whoever flies it clears this."""
+        """Whether the task has just begun; `GuidedFlight` clears this."""
 
     def hold(self) -> None:
-        """Hold the position from here."""
+        """Hold the present position."""
         self._begin(Task.HOLD)
 
     def arrive(self) -> None:
-        """End a take-off: hold what it has come to."""
+        """End a take-off: hold the position reached."""
         self.task = Task.HOLD
 
     def take_off(self, height: float) -> None:

@@ -1,4 +1,4 @@
-"""How ArduCopter flies in GUIDED: take-off, setpoints of attitude or position, hold."""
+"""The control in GUIDED: take-off, setpoints of attitude or position, hold."""
 
 from math import isnan
 
@@ -16,15 +16,15 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 THRUST_IS_THRUST = 8
 """Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
 SPOOL_UP_US = 2_000_000
-"""From NAV_TAKEOFF to the rotors' being ready to lift (recorded: it lifts off after 2.3 s)."""
+"""Spool-up of the rotors after NAV_TAKEOFF (recorded: it lifts off after 2.3 s)."""
 ARRIVAL_ACCELERATION = 0.55
-"""A take-off slows down by this, m/s^2 (recorded)."""
+"""Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVED_M = 0.1
 _SLOWEST_ARRIVAL = 0.1
 
 
 class GuidedFlight:
-    """Flies the task of GUIDED.
+    """Executes the task of GUIDED.
 
     Args:
         state: the autopilot's state.
@@ -77,8 +77,10 @@ class GuidedFlight:
             guided.arrive()
         return self._output.follow(self._hold.step(speed, dt), dt)
 
-    def _follow_angle(self, asked: AttitudeSetpoint, dt: float, *, began: bool) -> ActuatorCommand:
-        """Fly rates or an attitude; once they are silent, level and without climbing."""
+    def _follow_angle(
+        self, setpoint: AttitudeSetpoint, dt: float, *, began: bool
+    ) -> ActuatorCommand:
+        """Follow rates or an attitude; after GUID_TIMEOUT level the vehicle and hold its height."""
         state, parameters = self._state, self._parameters
         state.position_controlled = False
         was_silent = self._silent and not began
@@ -91,45 +93,45 @@ class GuidedFlight:
         if climbs:
             up = 0.01 * parameters["WPNAV_SPEED_UP"]
             down = 0.01 * parameters["WPNAV_SPEED_DN"]
-            climb = 0.0 if self._silent else climb_rate_of_setpoint(asked.thrust, up, down)
+            climb = 0.0 if self._silent else climb_rate_of_setpoint(setpoint.thrust, up, down)
             thrust = self._hold.step(climb, dt, level=True).thrust
             state.position_target.active = False
         else:
-            thrust = thrust_of_setpoint(asked.thrust)
+            thrust = thrust_of_setpoint(setpoint.thrust)
         self._output.thrust = state.attitude_target.thrust = thrust
-        # What a climb needs is boosted in any case; what was asked as thrust, if it is so set.
+        # The angle boost always applies to a climb rate; to a thrust only if it is enabled.
         if climbs or parameters["ATC_ANGLE_BOOST"]:
             thrust = angle_boosted(thrust, self._output.cos_tilt)
         if self._silent:
             return self._output.attitude(from_yaw(self._hold.yaw), thrust)
-        rates = asked.rates or (0.0, 0.0, 0.0)
-        if asked.q is None:
+        rates = setpoint.rates or (0.0, 0.0, 0.0)
+        if setpoint.q is None:
             state.attitude_target.q = state.estimate.q
             return self._output.rates(rates, thrust)
-        p, q, r = self._output.rates_towards(asked.q)
-        state.attitude_target.q = asked.q
+        p, q, r = self._output.rates_towards(setpoint.q)
+        state.attitude_target.q = setpoint.q
         return self._output.rates((p + rates[0], q + rates[1], r + rates[2]), thrust)
 
     def _follow_position(self, dt: float) -> ActuatorCommand:
         guided, parameters = self._guided, self._parameters
-        asked = guided.position
-        moves = asked is not None and isnan(asked.position[0])
-        if asked is None or (
+        setpoint = guided.position
+        moves = setpoint is not None and isnan(setpoint.position[0])
+        if setpoint is None or (
             moves and guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
         ):
             guided.hold()
             return self._output.follow(self._hold.step(0.0, dt), dt)
         hold = self._hold
-        if not isnan(asked.yaw):
-            hold.yaw = asked.yaw
-        elif not isnan(asked.yaw_rate):
-            hold.yaw += asked.yaw_rate * dt
-        velocity, acceleration = asked.velocity, asked.acceleration
-        if asked.in_body_heading:
+        if not isnan(setpoint.yaw):
+            hold.yaw = setpoint.yaw
+        elif not isnan(setpoint.yaw_rate):
+            hold.yaw += setpoint.yaw_rate * dt
+        velocity, acceleration = setpoint.velocity, setpoint.acceleration
+        if setpoint.in_body_heading:
             q = self._state.estimate.q
             velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
         demand = PositionDemand(
-            asked.position,
+            setpoint.position,
             velocity,
             acceleration,
             hold.yaw,

@@ -1,4 +1,4 @@
-"""How ArduCopter flies what is not rates: a point and a heading held, a climb rate followed."""
+"""Position hold: a point and a heading are held, a climb rate is followed."""
 
 from math import radians, sqrt
 
@@ -12,9 +12,16 @@ from sitl_mock.autopilot.position_control import (
 from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
+STOPPING_S = 0.65
+"""A hold begins at the position plus the velocity times this (recorded on entering LAND)."""
+_HEIGHT_INTEGRAL = 1.0
+"""Acceleration per climb rate error and second; chosen for a steady hover, not measured."""
+_STEEP_CLIMB = 10.0
+"""Limit of the height loop, m/s; the climb rate itself is limited before."""
+
 
 class ClimbProfile:
-    """The height, climb rate and acceleration that are followed now; SI, up positive."""
+    """Setpoints of height, climb rate and (limited) acceleration; SI, up positive."""
 
     def __init__(self) -> None:
         self.height = 0.0
@@ -22,38 +29,30 @@ class ClimbProfile:
         self.acceleration = 0.0
 
     def begin(self, height: float, rate: float) -> None:
-        """Begin where the vehicle is, as fast as it climbs."""
+        """Start at the present height and climb rate."""
         self.height = height
         self.rate = rate
         self.acceleration = 0.0
 
-    def step(self, asked: float, acceleration: float, dt: float) -> None:
-        """Move on by ``dt`` s towards the climb rate ``asked``."""
+    def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
+        """Advance by ``dt`` s towards a climb rate, with limited acceleration."""
         most = acceleration * dt
-        change = max(-most, min(most, asked - self.rate))
+        change = max(-most, min(most, climb_rate - self.rate))
         self.acceleration = change / dt
         self.rate += change
         self.height += self.rate * dt
 
 
-def approach_speed(way: float, acceleration: float, fastest: float) -> float:
-    """Return the speed from which ``acceleration`` still stops within the ``way``, m/s."""
-    return min(fastest, sqrt(2.0 * acceleration * max(0.0, way)))
-
-
-STOPPING_S = 0.65
-"""The point to hold lies this many seconds of velocity ahead (recorded on entering LAND)."""
-_HEIGHT_INTEGRAL = 1.0
-"""Acceleration per height speed error and second; the mock's own, steady in a hover."""
-_STEEP_CLIMB = 10.0
-"""Bounds what the height loop may ask, m/s; the climb rate has its limits already."""
+def approach_speed(distance: float, deceleration: float, fastest: float) -> float:
+    """Return the largest speed that can stop within the distance, at most ``fastest``, m/s."""
+    return min(fastest, sqrt(2.0 * deceleration * max(0.0, distance)))
 
 
 class PositionHold:
-    """Holds a point, a heading and a height that a climb rate moves.
+    """Holds a point, a heading, and a height that a climb rate changes.
 
     Args:
-        state: the autopilot's state; the position target's echo is written here.
+        state: the autopilot's state; its ``position_target`` is written here.
         parameters: gains, limits and speeds, read at every step.
     """
 
@@ -63,12 +62,12 @@ class PositionHold:
         self._controller = PositionController(self._gains)
         self.climb = ClimbProfile()
         self.point = (0.0, 0.0)
-        """Held, NED, m."""
+        """North and east of the held point, m."""
         self.yaw = 0.0
-        """Held, rad."""
+        """Held heading, rad."""
 
     def begin(self) -> None:
-        """Hold from here: stop ahead, keep the heading and the climb rate as they are."""
+        """Start a hold: stop ahead, keep heading and climb rate."""
         estimate = self._state.estimate
         x, y, z = estimate.position_ned
         vx, vy, vz = estimate.velocity_ned
@@ -78,7 +77,7 @@ class PositionHold:
         self._controller.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Move all that is held along with an estimator reset (rad, m NED)."""
+        """Shift point, height and heading with an estimator reset (rad, m NED)."""
         dx, dy, dz = position_step
         self.point = (self.point[0] + dx, self.point[1] + dy)
         self.climb.height -= dz
@@ -88,7 +87,7 @@ class PositionHold:
         """Return attitude and thrust of one period.
 
         Args:
-            climb_rate: asked, m/s up.
+            climb_rate: setpoint, m/s up.
             dt: the period, s.
             level: keep level instead of holding the point.
         """
@@ -107,7 +106,7 @@ class PositionHold:
         return self.follow(demand, dt)
 
     def follow(self, demand: PositionDemand, dt: float) -> PositionOutput:
-        """Return attitude and thrust of one period for a demand of any kind."""
+        """Return attitude and thrust of one period for any demand."""
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)

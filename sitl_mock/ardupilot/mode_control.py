@@ -1,4 +1,4 @@
-"""What each of ArduCopter's flight modes asks of the rate loop, period by period."""
+"""The actuator command of each period in each of ArduCopter's modes."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from sitl_mock.physics.quaternion import Vector, from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
-"""After contact in LAND the thrust falls by this per second (landed 1.6 s after, recorded)."""
+"""After contact in LAND the thrust decreases by this per second (recorded: landed after 1.6 s)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -24,7 +24,7 @@ class ArduPilotModeControl:
     Args:
         state: the autopilot's state; the echoes of the targets are written here.
         parameters: gains, limits and speeds; MOT_THST_HOVER is learned.
-        guided: what GUIDED does.
+        guided: the task of GUIDED.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 
@@ -52,7 +52,7 @@ class ArduPilotModeControl:
             self._guided.hold()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        """Shift the held position and heading with an estimator reset (rad, m NED)."""
         self._hold.shift(yaw_step, position_step)
         self._return.height -= position_step[2]
 
@@ -75,7 +75,7 @@ class ArduPilotModeControl:
         """Return the command for the next ``dt`` s."""
         state = self._state
         state.position_target.active = False
-        # Disarmed, too, the modes that hold a position say that they would (recorded in GUIDED).
+        # Modes that hold a position report it even when disarmed (recorded in GUIDED).
         state.height_controlled = state.position_controlled = state.mode not in (
             Mode.STABILIZE,
             Mode.ALT_HOLD,
@@ -98,7 +98,7 @@ class ArduPilotModeControl:
         if mode is Mode.GUIDED:
             return self._guided_flight.command(dt)
         if mode is Mode.STABILIZE:
-            # Somebody holds the sticks in the middle; upright at a hover.
+            # A pilot with centred sticks: level at the hover thrust.
             hover = float(self._parameters["MOT_THST_HOVER"])
             return self._output.attitude(
                 from_yaw(self._hold.yaw), angle_boosted(hover, self._output.cos_tilt)
@@ -124,7 +124,7 @@ class ArduPilotModeControl:
         )
 
     def _land(self, dt: float) -> ActuatorCommand:
-        """Descend: fast to LAND_ALT_LOW, then at LAND_SPEED; the thrust falls on the ground."""
+        """Descend fast to LAND_ALT_LOW, then at LAND_SPEED; reduce the thrust on the ground."""
         state, parameters = self._state, self._parameters
         if state.contact:
             self._output.thrust = max(0.0, self._output.thrust - TOUCHDOWN_THRUST_RATE * dt)

@@ -1,4 +1,4 @@
-"""ArduCopter's numbers for its modes, and what each needs."""
+"""ArduCopter's modes: their numbers, what each needs, and whether it may be armed."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -25,15 +25,15 @@ PILOT_MODES = {
     Mode.STABILIZED: Mode.STABILIZE,
     Mode.MANUAL: Mode.STABILIZE,
 }
-"""PX4's words for what a pilot switches to -> ArduCopter's."""
+"""PX4's name of a pilot's mode -> ArduCopter's mode."""
 PILOTED = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
 """Modes that a pilot flies."""
 
 
 def base_mode(*, armed: bool, position_controlled: bool) -> int:
-    """Return HEARTBEAT.base_mode: 81, with 8 while a horizontal position is held, and 128 armed.
+    """Return HEARTBEAT.base_mode: 81, plus 8 in horizontal position control, plus 128 if armed.
 
-    So 209 while rates fly in GUIDED, and 217 when it holds its position (recorded).
+    So it is 209 under rates in GUIDED, and 217 in a position hold (recorded).
     """
     flags = (
         dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -56,15 +56,15 @@ def arming_problem(
     gcs_failsafe: bool,
     refusal: str | None,
 ) -> str | None:
-    """Return why arming is refused now, None if it is not.
+    """Return why arming is refused now, in ArduCopter's words; None if it is not.
 
     Args:
         state: the autopilot's state.
-        initialised: whether the autopilot has said that it is ready.
-        home_set: whether the estimator has settled on its origin.
-        crashed: whether the vehicle is broken.
-        gcs_failsafe: whether the ground station is lost.
-        refusal: a reason given from outside (fault injection).
+        initialised: whether the boot is complete.
+        home_set: whether home is set.
+        crashed: whether the vehicle has crashed.
+        gcs_failsafe: whether the ground station failsafe is active.
+        refusal: the reason that a fault gives, None without such a fault.
     """
     mode: Mode = state.mode
     problems = (

@@ -1,4 +1,4 @@
-"""The messages that tell where the vehicle is and how it moves, in ArduCopter's conventions."""
+"""Telemetry of position and motion in ArduCopter's conventions."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -16,7 +16,7 @@ _SENT = (
     dialect.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
     dialect.MAVLINK_MSG_ID_VIBRATION,
 )
-"""Built as PX4's are; it has no ODOMETRY and no ALTITUDE."""
+"""Messages built as PX4 builds them; ODOMETRY and ALTITUDE do not exist."""
 
 
 class ArduPilotMotionTelemetry(MotionTelemetry):
@@ -28,14 +28,14 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         """Return message id -> builder."""
         alike = super().builders()
         return {message_id: alike[message_id] for message_id in _SENT} | {
-            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.place_or_nothing,
+            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.position_or_zeros,
             dialect.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
             dialect.MAVLINK_MSG_ID_RAW_IMU: self.raw_imu,
             dialect.MAVLINK_MSG_ID_SCALED_PRESSURE: self.scaled_pressure,
         }
 
     def attitude_target(self) -> Message:
-        """Return ATTITUDE_TARGET: the attitude that rates turn before the body does, its rates."""
+        """Return ATTITUDE_TARGET: the shaped target, which leads the body, and its rates."""
         shaped = self._vehicle.attitude_target
         if shaped is None:
             return super().attitude_target()
@@ -43,8 +43,8 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
             self._boot_ms, 0, shaped.target, *shaped.rates, self._state.attitude_target.thrust
         )
 
-    def place_or_nothing(self) -> Message:
-        """Return GLOBAL_POSITION_INT; without a position it is sent, too, full of zeros."""
+    def position_or_zeros(self) -> Message:
+        """Return GLOBAL_POSITION_INT, with zeros if there is no position."""
         message = self.global_position_int()
         if message is not None:
             return message

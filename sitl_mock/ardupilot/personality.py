@@ -1,4 +1,4 @@
-"""ArduCopter's personality: its numbers, and its rules put together (recorded from 4.7.0-dev)."""
+"""ArduCopter's personality: its numbers and its behaviour (recorded from 4.7.0-dev)."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
@@ -33,9 +33,9 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
 
 LANDED_AFTER_US = 1_000_000
-"""Contact with little thrust for this long is a landing."""
+"""Contact with low thrust for this time is a landing."""
 POSITION_TIMEOUT_US = 10_000_000
-"""How long the position stays valid without GPS; not measured."""
+"""Time for which the position stays valid without GPS; not measured."""
 DEFAULT_LOOP_HZ = 400.0
 _HOME = (dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, dialect.MAVLINK_MSG_ID_HOME_POSITION)
 _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIMESYNC: 0.1}
@@ -67,7 +67,7 @@ _SUPPORTED = frozenset(
         ardupilotmega.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
     }
 )
-"""Messages that can be asked for."""
+"""Messages that can be requested."""
 
 
 class ArduPilot:
@@ -92,11 +92,11 @@ class ArduPilot:
         return with_ardupilot_defaults(section)
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return a turn of the main loop."""
+        """Return the period of the main loop."""
         return self._loop_us(settings)
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the streams of a link: silent but for the boot's until it is asked."""
+        """Return the streams of a link: until a client requests more, those of the boot."""
         silent_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
@@ -106,11 +106,11 @@ class ArduPilot:
         )
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode a custom_mode means, None if the mock has none such."""
+        """Return the mode of a custom_mode, None if the mock does not have it."""
         return MODES_BY_NUMBER.get(custom_mode)
 
     def rules(self, parts: VehicleParts) -> Rules:
-        """Put ArduCopter's rules together."""
+        """Build ArduCopter's behaviour for one vehicle."""
         state, parameters, links = parts.state, parts.parameters, parts.links
         announce = ArduPilotAnnouncer(links)
         protocol = ParameterProtocol(parameters, FloatEncoding(ARDUPILOT_TYPES))
@@ -118,7 +118,7 @@ class ArduPilot:
         control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
         notifier = Notifier(
             announce,
-            send_home=lambda: _tell(commands, _HOME, links),
+            send_home=lambda: _send_once(commands, _HOME, links),
             send_parameter=lambda name: protocol.send_changed(name, [x for x in links if x.heard]),
         )
         boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
@@ -163,7 +163,7 @@ class ArduPilot:
         return round(1e6 / rate)
 
 
-def _tell(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
+def _send_once(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
     """Send messages once on every link."""
     for link in links:
         for message_id in messages:

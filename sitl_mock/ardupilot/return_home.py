@@ -1,4 +1,4 @@
-"""ArduCopter's RTL: climb, fly home, wait above it, land."""
+"""ArduCopter's RTL: climb, fly home, wait above home, land."""
 
 from enum import Enum, auto
 from math import hypot
@@ -7,12 +7,12 @@ from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import State
 
 _NEAR_M = 2.0
-"""Nearer to home than this (WPNAV_RADIUS) the vehicle is there."""
+"""Distance at which the vehicle has reached home (WPNAV_RADIUS)."""
 _REACHED_M = 0.3
 
 
 class Leg(Enum):
-    """Where on the way home the vehicle is."""
+    """Legs of the return."""
 
     CLIMB = auto()
     HOME = auto()
@@ -21,7 +21,7 @@ class Leg(Enum):
 
 
 class Return:
-    """The way home.
+    """The height and the leg of a return.
 
     Args:
         state: the autopilot's state.
@@ -33,11 +33,11 @@ class Return:
         self._parameters = parameters
         self.leg = Leg.CLIMB
         self.height = 0.0
-        """To fly home at, m above the local origin."""
+        """Of the flight home, m above the local origin."""
         self._waiting_since_us = 0
 
     def begin(self) -> None:
-        """Choose the height: RTL_ALT, less near home by RTL_CONE_SLOPE, never lower than now."""
+        """Choose the height: RTL_ALT, lower near home (RTL_CONE_SLOPE), never below the present."""
         state, parameters = self._state, self._parameters
         height = -state.estimate.position_ned[2]
         cone = parameters["RTL_CONE_SLOPE"] * self._distance()
@@ -46,7 +46,7 @@ class Return:
         self.leg = Leg.CLIMB
 
     def step(self) -> None:
-        """Go on to the next leg when this one is done."""
+        """Start the next leg when this one is complete."""
         state = self._state
         if self.leg is Leg.CLIMB:
             if self.height + state.estimate.position_ned[2] < _REACHED_M:

@@ -1,25 +1,25 @@
-"""When ArduPilot sends each telemetry message of a link: whole milliseconds, turns of its loop.
+"""ArduPilot's stream schedule: intervals in whole milliseconds, sent in cycles of the main loop.
 
-A link is silent but for HEARTBEAT and TIMESYNC until messages are asked for. An interval is cut to
-whole milliseconds; one shorter than a turn of the main loop is refused and the old one kept. A
-message leaves at the first turn after it is due, its phase kept: asked for 3 ms with the 400 Hz
-loop, it comes after 2.5, 2.5, 5 ms, ... (recorded), 333 Hz on the whole.
+A link sends only HEARTBEAT and TIMESYNC until a client requests messages. An interval is truncated
+to whole milliseconds. One shorter than the main loop's period is refused, and the old one stays. A
+message is sent in the first cycle after it is due and keeps its phase: 3 ms with the 400 Hz loop
+gives steps of 2.5, 2.5, 5 ms, ... (recorded), 333 Hz on average.
 """
 
 from collections.abc import Collection, Mapping
 
 LONGEST_MS = 60_000
-"""A longer interval than this counts as this."""
+"""Longest interval; longer ones are reduced to it."""
 
 
 class ArduPilotStreams:
-    """The streams of one link.
+    """The stream schedule of one link.
 
     Args:
         rates: message id -> Hz at boot.
-        supported: ids of the messages that can be asked for.
-        loop_us: a turn of the main loop.
-        silent_until_us: before, only the streams of the boot leave.
+        supported: ids of the messages that can be requested.
+        loop_us: period of the main loop.
+        silent_until_us: before this time only the streams of the boot are sent.
     """
 
     def __init__(
@@ -38,10 +38,10 @@ class ArduPilotStreams:
         self._last = dict.fromkeys(self._defaults, 0)
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
-        """Ask for a message every ``interval_us``; 0 = as at boot, negative = never.
+        """Set the interval of a message; 0 = the rate at boot, negative = never.
 
         Returns:
-            why it is refused, in ArduPilot's words; None: it is not.
+            the reason for a refusal in ArduPilot's words, None if accepted.
         """
         if message_id not in self._supported:
             return f"No ap_message for mavlink id ({message_id})"
@@ -61,11 +61,11 @@ class ArduPilotStreams:
         return None
 
     def interval(self, message_id: int) -> int:
-        """Return the interval in us that is set for a message, -1 if it is not streamed."""
+        """Return the interval of a message in us, -1 if it is not streamed."""
         return self._intervals.get(message_id, -1)
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
-        """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent."""
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
         due = []
         for message_id, interval in self._intervals.items():
             if slot_us < self._silent_until_us and message_id not in self._defaults:
@@ -73,7 +73,7 @@ class ArduPilotStreams:
             last = self._last[message_id]
             if slot_us - last < interval:
                 continue
-            # More than a whole interval late, the phase is given up: nothing is sent twice.
+            # More than one interval late, the phase restarts, so that no message is sent twice.
             late = slot_us - last >= 2 * interval
             self._last[message_id] = slot_us if late else last + interval
             due.append(message_id)

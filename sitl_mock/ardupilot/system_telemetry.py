@@ -1,4 +1,4 @@
-"""The messages that tell how the vehicle and its autopilot are, in ArduCopter's conventions."""
+"""Telemetry of the autopilot's state in ArduCopter's conventions."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ from sitl_mock.physics.vehicle import Vehicle
 _SENSORS_PRESENT = 1399979055
 _SENSORS_ENABLED = 1382128687
 _SENSORS_HEALTHY = 1467063343
-"""Recorded disarmed, without a height or position controller."""
+"""Recorded while disarmed, without height or position control."""
 _HEIGHT_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
 _POSITION_CONTROL = dialect.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 _LOGGING = dialect.MAV_SYS_STATUS_LOGGING
@@ -29,7 +29,7 @@ _EKF_NO_POSITION = (
     | ardupilotmega.EKF_CONST_POS_MODE
 )
 _STICKS_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
-"""The simulated transmitter at rest."""
+"""The sticks of the simulated transmitter at rest."""
 
 
 class ArduPilotSystemTelemetry(SystemTelemetry):
@@ -38,9 +38,9 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     Args:
         state: the autopilot's state.
         origin: of the local frame.
-        identity: what AUTOPILOT_VERSION says.
+        identity: content of AUTOPILOT_VERSION.
         vehicle: for the battery.
-        initialised: whether the autopilot has come up.
+        initialised: whether the boot is complete.
         origin_set: whether the estimator has an origin.
     """
 
@@ -73,7 +73,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         }
 
     def heartbeat(self) -> Message:
-        """Return HEARTBEAT; until it is initialised the guided bit is set (recorded: 89)."""
+        """Return HEARTBEAT; during the boot the guided bit is set (recorded: 89)."""
         state = self._state
         controlled = state.position_controlled or not self._initialised()
         return dialect.MAVLink_heartbeat_message(
@@ -95,7 +95,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS; the prearm bit is what clients call armable."""
+        """Return SYS_STATUS; clients read its prearm bit as armable."""
         state, battery = self._state, self._vehicle.battery
         working = _HEIGHT_CONTROL if state.height_controlled else 0
         working |= _POSITION_CONTROL if state.position_controlled else 0
@@ -130,7 +130,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         )
 
     def gps_raw_int(self) -> Message:
-        """Return GPS_RAW_INT: nothing until the receiver is found, then an RTK fix (recorded)."""
+        """Return GPS_RAW_INT: no fix during the boot, then an RTK fix (recorded)."""
         state = self._state
         if not state.gps_ok or not self._initialised():
             return dialect.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, NO_VALUE, NO_VALUE, 0, 0, 0)
@@ -152,9 +152,9 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return dialect.MAVLink_rc_channels_message(self._state.shown_us // 1000, 16, *channels, 255)
 
     def home_position(self) -> Message | None:
-        """Return HOME_POSITION, without an attitude (recorded), once there is a home."""
+        """Return HOME_POSITION, without attitude (recorded); None before home is set."""
         return self._home_position((NAN, NAN, NAN, NAN)) if self._origin_set() else None
 
     def gps_global_origin(self) -> Message | None:
-        """Return GPS_GLOBAL_ORIGIN, once there is one."""
+        """Return GPS_GLOBAL_ORIGIN; None before it is set."""
         return super().gps_global_origin() if self._origin_set() else None

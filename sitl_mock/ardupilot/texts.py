@@ -1,4 +1,4 @@
-"""ArduCopter's words. It has no events, and keeps what is missing here to itself."""
+"""ArduCopter's texts. It has no numbered events, and announces only those listed here."""
 
 from collections.abc import Iterable
 
@@ -31,7 +31,7 @@ _CHUNK = 50
 
 
 class ArduPilotAnnouncer:
-    """Announces occasions, and says texts of no occasion.
+    """Sends the texts of events, and other texts, on every link with a client.
 
     Args:
         links: where to.
@@ -42,13 +42,13 @@ class ArduPilotAnnouncer:
         self._long_texts = 0
 
     def __call__(self, kind: EventKind, detail: str) -> None:
-        """Tell of an kind, unless ArduPilot keeps it to itself."""
+        """Announce an event if ArduCopter has a text for it."""
         event = ARDUPILOT_EVENTS.get(kind)
         if event is not None:
             self.say(event.text.format(detail), event.severity)
 
     def say(self, text: str, severity: int) -> None:
-        """Send a text; only one that needs several chunks has an id (recorded)."""
+        """Send a text; only a text of several chunks has an id (recorded)."""
         data = text.encode()
         chunks = [data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK)]
         if len(chunks) > 1:

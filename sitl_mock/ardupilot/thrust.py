@@ -1,4 +1,4 @@
-"""ArduCopter's normalised thrust: what it gives, the angle boost, the climb rate it may stand for.
+"""ArduCopter's normalised thrust: specific thrust, angle boost, thrust or climb rate of a setpoint.
 
 Measured on 4.7.0-dev's built-in quadrotor, with GUID_OPTIONS bit 3 set.
 """
@@ -27,7 +27,7 @@ _MEASURED = (
 
 
 def specific_thrust(thrust: float) -> float:
-    """Return what a normalised thrust gives, m/s^2; straight lines between what was measured."""
+    """Return the specific thrust of a normalised thrust, m/s^2; interpolated measurements."""
     for (low, low_g), (high, high_g) in pairwise(_MEASURED):
         if thrust <= high:
             share = max(0.0, thrust - low) / (high - low)
@@ -38,24 +38,24 @@ def specific_thrust(thrust: float) -> float:
 def angle_boosted(thrust: float, cos_tilt: float) -> float:
     """Return the thrust divided by the cosine of the tilt, as ATC_ANGLE_BOOST does.
 
-    Towards the horizon and beyond it the thrust is taken back to nothing.
+    Near 90 degrees of tilt and beyond, the thrust decreases to zero.
     """
     upright = max(0.0, min(1.0, 10.0 * cos_tilt))
     return thrust * upright / max(0.1, min(1.0, cos_tilt))
 
 
 def thrust_of_setpoint(thrust: float) -> float:
-    """Return the thrust that a setpoint's field asks: NaN is none, infinity all (measured)."""
+    """Return the thrust of a setpoint's field: NaN means 0, infinity means 1 (measured)."""
     return 0.0 if isnan(thrust) else max(0.0, min(1.0, thrust))
 
 
 def climb_rate_of_setpoint(thrust: float, fastest_up: float, fastest_down: float) -> float:
-    """Return the climb rate that a setpoint's thrust field asks, m/s: 0.5 and NaN are none.
+    """Return the climb rate of a setpoint's thrust field, m/s: 0 for 0.5 and for NaN.
 
     Args:
         thrust: the field.
         fastest_up: climb rate at 1, m/s.
         fastest_down: sink rate at 0, m/s.
     """
-    way = 0.0 if isnan(thrust) else 2.0 * max(0.0, min(1.0, thrust)) - 1.0
-    return way * (fastest_up if way > 0.0 else fastest_down)
+    share = 0.0 if isnan(thrust) else 2.0 * max(0.0, min(1.0, thrust)) - 1.0
+    return share * (fastest_up if share > 0.0 else fastest_down)

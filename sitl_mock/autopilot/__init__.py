@@ -1,1 +1,1 @@
-"""What every autopilot has: state, commands, parameters, telemetry, setpoints, faults."""
+"""What PX4 and ArduPilot share: state, commands, parameters, telemetry, setpoints, faults."""

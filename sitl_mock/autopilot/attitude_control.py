@@ -35,12 +35,12 @@ def attitude_rates(
 ) -> Vector:
     """Return the body rates (rad/s, FRD) that turn ``q`` to ``target``.
 
-    The thrust axis goes first, along the shortest arc; the rest of the turn, about that axis, is
-    weighted by ``yaw_weight`` and its gain raised by as much (as PX4's AttitudeControl does).
+    As PX4's AttitudeControl: the rotation of the thrust axis along the shortest arc has priority.
+    The remaining rotation about this axis is scaled by ``yaw_weight``, its gain by the inverse.
 
     Args:
         q: present attitude.
-        target: attitude to reach; need not be of unit length.
+        target: attitude to reach, of any length.
         yaw_rate: feed-forward about the world's down axis, rad/s.
         gains: gains and limits.
     """
@@ -66,7 +66,7 @@ def attitude_rates(
 
 
 def is_usable(q: Quaternion) -> bool:
-    """Whether a quaternion is free of NaN and not zero."""
+    """Whether a quaternion has no NaN and is not zero."""
     w, x, y, z = q
     square = w * w + x * x + y * y + z * z
     return not isnan(square) and 1e-6 < square < 1e6

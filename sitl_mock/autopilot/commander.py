@@ -1,4 +1,4 @@
-"""Arming, modes and what ends them: what every autopilot family's rules of state must answer."""
+"""The interfaces of arming and modes (`Commander`) and of the control in a mode (`ModeControl`)."""
 
 from typing import Protocol
 
@@ -20,44 +20,44 @@ class Commander(Protocol):
     """Owns ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
     refusal: str | None
-    """A reason given from outside why arming is refused (fault injection)."""
+    """Reason with which a fault refuses arming, None without such a fault."""
     pilot: bool
-    """Whether somebody holds the sticks."""
+    """Whether a fault simulates a pilot at the sticks."""
 
     @property
     def under_setpoints(self) -> bool:
-        """Whether the vehicle now flies what setpoints ask."""
+        """Whether setpoints control the vehicle now."""
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips the checks."""
 
     def announce_problem(self) -> None:
-        """Say what forbids arming now, if anything does."""
+        """Announce what forbids arming now, if anything does."""
 
     def disarm(self, *, force: bool = False) -> int:
-        """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
+        """Disarm, and return a MAV_RESULT; in the air this needs ``force``."""
 
     def request_mode(self, mode: Mode) -> int:
         """Change the mode, and return a MAV_RESULT."""
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot's sticks change the mode (fault injection)."""
+        """Let the pilot take over in a mode (fault injection)."""
 
-    def heard(self, heartbeat: Message) -> None:
-        """Note the heartbeat of another system or component."""
+    def receive_heartbeat(self, heartbeat: Message) -> None:
+        """Record the heartbeat of another system or component."""
 
     def setpoint(self, message: Message) -> None:
-        """Take a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""
+        """Handle a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""
 
     def step(self, *, crashed: bool) -> None:
-        """Run the rules once; called at 20 Hz of vehicle time."""
+        """Update arming, mode and failsafes; called at 20 Hz of vehicle time."""
 
 
 class ModeControl(Protocol):
-    """Turns mode, estimate and setpoints into one actuator command a period."""
+    """Computes the actuator command of each period from mode, estimate and setpoints."""
 
     def command(self, dt: float) -> ActuatorCommand:
         """Return the command for the next ``dt`` s."""
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        """Shift the held position and heading with an estimator reset (rad, m NED)."""

@@ -1,4 +1,4 @@
-"""What each MAV_CMD does that autopilot families share, and its result."""
+"""The MAV_CMDs that all autopilots execute alike, and their results."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -22,18 +22,18 @@ FORCE_MAGIC = 21196.0
 
 
 class Command(NamedTuple):
-    """A command with its seven parameters; 5 and 6 in degrees when they are a place."""
+    """A command with its seven parameters; 5 and 6 are in degrees if they are a position."""
 
     number: int
     parameters: tuple[float, float, float, float, float, float, float]
 
 
 Handler = Callable[[Command, Link], int]
-"""Carries out a command that came on a link; returns its MAV_RESULT."""
+"""Executes a command received on a link; returns its MAV_RESULT."""
 
 
 class Commands:
-    """Carries out commands.
+    """Executes commands.
 
     Args:
         state: the autopilot's state.
@@ -54,10 +54,10 @@ class Commands:
                 lambda _, link: self.send(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, link)
             ),
         }
-        """What is carried out; a family adds its own."""
+        """MAV_CMD -> handler; an autopilot adds its own."""
 
     def run(self, command: Command, link: Link) -> int:
-        """Carry out one command that came on a link, and return its MAV_RESULT."""
+        """Execute one command received on a link, and return its MAV_RESULT."""
         handler = self.handlers.get(command.number)
         return UNSUPPORTED if handler is None else handler(command, link)
 

@@ -1,4 +1,4 @@
-"""The occasions that an autopilot announces."""
+"""The events that an autopilot announces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class EventKind(Enum):
-    """Something that an autopilot tells of."""
+    """An event that an autopilot announces; each has its own texts for them."""
 
     ARMED = auto()
     ARMING_DENIED = auto()
@@ -41,11 +41,11 @@ class EventKind(Enum):
 
 
 class Event(NamedTuple):
-    """How an autopilot tells of an occasion: words for a ground station, an id for machines.
+    """How an autopilot announces an event: STATUSTEXT, and EVENT where it has an id.
 
-    ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = words
-    only; ``arguments`` are the event's bytes; ``internal`` is its severity in the vehicle's own
-    log, None = the same.
+    ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = text
+    only; ``arguments`` are the packed arguments of EVENT; ``internal`` is the severity in the
+    vehicle's log, None = the same.
     """
 
     text: str
@@ -56,4 +56,4 @@ class Event(NamedTuple):
 
 
 Announce = Callable[[EventKind, str], None]
-"""Tells the outside of an kind, with a detail."""
+"""Announces an event with a detail for its text."""

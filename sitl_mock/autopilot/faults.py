@@ -1,4 +1,4 @@
-"""Which faults are active, and what they do to the vehicle."""
+"""The schedule of the faults, and their effects on the vehicle."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,10 +36,10 @@ class _Entry:
 
 
 class FaultSchedule:
-    """The faults asked so far, and those active now.
+    """The faults injected so far, and those active now.
 
     Args:
-        faults: known from the start.
+        faults: of the configuration.
     """
 
     def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
@@ -47,11 +47,11 @@ class FaultSchedule:
         self.link: tuple[LinkFault, ...] = ()
 
     def add(self, fault: LinkFault | VehicleFault, now_us: int) -> None:
-        """Ask for a fault; without a start condition it begins at the next update."""
+        """Add a fault; without a start it begins at the next update."""
         self._entries.append(_Entry(fault, now_us))
 
     def clear(self) -> list[VehicleFault]:
-        """Forget all faults, and return the vehicle's that were active."""
+        """Remove all faults; return the vehicle faults that were active."""
         active = [e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)]
         self._entries = []
         self.link = ()
@@ -60,11 +60,11 @@ class FaultSchedule:
     def update(
         self, now_us: int, offboard_us: int | None
     ) -> tuple[list[VehicleFault], list[VehicleFault]]:
-        """Move on to a time, and return the vehicle's faults that began and that ended.
+        """Advance to a time; return the vehicle faults that began and those that ended.
 
         Args:
             now_us: vehicle time.
-            offboard_us: when OFFBOARD was first entered armed, None if not yet.
+            offboard_us: when setpoints first controlled the vehicle, None if not yet.
         """
         began: list[VehicleFault] = []
         ended: list[VehicleFault] = []
@@ -102,14 +102,14 @@ class FaultSchedule:
 
 
 class FaultEffects:
-    """Applies faults of the vehicle (those of the link are the server's).
+    """Applies vehicle faults; `Connections` applies those of the link.
 
     Args:
         state: the autopilot's state.
-        vehicle: whose estimate and battery are spoilt.
-        commander: which refuses, or whose mode the pilot changes.
-        control: whose held position and heading follow an estimator reset.
-        links: whose messages are spoilt.
+        vehicle: for faults of estimate and battery.
+        commander: for faults of arming and mode.
+        control: its held position and heading follow an estimator reset.
+        links: for faults of messages.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class FaultEffects:
         links: list[Link],
     ) -> None:
         self.offboard_us: int | None = None
-        """When OFFBOARD was first entered armed, vehicle time."""
+        """When setpoints first controlled the vehicle, vehicle time."""
         self.clock_frozen = False
         self._state = state
         self._vehicle = vehicle
@@ -134,19 +134,19 @@ class FaultEffects:
         self._slipped_s = 0.0
 
     def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
-        """Let faults take effect, and undo those that ended."""
+        """Apply the faults that began, and undo those that ended."""
         for fault in began:
             self._begin(fault)
         for fault in ended:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Wall time by which the vehicle's clock fell behind since this was asked, s."""
+        """Return the wall time that the vehicle clock lost since the last call, s."""
         slipped, self._slipped_s = self._slipped_s, 0.0
         return slipped
 
     def silenced(self, message_id: int) -> bool:
-        """Whether a message is not streamed at present."""
+        """Whether a fault stops this message now."""
         if not self._stopped:
             return False
         kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
@@ -154,7 +154,7 @@ class FaultEffects:
         return any(not fault.messages or name in fault.messages for fault in self._stopped)
 
     def watch_position(self, converged_us: float, timeout_us: float) -> None:
-        """Call the position valid from ``converged_us`` until ``timeout_us`` after GPS was lost."""
+        """Set the position valid from ``converged_us`` to ``timeout_us`` after the loss of GPS."""
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
         state.position_valid = state.time_us >= converged_us and not lost
@@ -200,7 +200,7 @@ class FaultEffects:
             case GpsLoss():
                 self._state.gps_ok = True
             case EstimatorReset() | LowBattery() | SlipClock():
-                pass  # a jump, an empty battery and lost time stay
+                pass  # these cannot be undone
 
     def _hook_links(self) -> None:
         for link in self._links:
@@ -210,5 +210,5 @@ class FaultEffects:
         for fault in self._nan:
             if message.get_type() == fault.message:
                 value = getattr(message, fault.field)
-                spoilt = [nan] * len(value) if isinstance(value, Sequence) else nan
-                setattr(message, fault.field, spoilt)
+                corrupted = [nan] * len(value) if isinstance(value, Sequence) else nan
+                setattr(message, fault.field, corrupted)

@@ -1,4 +1,4 @@
-"""Landed or not: contact and little thrust for a while; taken off at once."""
+"""Land detector: landed after contact with low thrust for a time, taken off at once."""
 
 from collections.abc import Callable
 
@@ -6,18 +6,18 @@ from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
-"""Little thrust: below this share of the hover thrust."""
+"""Thrust below this share of the hover thrust is low."""
 
 
 class LandDetector:
-    """Keeps ``contact``, ``landed``, ``landed_state`` and ``flown`` of the state.
+    """Updates ``contact``, ``landed``, ``landed_state`` and ``flown`` of the state.
 
     Args:
         state: the autopilot's state.
-        announce: tells of a take-off and a landing.
-        hover_thrust: the normalised thrust of a hover.
-        landed_after_us: contact with little thrust for this long is a landing.
-        climbing: whether a take-off is still below its end.
+        announce: announces take-off and landing.
+        hover_thrust: normalised thrust of a hover.
+        landed_after_us: contact with low thrust for this time is a landing.
+        climbing: whether a take-off has not reached its height.
     """
 
     def __init__(
@@ -37,19 +37,19 @@ class LandDetector:
         self._quiet_since_us = 0
 
     def step(self, *, contact: bool) -> None:
-        """Look once: ``contact`` with the ground, and the thrust commanded."""
+        """Update from the ``contact`` with the ground and the commanded thrust."""
         state = self._state
         was_landed = state.landed
-        self._look(contact=contact)
+        self._update(contact=contact)
         if was_landed != state.landed and state.armed:
             landed = EventKind.LANDING_DETECTED if state.landed else EventKind.TAKEOFF_DETECTED
             self._announce(landed, "")
         state.landed_state = self._landed_state()
 
-    def _look(self, *, contact: bool) -> None:
+    def _update(self, *, contact: bool) -> None:
         state = self._state
         state.contact = contact
-        # Written so that a NaN thrust, which is none, counts as little.
+        # A NaN thrust, which means none, fails this comparison and counts as low.
         pushing = state.armed and state.command.thrust > LOW_THRUST_SHARE * self._hover_thrust()
         if not contact or pushing:
             self._quiet_since_us = state.time_us

@@ -1,4 +1,4 @@
-"""The messages that tell where the vehicle is and how it moves, in PX4's conventions."""
+"""Telemetry of position and motion; the defaults follow PX4's conventions."""
 
 from collections.abc import Callable, Sequence
 from math import asin, atan2, degrees, hypot, isnan, pi
@@ -30,7 +30,7 @@ class MotionTelemetry:
 
     Args:
         state: the autopilot's state.
-        vehicle: for what is not estimated (rotors).
+        vehicle: for the rotors and the reset counter.
         origin: of the local frame.
     """
 
@@ -40,7 +40,7 @@ class MotionTelemetry:
         self._origin = origin
 
     airspeed = NAN
-    """VFR_HUD's: there is no sensor for it."""
+    """In VFR_HUD; there is no airspeed sensor."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -64,7 +64,7 @@ class MotionTelemetry:
         return self._state.shown_us // 1000
 
     def place(self) -> Geodetic:
-        """Return where the vehicle believes to be."""
+        """Return the estimated geodetic position."""
         return to_geodetic(self._origin, self._state.estimate.position_ned)
 
     def attitude(self) -> Message:
@@ -130,7 +130,7 @@ class MotionTelemetry:
         )
 
     def attitude_target(self) -> Message:
-        """Return ATTITUDE_TARGET: what the attitude and rate controllers follow."""
+        """Return ATTITUDE_TARGET, the setpoint of the attitude and rate controllers."""
         target = self._state.attitude_target
         return dialect.MAVLink_attitude_target_message(
             self._boot_ms, 0, target.q, *target.rates, target.thrust
@@ -169,7 +169,7 @@ class MotionTelemetry:
         )
 
     def pressure_hpa(self) -> float:
-        """Return the air's pressure at the estimated height (ICAO standard atmosphere)."""
+        """Return the air pressure at the estimated height (ICAO standard atmosphere)."""
         altitude = self._origin.altitude_m - self._state.estimate.position_ned[2]
         return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * altitude) ** 5.25588)
 
@@ -203,7 +203,7 @@ class MotionTelemetry:
         return dialect.MAVLink_servo_output_raw_message(state.shown_us & 0xFFFFFFFF, 0, *outputs)
 
     def vibration(self) -> Message:
-        """Return VIBRATION; the mock's airframe does not shake."""
+        """Return VIBRATION; the simulated airframe does not vibrate."""
         return dialect.MAVLink_vibration_message(self._state.shown_us, 0.0, 0.01, 0.11, 0, 0, 0)
 
     def _heading_deg(self) -> float:
@@ -211,7 +211,7 @@ class MotionTelemetry:
 
 
 def _ignored(target: PositionTargetEcho) -> int:
-    """Return the POSITION_TARGET_TYPEMASK that leaves out what is not followed."""
+    """Return the POSITION_TARGET_TYPEMASK of the components that are not controlled."""
     parts = (
         (POSITION_BITS, target.position),
         (VELOCITY_BITS, target.velocity),
@@ -227,7 +227,7 @@ def _ignored(target: PositionTargetEcho) -> int:
 
 
 def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:
-    """Return a diagonal matrix's upper triangle, row by row, as MAVLink sends covariances."""
+    """Return the upper triangle of a diagonal matrix, row by row, as MAVLink sends covariances."""
     size = len(variances)
     return tuple(
         variances[row] if column == row else 0.0
@@ -250,6 +250,6 @@ def euler(q: Quaternion) -> tuple[float, float, float]:
 
 
 def clip(value: float, bits: int) -> int:
-    """Return a value rounded into a signed integer with this many bits beside the sign."""
+    """Return the value rounded and clamped to a signed integer of ``bits`` bits plus sign."""
     limit = (1 << bits) - 1
     return max(-limit, min(limit, round(value)))

@@ -25,7 +25,7 @@ class ParameterProtocol:
 
     Args:
         parameters: the table that is read and changed.
-        encoding: the autopilot's way with them.
+        encoding: of the autopilot.
     """
 
     def __init__(self, parameters: ParameterTable, encoding: Encoding) -> None:
@@ -34,13 +34,13 @@ class ParameterProtocol:
         self._listing: dict[str, tuple[Link, int]] = {}
 
     def request_list(self, _: Message, link: Link) -> None:
-        """PARAM_REQUEST_LIST: the hash, then every parameter, a few each tick."""
+        """PARAM_REQUEST_LIST: send the hash, then every parameter, a few each slot."""
         if self._encoding.hashed:
             self._send_hash(link)
         self._listing[link.name] = (link, 0)
 
     def request_read(self, message: Message, link: Link) -> None:
-        """PARAM_REQUEST_READ, by index or, with index -1, by name."""
+        """PARAM_REQUEST_READ: send one parameter, by index or, with index -1, by name."""
         index = message.param_index
         if index == _NO_INDEX:
             name = message.param_id
@@ -57,7 +57,7 @@ class ParameterProtocol:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def set(self, message: Message, link: Link) -> None:
-        """PARAM_SET: change it and answer with the value now in force."""
+        """PARAM_SET: change the value and send the new one."""
         name = message.param_id
         if name == HASH_NAME:
             return
@@ -74,12 +74,12 @@ class ParameterProtocol:
         self._send_alone(name, link)
 
     def send_changed(self, name: str, links: Iterable[Link]) -> None:
-        """Send a parameter that the autopilot has changed by itself."""
+        """Send a parameter that the autopilot itself changed."""
         for link in links:
             self._send_alone(name, link)
 
     def step(self) -> None:
-        """Send the next few parameters of every list asked for."""
+        """Send the next few parameters of every requested list."""
         for key, (link, index) in list(self._listing.items()):
             end = min(index + _SENT_PER_TICK, len(self._parameters))
             for position in range(index, end):
@@ -90,7 +90,7 @@ class ParameterProtocol:
                 self._listing[key] = (link, end)
 
     def _send_alone(self, name: str, link: Link) -> None:
-        """Send a parameter outside of a list."""
+        """Send a parameter that is not part of a list."""
         indexed = self._encoding.indexed
         self._send(name, self._parameters.index_of(name) if indexed else _NO_INDEX_UNSIGNED, link)
 

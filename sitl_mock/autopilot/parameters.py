@@ -21,16 +21,16 @@ class Parameter(NamedTuple):
 
 
 class ParameterRefusedError(Exception):
-    """A value or type that the parameter cannot take."""
+    """The parameter cannot have this value or type."""
 
 
 class Encoding(Protocol):
-    """How an autopilot puts parameters into messages."""
+    """How an autopilot encodes parameters in messages."""
 
     hashed: bool
-    """Whether the list begins with a hash over all values."""
+    """Whether the list begins with a hash of all values."""
     indexed: bool
-    """Whether a parameter that was read by its name, or set, comes with its index."""
+    """Whether the answer to a read by name, or to a set, has the index."""
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""
@@ -44,7 +44,7 @@ class Encoding(Protocol):
 
 
 class BytewiseEncoding:
-    """PX4's: an integer's bytes travel inside the float field."""
+    """PX4's encoding: the float field carries the bytes of an integer."""
 
     hashed = True
     indexed = True
@@ -71,7 +71,7 @@ class BytewiseEncoding:
 
 
 class FloatEncoding:
-    """ArduPilot's: the value is the float, whatever the type; whole numbers are cut to be so.
+    """ArduPilot's encoding: a float for every type; values of integer types are truncated.
 
     Args:
         types: MAV_PARAM_TYPE by name.
@@ -88,7 +88,7 @@ class FloatEncoding:
         return float(value), self._types[name]
 
     def from_wire(self, name: str, value: float, kind: int) -> int | float:
-        """Return the value carried by a PARAM_SET; the type that it names is not looked at.
+        """Return the value carried by a PARAM_SET; its type field is ignored.
 
         Raises:
             ParameterRefusedError: the value is not finite.
@@ -99,7 +99,7 @@ class FloatEncoding:
 
 
 class ParameterTable:
-    """All parameters, sorted by name; the position in that order is the MAVLink index.
+    """All parameters, sorted by name; the position in this order is the MAVLink index.
 
     Args:
         defaults: the autopilot's parameters.

@@ -1,7 +1,7 @@
-"""What differs between autopilot families, as one interface.
+"""The interface of a simulated autopilot: everything in which PX4 and ArduPilot differ.
 
-A personality has numbers and words of its own, and puts its family's rules together (`Rules`) from
-what every vehicle has (`VehicleParts`). Nothing else of the mock knows a family.
+A personality has its own numbers and texts. It builds its behaviour (`Rules`) from the parts that
+every vehicle has (`VehicleParts`).
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -24,7 +24,7 @@ from sitl_mock.physics.vehicle import Vehicle
 
 
 class Identity(NamedTuple):
-    """What AUTOPILOT_VERSION says."""
+    """Content of AUTOPILOT_VERSION."""
 
     capabilities: int
     flight_sw_version: int
@@ -34,7 +34,7 @@ class Identity(NamedTuple):
 
 
 class VehicleParts(NamedTuple):
-    """What every vehicle has, whatever its autopilot."""
+    """The parts of a vehicle that do not depend on its autopilot."""
 
     state: State
     parameters: ParameterTable
@@ -47,7 +47,7 @@ class VehicleParts(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What an autopilot family does, put together for one vehicle."""
+    """The behaviour of an autopilot, built for one vehicle."""
 
     control: ModeControl
     commander: Commander
@@ -57,25 +57,25 @@ class Rules(NamedTuple):
     builders: dict[int, Builder]
     """Message id -> builder."""
     handlers: dict[str, Callable[[Message, Link], None]]
-    """Handlers of messages that only this family takes, by the message's name."""
+    """Message name -> handler, for messages that only this autopilot handles."""
     converged_us: float
-    """Vehicle time at which the position becomes valid."""
+    """Vehicle time at which the position becomes valid, us."""
     position_timeout_us: Callable[[], float]
-    """How long the position stays valid without GPS."""
+    """Time for which the position stays valid without GPS, us."""
 
 
 class Personality(Protocol):
-    """One autopilot family."""
+    """One autopilot."""
 
     events: Mapping[EventKind, Event]
-    """What is said on each occasion."""
+    """Text and id of each event."""
     boot_mode: Mode
     system_id_parameter: str
-    """Name of the parameter that holds the vehicle's system id."""
+    """Name of the parameter with the system id."""
     any_component: bool
-    """Whether messages to any component of this system are taken."""
+    """Whether it handles messages to any component of its system."""
     unsigned_links: Collection[str]
-    """Links on which frames without a signature are obeyed though signing is on."""
+    """Links on which it accepts unsigned frames although signing is on."""
     parameters: tuple[Parameter, ...]
     """All parameters with their defaults."""
 
@@ -83,13 +83,13 @@ class Personality(Protocol):
         """Return the ``mock:`` section, completed by the defaults of this autopilot."""
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the period of the turns in which telemetry leaves, us."""
+        """Return the period of the slots in which telemetry is sent, us."""
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the streams of a link (``companion`` or ``gcs``) as they are at boot."""
+        """Return the stream schedule of a link (``companion`` or ``gcs``) at boot."""
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode a custom_mode means, None if there is no such mode."""
+        """Return the mode of a custom_mode, None if there is no such mode."""
 
     def rules(self, parts: VehicleParts) -> Rules:
-        """Put the family's rules together for one vehicle."""
+        """Build the behaviour for one vehicle."""

@@ -1,4 +1,4 @@
-"""The position controller of the autopilot's own modes: P and PI to attitude and thrust."""
+"""Position controller of the autopilot's own modes: P on position, PI on velocity."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,14 +10,14 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 GRAVITY = 9.80665
 _STEEPEST = radians(80.0)
-"""No limit on the tilt lets it grow beyond this."""
+"""Upper bound of the tilt limit."""
 
 
 class PositionDemand(NamedTuple):
-    """What to follow: position, velocity and acceleration (NED, SI; NaN = free) and yaw (rad).
+    """Setpoint: position, velocity, acceleration (NED, SI; NaN = not controlled) and yaw (rad).
 
-    ``speed`` bounds the horizontal velocity asked by the position loop, ``down_speed`` and
-    ``up_speed`` the vertical one, m/s.
+    ``speed`` limits the horizontal velocity setpoint, ``down_speed`` and ``up_speed`` the vertical
+    one, m/s.
     """
 
     position: Vector
@@ -30,7 +30,7 @@ class PositionDemand(NamedTuple):
 
 
 class PositionOutput(NamedTuple):
-    """Attitude to hold, collective thrust 0..1, and the velocity and acceleration asked (NED)."""
+    """Attitude, collective thrust 0..1, and the setpoints of velocity and acceleration (NED)."""
 
     q: Quaternion
     thrust: float
@@ -41,7 +41,7 @@ class PositionOutput(NamedTuple):
 class PositionGains(NamedTuple):
     """Gains and limits: velocity per position error (1/s), acceleration per velocity error.
 
-    Thrusts are normalised: at a hover, the least and the most.
+    Thrusts are normalised: hover, minimum and maximum.
     """
 
     horizontal: float
@@ -58,17 +58,17 @@ class PositionGains(NamedTuple):
 
 @dataclass
 class PositionController:
-    """A multicopter's position control in its plain form: P on position, PI on velocity.
+    """P on position, PI on velocity, then attitude and thrust.
 
     Args:
-        gains: asked at every step, so that a PARAM_SET acts at once.
+        gains: called at every step, so a PARAM_SET takes effect at once.
     """
 
     gains: Callable[[], PositionGains]
     _integral: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def reset(self) -> None:
-        """Forget the integrals."""
+        """Reset the integrals."""
         self._integral = [0.0, 0.0, 0.0]
 
     def step(
@@ -78,17 +78,17 @@ class PositionController:
         velocity: Vector,
         dt: float,
     ) -> PositionOutput:
-        """Return attitude and thrust for one period of ``dt`` s from the estimated state."""
+        """Return attitude and thrust of one period of ``dt`` s for the estimated motion."""
         gains = self.gains()
-        asked_velocity = _velocity(gains, demand, position)
-        acceleration = self._acceleration(gains, demand, asked_velocity, velocity, dt)
-        return _thrust_vector(gains, acceleration, asked_velocity, demand.yaw)
+        velocity_setpoint = _velocity(gains, demand, position)
+        acceleration = self._acceleration(gains, demand, velocity_setpoint, velocity, dt)
+        return _thrust_vector(gains, acceleration, velocity_setpoint, demand.yaw)
 
     def _acceleration(
         self,
         gains: PositionGains,
         demand: PositionDemand,
-        asked: Vector,
+        velocity_setpoint: Vector,
         velocity: Vector,
         dt: float,
     ) -> Vector:
@@ -98,7 +98,7 @@ class PositionController:
         for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
             total = 0.0 if isnan(feed_forward) else feed_forward
-            error = asked[axis] - velocity[axis]
+            error = velocity_setpoint[axis] - velocity[axis]
             if not isnan(error):
                 grown = self._integral[axis] + integral * error * dt
                 self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, grown))
@@ -109,17 +109,19 @@ class PositionController:
 
 
 def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
-    """Return the velocity asked, NED; NaN = none."""
+    """Return the velocity setpoint, NED; NaN = none."""
     factors = (gains.horizontal, gains.horizontal, gains.vertical)
-    asked = []
+    velocity_setpoint = []
     for axis in range(3):
         error = demand.position[axis] - position[axis]
-        wanted = demand.velocity[axis]
+        feed_forward = demand.velocity[axis]
         if isnan(error):
-            asked.append(wanted)
+            velocity_setpoint.append(feed_forward)
         else:
-            asked.append(factors[axis] * error + (0.0 if isnan(wanted) else wanted))
-    north, east, down = asked
+            velocity_setpoint.append(
+                factors[axis] * error + (0.0 if isnan(feed_forward) else feed_forward)
+            )
+    north, east, down = velocity_setpoint
     speed = hypot(north, east)
     if speed > demand.speed:
         north, east = north * demand.speed / speed, east * demand.speed / speed
@@ -129,7 +131,7 @@ def _velocity(gains: PositionGains, demand: PositionDemand, position: Vector) ->
 
 
 def _thrust_vector(
-    gains: PositionGains, acceleration: Vector, asked: Vector, yaw: float
+    gains: PositionGains, acceleration: Vector, velocity_setpoint: Vector, yaw: float
 ) -> PositionOutput:
     """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw."""
     north, east, down = acceleration
@@ -143,7 +145,7 @@ def _thrust_vector(
     thrust = gains.hover_thrust * max(GRAVITY - down, 0.0) / GRAVITY
     thrust *= specific / lift
     thrust = max(gains.min_thrust, min(gains.max_thrust, thrust))
-    return PositionOutput(q, thrust, asked, (north, east, down))
+    return PositionOutput(q, thrust, velocity_setpoint, (north, east, down))
 
 
 def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:

@@ -1,4 +1,4 @@
-"""What a message that arrives does: a table from message to handler."""
+"""Dispatches received messages to their handlers."""
 
 from collections.abc import Callable
 from math import nan
@@ -25,13 +25,13 @@ _PLACE_FRAMES = frozenset(
 
 
 class Receiver:
-    """Hands every message meant for this autopilot to its handler.
+    """Calls the handler of every message addressed to this autopilot.
 
     Args:
         state: the autopilot's state.
-        rules: what the autopilot's family does.
-        personality: translates custom modes.
-        system_id: this vehicle's.
+        rules: the autopilot's behaviour.
+        personality: decodes custom modes.
+        system_id: of this vehicle.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Receiver:
     def handle(self, message: Message, link: Link) -> None:
         """Handle one message.
 
-        What is not for this autopilot, unknown, or not signed as it must be, is ignored in silence.
+        It ignores messages that are unknown, not accepted by signing, or for another system.
         """
         if not link.accepts(message):
             return
@@ -81,7 +81,7 @@ class Receiver:
         if message.get_srcSystem() == self._system_id and message.get_srcComponent() == _COMPONENT:
             return
         link.gcs_heard = link.gcs_heard or message.type == dialect.MAV_TYPE_GCS
-        self._commander.heard(message)
+        self._commander.receive_heartbeat(message)
 
     def _command_long(self, message: Message, link: Link) -> None:
         parameters = tuple(getattr(message, f"param{number}") for number in range(1, 8))

@@ -1,4 +1,4 @@
-"""What an offboard setpoint asks, and the masks of the messages that carry it."""
+"""Offboard setpoints, the type masks of their messages, and the stream that they form."""
 
 import math
 from typing import NamedTuple
@@ -23,10 +23,12 @@ YAW_IGNORED = 1024
 POSITION_YAW_RATE_IGNORED = 2048
 """POSITION_TARGET_TYPEMASK of SET_POSITION_TARGET_LOCAL_NED."""
 _BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
+DETECTION_US = 60_000
+"""How much later than COM_OF_LOSS_T the loss is seen (measured: 1.06 to 1.11 s for 1.0 s)."""
 
 
 class AttitudeSetpoint(NamedTuple):
-    """Attitude and/or rates with thrust, as SET_ATTITUDE_TARGET carries them.
+    """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
     ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
     present one; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1, NaN = none.
@@ -39,7 +41,7 @@ class AttitudeSetpoint(NamedTuple):
 
 
 class PositionSetpoint(NamedTuple):
-    """Position, velocity, acceleration (NED, SI) and yaw; NaN = that one is free.
+    """Position, velocity, acceleration (NED, SI) and yaw; NaN = not controlled.
 
     ``in_body_heading``: the horizontal components are along the heading, not north and east.
     """
@@ -56,7 +58,7 @@ Setpoint = AttitudeSetpoint | PositionSetpoint
 
 
 def position_setpoint(message: Message) -> PositionSetpoint | None:
-    """Return what a SET_POSITION_TARGET_LOCAL_NED asks, or None when it asks nothing.
+    """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing.
 
     Frames MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
     """
@@ -89,12 +91,8 @@ def _masked(mask: int, bits: tuple[int, int, int], values: Vector) -> Vector:
     return (x, y, z)
 
 
-DETECTION_US = 60_000
-"""How much later than COM_OF_LOSS_T the loss is seen (measured: 1.06 to 1.11 s for 1.0 s)."""
-
-
 class OffboardStream:
-    """The setpoints that count, and when they came (vehicle time in us)."""
+    """The accepted setpoints, and the vehicle time of the latest one, us."""
 
     def __init__(self) -> None:
         self.setpoint: Setpoint | None = None
@@ -103,19 +101,19 @@ class OffboardStream:
         self.fresh = False
 
     def accept(self, setpoint: Setpoint, now_us: int) -> None:
-        """Take a setpoint as the newest; it stays in force until the next."""
+        """Accept a setpoint; it is valid until the next one."""
         self.setpoint = setpoint
         self.received += 1
         self.last_us = now_us
         self.fresh = True
 
     def take_fresh(self) -> bool:
-        """Whether a setpoint came since the last call."""
+        """Return whether a setpoint arrived since the last call."""
         fresh, self.fresh = self.fresh, False
         return fresh
 
     def alive(self, now_us: int, loss_s: float) -> bool:
-        """Whether the stream counts as alive with COM_OF_LOSS_T = ``loss_s``."""
+        """Whether the latest setpoint is recent enough for COM_OF_LOSS_T = ``loss_s``."""
         if self.last_us is None:
             return False
         return now_us - self.last_us <= round(loss_s * 1e6) + DETECTION_US

@@ -1,4 +1,4 @@
-"""What the autopilot's parts tell one another: one mutable record, as a bus of latest values."""
+"""The autopilot's state: one mutable record of latest values, which all its parts share."""
 
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum, auto
@@ -6,9 +6,12 @@ from enum import Enum, IntEnum, auto
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand, Estimate
 
+NAN = float("nan")
+NAN_VECTOR = (NAN, NAN, NAN)
+
 
 class Mode(Enum):
-    """A flight mode, as its autopilot calls it: PX4's down to OFFBOARD, then ArduCopter's own."""
+    """A flight mode: PX4's names down to OFFBOARD, then those of ArduCopter alone."""
 
     MANUAL = auto()
     ALTCTL = auto()
@@ -25,10 +28,6 @@ class Mode(Enum):
     BRAKE = auto()
 
 
-NAN = float("nan")
-NAN_VECTOR = (NAN, NAN, NAN)
-
-
 class Landed(IntEnum):
     """MAV_LANDED_STATE."""
 
@@ -39,7 +38,7 @@ class Landed(IntEnum):
 
 
 class BatteryWarning(IntEnum):
-    """How empty the battery is; the numbers are MAV_BATTERY_CHARGE_STATE."""
+    """Battery warning; the numbers are MAV_BATTERY_CHARGE_STATE."""
 
     OK = 1
     LOW = 2
@@ -49,7 +48,7 @@ class BatteryWarning(IntEnum):
 
 @dataclass
 class AttitudeTargetEcho:
-    """What the attitude and rate controllers follow, for ATTITUDE_TARGET. rad/s, thrust 0..1."""
+    """Setpoint of the attitude and rate controllers, for ATTITUDE_TARGET. rad/s, thrust 0..1."""
 
     q: Quaternion = (1.0, 0.0, 0.0, 0.0)
     rates: Vector = (0.0, 0.0, 0.0)
@@ -58,7 +57,7 @@ class AttitudeTargetEcho:
 
 @dataclass
 class PositionTargetEcho:
-    """What the position controller follows, for POSITION_TARGET_LOCAL_NED. NED, SI, yaw in rad."""
+    """Setpoint of the position controller, for POSITION_TARGET_LOCAL_NED. NED, SI, yaw in rad."""
 
     active: bool = False
     position: Vector = NAN_VECTOR
@@ -71,13 +70,12 @@ class PositionTargetEcho:
 class State:
     """The autopilot's present state.
 
-    Times are vehicle time in us since boot. ``shown_us`` is what telemetry carries as the time; it
-    differs from ``time_us`` only while a fault freezes the clock. ``contact`` is touching the
-    ground, ``landed`` what the land detector makes of it; ``flown``: took off since arming.
-    ``status_us``: when the status was last published, which tells of mode and arming.
-    ``after_disarming``: the mode that PX4 goes to when it disarms.
-    ``height_controlled`` and ``position_controlled``: ArduPilot's controllers run. ``aborted``: its
-    process has ended, and nothing comes any more.
+    Times are vehicle time in us since boot. ``shown_us`` is the time in telemetry; it differs from
+    ``time_us`` only while a fault freezes the clock. ``contact``: the vehicle touches the ground;
+    ``landed``: the land detector's result; ``flown``: it took off since arming. ``status_us``: when
+    the status (mode and arming) was last published. ``after_disarming``: the mode that PX4 enters
+    when it disarms. ``height_controlled`` and ``position_controlled``: these controllers of
+    ArduPilot run. ``aborted``: ArduPilot's process has ended, so it sends nothing more.
     """
 
     estimate: Estimate

@@ -1,4 +1,4 @@
-"""The messages about the vehicle and its autopilot that every family builds alike."""
+"""Telemetry of the autopilot's state that all autopilots build alike."""
 
 from math import hypot
 
@@ -12,20 +12,20 @@ from sitl_mock.physics.geodesy import Origin, to_geodetic
 from sitl_mock.physics.quaternion import Quaternion
 
 UNIX_AT_BOOT_US = 1_795_236_148_441_838
-"""SYSTEM_TIME's wall clock at boot: fixed, so that a run repeats to the bit."""
+"""Unix time of SYSTEM_TIME at boot; fixed, so that a run is reproducible to the bit."""
 _PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
 _GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
 NO_VALUE = 65535
-"""An unsigned 16-bit field that tells nothing."""
+"""An unsigned 16-bit field without a value."""
 
 
 class SystemTelemetry:
-    """Builds messages about the state and the link; a family's own come on top.
+    """Builds messages about state and link; an autopilot adds its own.
 
     Args:
         state: the autopilot's state.
         origin: of the local frame.
-        identity: what AUTOPILOT_VERSION says.
+        identity: content of AUTOPILOT_VERSION.
     """
 
     def __init__(self, state: State, origin: Origin, identity: Identity) -> None:
@@ -50,7 +50,7 @@ class SystemTelemetry:
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
     def _healthy(self, sensors: int) -> int:
-        """Return the health bits of SYS_STATUS: ``sensors``, less what fails just now."""
+        """Return the health bits of SYS_STATUS: ``sensors`` without those that fail now."""
         if self._state.prearm_problem is not None:
             sensors &= ~_PREARM_CHECK
         if not self._state.gps_ok:
@@ -60,7 +60,7 @@ class SystemTelemetry:
     def _gps_fix(
         self, fix: int, dilutions: tuple[int, int], course: int, accuracies: tuple[int, ...]
     ) -> Message:
-        """Return GPS_RAW_INT at the estimated place; the rest in its own units."""
+        """Return GPS_RAW_INT at the estimated position; arguments in the units of the message."""
         state = self._state
         place = to_geodetic(self._origin, state.estimate.position_ned)
         altitude_mm = round(place.altitude_m * 1e3)

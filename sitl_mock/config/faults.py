@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, suggestion
 
 _MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
+Direction = Literal["to_companion", "from_companion", "both"]
 
 
 def _known_message(name: str) -> str:
@@ -18,8 +19,6 @@ def _known_message(name: str) -> str:
 
 MessageName = Annotated[str, AfterValidator(_known_message)]
 """The name of a MAVLink message, e.g. ATTITUDE_QUATERNION."""
-
-Direction = Literal["to_companion", "from_companion", "both"]
 
 
 class Timed(Section):

@@ -11,6 +11,8 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+_LISTED = 20
+"""A message shows the list of known words up to this length."""
 
 
 class Section(BaseModel):
@@ -35,10 +37,6 @@ def preset(words: Mapping[str, object], value: object, what: str) -> object:
     if value not in words:
         raise ValueError(f"known {what} are {', '.join(words)}")
     return words[value]
-
-
-_LISTED = 20
-"""A message shows the list of known words up to this length."""
 
 
 class ConfigError(Exception):

@@ -10,6 +10,9 @@ from typing import Any, NamedTuple
 
 from fastcrc import crc16
 
+_HEADER_BYTES = 10
+_CRC_BYTES = 2
+
 
 class Layout(NamedTuple):
     """Id, CRC_EXTRA and payload layout of one message."""
@@ -27,9 +30,6 @@ REQUEST_EVENT = Layout(412, 33, struct.Struct("<HHBB"))
 """first_sequence, last_sequence, target system and component."""
 RESPONSE_EVENT_ERROR = Layout(413, 77, struct.Struct("<HHBBB"))
 """sequence, sequence_oldest_available, target system and component, reason."""
-
-_HEADER_BYTES = 10
-_CRC_BYTES = 2
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,10 @@ def link_signing(
         return None
     link_id = config.link_id + (link == "gcs")
     key = key_from_passphrase(config.passphrase_file)
-    asked = config.accept_unsigned
-    return Signing(key, link_id, accept_unsigned=link in unsigned_links if asked is None else asked)
+    requested = config.accept_unsigned
+    return Signing(
+        key, link_id, accept_unsigned=link in unsigned_links if requested is None else requested
+    )
 
 
 class Signing:

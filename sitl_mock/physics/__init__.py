@@ -1,1 +1,1 @@
-"""The vehicle itself: rigid body, rotors, rate loop, air, ground, battery, sensors (pure)."""
+"""The physics: rigid body, rotors, rate loop, wind, ground, battery, sensors (pure)."""

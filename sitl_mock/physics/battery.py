@@ -1,4 +1,4 @@
-"""A battery pack: charge, current and a voltage that sags, and the thrust that sags with it."""
+"""A battery: charge, current, voltage sag, and the loss of thrust with the voltage."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig
 
 
 class BatteryState(NamedTuple):
-    """What a power module measures."""
+    """Measurements of a power module."""
 
     voltage_v: float
     current_a: float
@@ -14,7 +14,7 @@ class BatteryState(NamedTuple):
 
 
 class Battery:
-    """Charge counted in ampere seconds; open-circuit voltage linear in it, less R I."""
+    """Integrates the current. Voltage = open-circuit voltage (linear in the charge) - R I."""
 
     __slots__ = ("_charge_as", "_config", "_hover_thrust", "_reference_v", "state", "thrust_factor")
 
@@ -28,16 +28,16 @@ class Battery:
         )
         self.state = BatteryState(0.0, 0.0, config.initial_remaining)
         self.thrust_factor = 1.0
-        """Factor on every rotor's thrust; 1 for the full pack in a hover."""
+        """Factor on the thrust of every rotor; 1 with a full battery in a hover."""
         self.step(0.0, 0.0)
 
     def set_remaining(self, remaining: float) -> None:
-        """Put the charge to a fraction 0..1 of the capacity."""
+        """Set the charge to a fraction 0..1 of the capacity."""
         self.state = self.state._replace(remaining=min(max(remaining, 0.0), 1.0))
         self.step(0.0, 0.0, current=self.state.current_a)
 
     def step(self, thrust: float, dt: float, current: float | None = None) -> None:
-        """Draw for `dt` seconds what `thrust` (N) takes, or a given current (A)."""
+        """Draw the current of `thrust` (N), or a given current (A), for `dt` seconds."""
         config = self._config
         if current is None:
             load = thrust / self._hover_thrust

@@ -1,4 +1,4 @@
-"""What surrounds the vehicle: wind, and flat ground at the height of home."""
+"""The environment: wind, and flat ground at the height of home."""
 
 from math import cos, exp, radians, sin, sqrt
 from random import Random
@@ -8,7 +8,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 
 class Wind:
-    """The air's velocity at the vehicle, NED, m/s; `step` moves it on by the fixed `dt` seconds."""
+    """Velocity of the air at the vehicle, NED, m/s; `step` advances it by `dt` seconds."""
 
     __slots__ = ("_calm", "_decay", "_gust", "_kick", "_kick_down", "_mean", "_random", "velocity")
 
@@ -19,9 +19,9 @@ class Wind:
         self._kick = config.gust_m_s * sqrt(1.0 - self._decay**2)
         self._kick_down = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
         self._calm = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
-        # A text seed is hashed by SHA-512: the same everywhere, and apart from the other noises.
+        # A text seed gives the same numbers on every machine, independent of the other noises.
         self._random = Random(f"{seed}/wind")
-        # Begun in the stationary distribution, so that no flight starts in a lull.
+        # Drawn from the stationary distribution, so that gusts do not start from zero.
         gauss = self._random.gauss
         self._gust: Vector = (
             gauss(0.0, config.gust_m_s),
@@ -35,7 +35,7 @@ class Wind:
         return (self._mean[0] + north, self._mean[1] + east, down)
 
     def step(self) -> None:
-        """Move the gusts on by one `dt`."""
+        """Advance the gusts by one `dt`."""
         if self._calm:
             return
         gauss, decay = self._random.gauss, self._decay
@@ -49,7 +49,7 @@ class Wind:
 
 
 class Ground:
-    """The landing gear's rules: it neither sinks nor slides, and it stands the vehicle up."""
+    """Contact with the ground: no penetration, no sliding, and the vehicle levels."""
 
     __slots__ = ("_crash_cosine", "_crash_speed", "_levelling")
 
@@ -59,12 +59,12 @@ class Ground:
         self._levelling = exp(-dt * 1e3 / airframe.ground_levelling_ms)
 
     def survives(self, q: Quaternion, sink_speed: float) -> bool:
-        """Whether touching down like this (m/s, down) leaves the vehicle upright and whole."""
+        """Whether a touchdown at this attitude and sink speed (m/s) is no crash."""
         _, x, y, _ = q
         upright = 1.0 - 2.0 * (x * x + y * y) >= self._crash_cosine
         return upright and sink_speed <= self._crash_speed
 
     def level(self, q: Quaternion) -> Quaternion:
-        """One step of the standing vehicle towards level; the heading stays."""
+        """Level the vehicle on the ground for one step; the heading stays."""
         w, x, y, z = q
         return normalise((w, x * self._levelling, y * self._levelling, z))

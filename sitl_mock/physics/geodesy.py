@@ -1,4 +1,4 @@
-"""Between local NED and latitude, longitude, altitude: a flat map about an origin."""
+"""Converts between local NED and latitude, longitude, altitude, on a flat Earth at the origin."""
 
 from math import cos, degrees, radians
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Origin(NamedTuple):
 
 
 class Geodetic(NamedTuple):
-    """A place: degrees, and m above mean sea level."""
+    """A geodetic position: degrees, and m above mean sea level."""
 
     latitude_deg: float
     longitude_deg: float
@@ -25,7 +25,7 @@ class Geodetic(NamedTuple):
 
 
 def to_geodetic(origin: Origin, position: Vector) -> Geodetic:
-    """Return the place of a local NED position (m)."""
+    """Return the geodetic position of a local NED position (m)."""
     north, east, down = position
     parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
     return Geodetic(
@@ -36,7 +36,7 @@ def to_geodetic(origin: Origin, position: Vector) -> Geodetic:
 
 
 def to_local(origin: Origin, place: Geodetic) -> Vector:
-    """Return the local NED position (m) of a place."""
+    """Return the local NED position (m) of a geodetic position."""
     parallel = EARTH_RADIUS_M * cos(radians(origin.latitude_deg))
     return (
         radians(place.latitude_deg - origin.latitude_deg) * EARTH_RADIUS_M,

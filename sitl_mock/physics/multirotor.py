@@ -1,6 +1,6 @@
 """A multirotor in the air under rate control: rate loop, allocation, rotors and rigid body.
 
-No ground, battery, wind, sensors or MAVLink: what a vehicle adds to it, or a study leaves out.
+`Vehicle` adds ground, battery, wind and sensors. The studies use the multirotor alone.
 """
 
 from sitl_mock.config.airframe import AirframeConfig
@@ -15,9 +15,9 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 
 class Multirotor:
-    """The complete inner loop in fixed steps; a step is `drive`, then `move` (or `rest`).
+    """The inner loop in fixed steps: each step is `drive`, then `move` or `rest`.
 
-    It begins at rest, its rotors turning steadily.
+    It starts at rest, with rotors at a steady speed.
 
     Args:
         airframe: body and rotors.
@@ -30,8 +30,8 @@ class Multirotor:
         motion: velocity (NED), attitude and body rates (FRD) after the latest step.
         acceleration: NED, m/s^2, mean over the latest step.
         angular_acceleration: FRD, rad/s^2, mean over the latest step.
-        mix: throttles of the latest step, and whether they fell short of a torque.
-        rotors: the four of them.
+        mix: throttles of the latest step, and which torques saturated.
+        rotors: the four rotors.
     """
 
     __slots__ = (
@@ -90,11 +90,11 @@ class Multirotor:
 
     @property
     def shaped(self) -> Shaped | None:
-        """The attitude target that the body follows; None: it follows rates, or nothing."""
+        """The shaped attitude target; None if rates are not shaped, or not controlled now."""
         return None if self._shaping is None else self._shaping.shaped
 
     def throttle(self, specific_thrust: float) -> float:
-        """Collective throttle that settles at a specific thrust (m/s^2), at most 1."""
+        """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
         return self.rotors.throttle(0.25 * self._mass * specific_thrust)
 
     def drive(
@@ -106,15 +106,15 @@ class Multirotor:
         thrust_factor: float = 1.0,
         wind: Vector = ZERO,
     ) -> Load:
-        """Controller, allocation and rotors of one step: what then acts on the body.
+        """Run controller, allocation and rotors for one step; return the load on the body.
 
         Args:
-            setpoint: body rates, rad/s, FRD; NaN holds the present rate, and so does infinity
-                unless the rate loop shapes its setpoints: then the rate runs away.
-            throttle: collective; NaN or <= 0 stops the rotors, above 1 is full.
-            controlled: whether the rate loop acts; without it, it idles.
-            thrust_factor: on every rotor's thrust, for the battery's voltage.
-            wind: the air's velocity, NED, m/s.
+            setpoint: body rates, rad/s, FRD; NaN holds the present rate. Infinity holds it too,
+                but if the rate loop shapes its setpoints, the rate then grows without limit.
+            throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
+            controlled: whether the rate loop runs; otherwise it idles.
+            thrust_factor: factor of the battery voltage on the thrust of every rotor.
+            wind: velocity of the air, NED, m/s.
         """
         if controlled:
             if self._shaping is not None:
@@ -131,7 +131,7 @@ class Multirotor:
                 self._shaping.idle(setpoint)
             self._rate_loop.idle(setpoint)
             torques = ZERO
-        # Written so that a NaN throttle fails the comparison and stops the rotors.
+        # A NaN throttle fails this comparison, which stops the rotors.
         if throttle > 0.0:
             self.mix = mix(
                 throttle,
@@ -145,11 +145,11 @@ class Multirotor:
         return (thrust / self._mass, torque_x, torque_y, torque_z, *wind)
 
     def sinks(self, load: Load) -> bool:
-        """Whether this load does not lift the body: its vertical acceleration is not upwards."""
+        """Whether the vertical acceleration under this load is not upward."""
         return derivative(self.motion, load, self._body)[2] >= 0.0
 
     def move(self, load: Load) -> Vector:
-        """One step of the body under this load; returns the displacement, NED, m."""
+        """Integrate one step under this load; return the displacement, NED, m."""
         before, rate_hz = self.motion, self._rate_hz
         after, moved = advance(before, load, self._body, self.dt)
         self.motion = after
@@ -166,7 +166,7 @@ class Multirotor:
         return moved
 
     def rest(self, q: Quaternion) -> None:
-        """Hold the body at rest with this attitude."""
+        """Set the body at rest with this attitude."""
         self.motion = (*ZERO, *q, *ZERO)
         self.acceleration = ZERO
         self.angular_acceleration = ZERO

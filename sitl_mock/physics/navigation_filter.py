@@ -1,8 +1,8 @@
-"""The error of an autopilot's navigation filter: smooth, and lasting for seconds.
+"""The error of an autopilot's navigation filter, which is smooth and lasts for seconds.
 
-The filter integrates its inertial sensor at a delayed horizon and corrects itself there by
-satellite fixes. Only its error is followed, which is linear and moves on at fixes alone: between
-two of them it has a closed form. Horizontal vectors are complex numbers, north + j east.
+The filter integrates the inertial sensor at a delayed fusion time and corrects itself there by
+satellite fixes. We compute only its error. The error is linear and has a closed form between two
+fixes, so we update it at fixes only. Horizontal vectors are complex numbers, north + j east.
 """
 
 from math import exp, radians, sqrt
@@ -15,15 +15,15 @@ from sitl_mock.physics.rigid_body import Motion
 
 _GRAVITY = 9.80665
 _SAG_S = 2.0
-"""The height's error follows the acceleration with this time constant, s."""
+"""Time constant with which the height error follows the acceleration, s."""
 _SLOW = 0.5
-"""Below this speed, m/s, the course tells nothing of the heading."""
+"""Below this speed, m/s, the course does not correct the heading."""
 Errors = tuple[complex, complex, complex]
-"""Of position (m), velocity (m/s) and acceleration (m/s^2, by the attitude's roll and pitch)."""
+"""Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 
 
 class Snapshot(NamedTuple):
-    """The true motion at the end of one physics step."""
+    """The true motion after one physics step."""
 
     motion: Motion
     position: Vector
@@ -31,30 +31,30 @@ class Snapshot(NamedTuple):
 
 
 class NavigationError(NamedTuple):
-    """How far the estimate is off: m, m/s, and a small rotation of the attitude, rad, NED."""
+    """Error of the estimate: m, m/s, and a small rotation of the attitude, rad, NED."""
 
     position: Vector
     velocity: Vector
     rotation: Vector
 
 
-class _Track(NamedTuple):
-    """What a fix leaves behind, of the plane or of the vertical direction."""
+class _FilterState(NamedTuple):
+    """Errors after a fix, horizontal or vertical."""
 
     errors: Errors
     pending: tuple[complex, complex]
-    """What the output still lacks of the corrections of position and velocity."""
+    """Corrections of position and velocity that the output does not yet contain."""
     noise: tuple[complex, complex]
-    """Of the latest fix's position and velocity."""
+    """Noise of the latest fix: position and velocity."""
 
 
 class NavigationFilter:
-    """The errors, from fix to fix.
+    """Computes the errors from fix to fix.
 
     Args:
-        config: the filter's.
-        start: where the vehicle stands at the time 0.
-        seed: of its noise.
+        config: noise, delays and gains.
+        start: the true motion at time 0.
+        seed: of the noise.
     """
 
     __slots__ = (
@@ -86,38 +86,44 @@ class NavigationFilter:
         self._at = 0.0
         self._fixed = start
         self._corrected = self._sag = 0.0
-        self._level, self._upright = self._begun(1.0), self._begun(config.vertical_share)
+        self._level, self._upright = self._initial(1.0), self._initial(config.vertical_share)
 
-    def _begun(self, share: float) -> _Track:
-        """The first fix is believed as it comes."""
+    def _initial(self, share: float) -> _FilterState:
+        """Return the state after the first fix, whose noise becomes the error."""
         config, gauss = self._config, self._random.gauss
         place, speed = share * config.position_noise_m, share * config.velocity_noise_m_s
         noise = (
             complex(gauss(0.0, place), gauss(0.0, place)),
             complex(gauss(0.0, speed), gauss(0.0, speed)),
         )
-        return _Track((*noise, 0j), (0j, 0j), noise)
+        return _FilterState((*noise, 0j), (0j, 0j), noise)
 
     def advance(self, delayed: Snapshot, at: float, now: float) -> None:
-        """Correct the filter if a fix is due: the motion at its horizon, and both times, s."""
+        """Correct the errors if a fix is due.
+
+        Args:
+            delayed: the true motion at the fusion time.
+            at: the fusion time, s.
+            now: the present time, s.
+        """
         if at - self._at < self._period - 1e-9:
             return
         elapsed = at - self._at
         config, late = self._config, 1e-3
-        speed, pull = _plane(delayed.motion), _plane(delayed.acceleration)
-        moved = self._carried(delayed, elapsed)
-        noise = self._shaken(self._level.noise, 1.0)
+        speed, pull = _horizontal(delayed.motion), _horizontal(delayed.acceleration)
+        moved = self._propagated(delayed, elapsed)
+        noise = self._next_noise(self._level.noise, 1.0)
         seen = (
             noise[0] - (config.position_late_ms * late + self._lead) * speed,
             noise[1] - (config.velocity_late_ms * late + self._lead) * pull,
         )
         settled = exp((self._corrected - now) * 1e3 / config.predictor_ms)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_by(self._level, moved, seen, noise, settled, kick)
+        level = self._corrected_state(self._level, moved, seen, noise, settled, kick)
         share = config.vertical_share
-        noise = self._shaken(self._upright.noise, share)
-        still = _moved_on(self._upright.errors, elapsed)
-        upright = self._corrected_by(self._upright, still, noise, noise, settled, share * kick)
+        noise = self._next_noise(self._upright.noise, share)
+        still = _extrapolated(self._upright.errors, elapsed)
+        upright = self._corrected_state(self._upright, still, noise, noise, settled, share * kick)
         self._turn(speed, pull)
         sag = config.height_sag_s4_per_m * abs(pull) ** 2
         self._sag += (1.0 - exp(-elapsed / _SAG_S)) * (sag - self._sag)
@@ -125,45 +131,48 @@ class NavigationFilter:
         self._at, self._fixed, self._corrected = at, delayed, now
 
     def error(self, truth: Snapshot, now: float) -> NavigationError:
-        """The error now, s, of the motion that is true now."""
+        """Return the error at ``now`` (s), at which the true motion is ``truth``."""
         elapsed = now - self._at
         settled = exp((self._corrected - now) * 1e3 / self._config.predictor_ms)
-        place, speed, tilt = self._carried(truth, elapsed)
+        place, speed, tilt = self._propagated(truth, elapsed)
         pending = self._level.pending
-        place += self._lead * _plane(truth.motion) - settled * pending[0]
-        speed += self._lead * _plane(truth.acceleration) - settled * pending[1]
-        down, sink, _ = _moved_on(self._upright.errors, elapsed)
+        place += self._lead * _horizontal(truth.motion) - settled * pending[0]
+        speed += self._lead * _horizontal(truth.acceleration) - settled * pending[1]
+        down, sink, _ = _extrapolated(self._upright.errors, elapsed)
         pending = self._upright.pending
         down += self._config.height_offset_m + self._sag - settled * pending[0]
         return NavigationError(
             (place.real, place.imag, down.real),
             (speed.real, speed.imag, (sink - settled * pending[1]).real),
-            # Thrust along the wrong axis is what makes the acceleration wrong.
+            # A wrong attitude rotates the thrust, which makes the acceleration wrong.
             (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, self._yaw),
         )
 
     def _turn(self, speed: complex, pull: complex) -> None:
-        """The heading's error wanders, and follows the course's turn rate."""
+        """Update the heading error: coloured noise about a mean that follows the turn rate."""
         config, decay = self._config, self._yaw_decay
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
         learned = -turn_rate * config.turn_yaw_ms * 1e-3
         self._yaw = learned + decay * (self._yaw - learned) + self._random.gauss(0.0, spread)
 
-    def _carried(self, truth: Snapshot, elapsed: float) -> Errors:
-        """The plane's errors so long after the fix: a turned and scaled motion is integrated."""
-        place, speed, tilt = _moved_on(self._level.errors, elapsed)
+    def _propagated(self, truth: Snapshot, elapsed: float) -> Errors:
+        """Return the horizontal errors ``elapsed`` s after the fix.
+
+        The filter integrated an acceleration that was rotated and scaled.
+        """
+        place, speed, tilt = _extrapolated(self._level.errors, elapsed)
         wrong = complex(self._config.acceleration_scale, self._yaw)
-        before = _plane(self._fixed.motion)
-        way = _plane(truth.position) - _plane(self._fixed.position)
+        before = _horizontal(self._fixed.motion)
+        way = _horizontal(truth.position) - _horizontal(self._fixed.position)
         return (
             place + wrong * (way - elapsed * before),
-            speed + wrong * (_plane(truth.motion) - before),
+            speed + wrong * (_horizontal(truth.motion) - before),
             tilt,
         )
 
-    def _shaken(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
-        """The noise of the next fix."""
+    def _next_noise(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
+        """Return the noise of the next fix."""
         config, gauss, decay = self._config, self._random.gauss, self._decay
         fresh = share * sqrt(1.0 - decay * decay)
         place, speed = config.position_noise_m * fresh, config.velocity_noise_m_s * fresh
@@ -172,16 +181,16 @@ class NavigationFilter:
             decay * noise[1] + complex(gauss(0.0, speed), gauss(0.0, speed)),
         )
 
-    def _corrected_by(
+    def _corrected_state(
         self,
-        track: _Track,
+        track: _FilterState,
         errors: Errors,
         seen: tuple[complex, complex],
         noise: tuple[complex, complex],
         settled: float,
         kick: float,
-    ) -> _Track:
-        """Correct errors by a fix whose own errors are `seen`; then the attitude wanders."""
+    ) -> _FilterState:
+        """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
         place, speed, tilt = errors
         off, faster = seen[0] - place, seen[1] - speed
         first, second, third = (
@@ -190,19 +199,19 @@ class NavigationFilter:
         gauss = self._random.gauss
         wander = complex(gauss(0.0, kick), gauss(0.0, kick))
         pending = track.pending
-        return _Track(
+        return _FilterState(
             (place + first, speed + second, tilt + third + wander),
             (settled * pending[0] + first, settled * pending[1] + second),
             noise,
         )
 
 
-def _plane(vector: tuple[float, ...]) -> complex:
-    """North + j east of a vector that begins with them."""
+def _horizontal(vector: tuple[float, ...]) -> complex:
+    """Return north + j east of a vector that starts with these two."""
     return complex(vector[0], vector[1])
 
 
-def _moved_on(errors: Errors, elapsed: float) -> Errors:
-    """Errors that nothing new adds to, so long later, s."""
+def _extrapolated(errors: Errors, elapsed: float) -> Errors:
+    """Return the errors ``elapsed`` s later, without new disturbances."""
     place, speed, tilt = errors
     return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt

@@ -1,4 +1,4 @@
-"""The few quaternion operations the vehicle needs: (w, x, y, z), Hamilton, body to world."""
+"""Quaternion operations: (w, x, y, z), Hamilton product, body to world."""
 
 from math import atan2, cos, sin, sqrt
 
@@ -7,7 +7,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
-    """Hamilton product: the rotation `right` followed by `left`, in world terms."""
+    """Hamilton product: the rotation `right`, then `left`, both about world axes."""
     lw, lx, ly, lz = left
     rw, rx, ry, rz = right
     return (
@@ -31,7 +31,7 @@ def from_yaw(angle: float) -> Quaternion:
 
 
 def to_body(q: Quaternion, vector_ned: Vector) -> Vector:
-    """Components of a world (NED) vector along the body axes (FRD)."""
+    """Return a world vector (NED) in body axes (FRD)."""
     w, x, y, z = q
     n, e, d = vector_ned
     # v' = v + 2 u x (u x v + w v) with the conjugate's u = -(x, y, z)
@@ -52,7 +52,7 @@ def yaw(q: Quaternion) -> float:
 
 
 def along_heading(q: Quaternion, vector: Vector) -> Vector:
-    """Return a vector given along the heading of ``q`` in world axes; NaN components stay NaN."""
+    """Rotate a vector from the heading of ``q`` to world axes; NaN components stay NaN."""
     w, _, _, z = from_yaw(yaw(q))
     c, s = w * w - z * z, 2.0 * w * z
     x, y, down = vector

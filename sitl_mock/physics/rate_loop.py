@@ -7,25 +7,24 @@ from typing import NamedTuple
 from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.physics.quaternion import Vector
 
+AxisState = tuple[float, float]
+"""State of one axis, N m: its integral, and its filtered torque, which is the output."""
+AT_REST: AxisState = (0.0, 0.0)
+
 
 class AxisLaw(NamedTuple):
-    """Constants of one axis, as the control law uses them."""
+    """Constants of the control law of one axis."""
 
     proportional: float  # N m per rad/s
     integral: float  # N m per rad
     feed_forward: float  # N m per rad/s
     damping: float  # N m per rad/s^2
     integral_limit: float  # N m
-    filter_decay: float  # the torque filter's memory from one step to the next, 0 = no filter
-
-
-AxisState = tuple[float, float]
-"""Memory of one axis, N m: its integral, and its filtered torque, which is its output."""
-AT_REST: AxisState = (0.0, 0.0)
+    filter_decay: float  # of the torque filter per step, 0 = no filter
 
 
 def axis_law(gains: AxisGains, dt: float) -> AxisLaw:
-    """The law of one axis for steps of `dt` seconds."""
+    """Return the control law of one axis for steps of `dt` seconds."""
     filter_s = gains.torque_filter_ms * 1e-3
     return AxisLaw(
         gains.proportional_n_m_s,
@@ -46,15 +45,15 @@ def axis_step(
     saturated: bool,
     dt: float,
 ) -> AxisState:
-    """One step of one axis; pure.
+    """Return the state of one axis after a step (pure).
 
     Args:
         law: the axis's constants.
-        state: its memory.
-        setpoint: wanted body rate, rad/s.
+        state: before the step.
+        setpoint: of the body rate, rad/s.
         rate: present body rate, rad/s.
         acceleration: present angular acceleration, rad/s^2.
-        saturated: the rotors could not give the last torque; the integral may then only shrink.
+        saturated: the rotors could not give the last torque; the integral must not grow then.
         dt: step, s.
     """
     proportional, integral_gain, feed_forward, damping, limit, memory = law
@@ -68,10 +67,10 @@ def axis_step(
 
 
 class RateLoop:
-    """The three axes, and the transport delay of their setpoints.
+    """The rate controller of the three axes, with the transport delay of their setpoints.
 
-    A setpoint that is NaN or infinite holds the present rate, as PX4 was measured to do: the axis
-    sees no error, and a rolling vehicle rolls on. Setpoints are not clipped.
+    A NaN or infinite setpoint holds the present rate, as measured on PX4: the error is zero, and a
+    rolling vehicle continues to roll. Setpoints are not limited.
     """
 
     __slots__ = ("_axes", "_delay", "_dt", "_laws")
@@ -93,7 +92,7 @@ class RateLoop:
         tilt_saturated: bool,
         yaw_saturated: bool,
     ) -> Vector:
-        """Torques about body x, y, z in N m for this step."""
+        """Return the torques about body x, y, z in N m for this step."""
         roll, pitch, yaw = self._delay.step(setpoint)
         p, q, r = rates
         p_dot, q_dot, r_dot = accelerations
@@ -107,16 +106,16 @@ class RateLoop:
         return x[1], y[1], z[1]
 
     def idle(self, setpoint: Vector) -> None:
-        """A step without control (disarmed, or standing): memory cleared, setpoints delayed."""
+        """Run a step without control (disarmed, or on the ground): reset, but delay setpoints."""
         self._delay.step(setpoint)
         self._axes = (AT_REST, AT_REST, AT_REST)
 
 
 class SetpointDelay:
-    """Holds setpoints back, to the nearest whole step; before the first they were zero.
+    """Delays setpoints by a whole number of steps; before the first one it returns zero.
 
     Args:
-        delays_ms: of roll, pitch and yaw.
+        delays_ms: of roll, pitch and yaw; rounded to whole steps.
         dt: step, s.
     """
 
@@ -129,7 +128,7 @@ class SetpointDelay:
         )
 
     def step(self, setpoint: Vector) -> Vector:
-        """Take this step's setpoint; return the one that arrives."""
+        """Accept the setpoint of this step; return the delayed one."""
         roll, pitch, yaw = self._roll, self._pitch, self._yaw
         roll.append(setpoint[0])
         pitch.append(setpoint[1])

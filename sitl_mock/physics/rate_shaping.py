@@ -1,6 +1,7 @@
-"""Shaped body rates: limited in acceleration, integrated into an attitude target, which is held.
+"""ArduPilot's shaping of body-rate setpoints.
 
-ArduPilot's way with a body-rate setpoint. What comes out is the setpoint of the rate loop.
+It limits the angular acceleration and integrates the rates to an attitude target. An attitude
+controller follows the target; its output is the setpoint of the rate loop.
 """
 
 from math import atan2, copysign, inf, isnan, sqrt
@@ -14,7 +15,7 @@ AT_REST: Vector = (0.0, 0.0, 0.0)
 
 
 class Shaped(NamedTuple):
-    """What the shaping remembers from one step to the next."""
+    """State of the shaping."""
 
     rates: Vector
     """Shaped rates along the axes of the attitude target, rad/s."""
@@ -23,10 +24,10 @@ class Shaped(NamedTuple):
 
 
 def slew(goal: float, rate: float, most: float) -> float:
-    """The rate moved to its goal, by `most` at the farthest.
+    """Return the rate changed towards its goal by at most `most`.
 
-    A NaN goal holds the rate. An infinite one is never reached: the rate runs away, as ArduPilot
-    was measured to do.
+    A NaN goal holds the rate. With an infinite goal the rate grows without limit, as measured on
+    ArduPilot.
     """
     if isnan(goal):
         return rate
@@ -35,13 +36,13 @@ def slew(goal: float, rate: float, most: float) -> float:
 
 
 def rotated(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
-    """The attitude after `dt` seconds of body rates (rad/s); its angle errs by (rate dt)^3 / 12."""
+    """Return the attitude after `dt` s of body rates (rad/s); its error is (rate dt)^3 / 12."""
     half = 0.5 * dt
     return normalise(multiply(q, (1.0, half * rates[0], half * rates[1], half * rates[2])))
 
 
 def rotation_vector(q: Quaternion) -> Vector:
-    """Rotation vector of a unit quaternion, rad, the short way round."""
+    """Return the rotation vector of a unit quaternion, rad, along the shorter rotation."""
     w, x, y, z = q if q[0] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
     sine = sqrt(x * x + y * y + z * z)
     scale = 2.0 * atan2(sine, w) / sine if sine > 0.0 else 2.0
@@ -49,9 +50,14 @@ def rotation_vector(q: Quaternion) -> Vector:
 
 
 def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
-    """Rate that closes an angle: proportional, then so that it can stop at this deceleration.
+    """Return the rate that closes an angle, as ArduPilot's sqrt_controller does.
 
-    ArduPilot's sqrt_controller.
+    Small angles: proportional. Larger ones: the rate from which `acceleration` stops in time.
+
+    Args:
+        angle: to close, rad.
+        gain: rate per angle, 1/s.
+        acceleration: limit, rad/s^2.
     """
     linear = acceleration / (gain * gain) if gain > 0.0 else inf
     if abs(angle) <= linear:
@@ -60,10 +66,10 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
 
 
 class RateShaping:
-    """The three axes, their delays before the shaping, and the attitude target they share.
+    """Shapes the rates of the three axes, which share one attitude target.
 
     Args:
-        axes: constants of roll, pitch and yaw.
+        axes: settings of roll, pitch and yaw.
         dt: step, s.
     """
 
@@ -81,15 +87,15 @@ class RateShaping:
 
     @property
     def shaped(self) -> Shaped | None:
-        """The attitude target after the latest step; None while nothing is controlled."""
+        """The attitude target after the latest step; None while the rate loop idles."""
         return self._shaped
 
     def step(self, setpoint: Vector, q: Quaternion) -> Vector:
-        """Body rates for the rate loop, rad/s, FRD.
+        """Return the setpoint of the rate loop, rad/s, FRD.
 
         Args:
-            setpoint: wanted body rates, rad/s; NaN holds the shaped rate, infinity runs away.
-            q: present attitude; the attitude target begins there.
+            setpoint: body rates, rad/s; NaN holds the shaped rate, infinity grows without limit.
+            q: present attitude; the attitude target starts there.
         """
         goals = self._delay.step(setpoint)
         rates, target = self._shaped or Shaped(AT_REST, q)
@@ -102,7 +108,7 @@ class RateShaping:
         target = rotated(target, rates, self._dt)
         self._shaped = Shaped(rates, target)
         w, x, y, z = target
-        ahead = multiply((w, -x, -y, -z), q)  # the body as the attitude target sees it
+        ahead = multiply((w, -x, -y, -z), q)  # the body in the frame of the attitude target
         turn_x, turn_y, turn_z = rotation_vector(ahead)
         roll, pitch, yaw = to_body(ahead, rates)
         for_roll, for_pitch, for_yaw = self._closing
@@ -113,6 +119,6 @@ class RateShaping:
         )
 
     def idle(self, setpoint: Vector) -> None:
-        """A step without control: the attitude target is forgotten, setpoints are delayed."""
+        """Run a step without control: clear the attitude target, but delay setpoints."""
         self._delay.step(setpoint)
         self._shaped = None

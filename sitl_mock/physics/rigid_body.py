@@ -1,7 +1,7 @@
-"""Rigid-body dynamics as pure arithmetic on floats and tuples: one step, no state.
+"""One step of rigid-body dynamics, as arithmetic on floats and tuples, without state.
 
-World NED, body FRD, quaternion (w, x, y, z) body to world, SI. Nothing here allocates more than
-tuples or looks anything up, so the same functions can be compiled for batches.
+World NED, body FRD, quaternion (w, x, y, z) body to world, SI. The functions allocate nothing but
+tuples, so they can be compiled for batches.
 """
 
 from math import sqrt
@@ -11,7 +11,7 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.physics.quaternion import Vector
 
 Motion = tuple[float, float, float, float, float, float, float, float, float, float]
-"""(v_n, v_e, v_d [m/s], w, x, y, z, p, q, r [rad/s]): all that the derivative depends on."""
+"""(v_n, v_e, v_d [m/s], w, x, y, z, p, q, r [rad/s]): the state on which the derivative depends."""
 Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
@@ -29,7 +29,7 @@ class Body(NamedTuple):
 
 
 def body_of(airframe: AirframeConfig) -> Body:
-    """The rigid body of an airframe."""
+    """Return the rigid body of an airframe."""
     return Body(
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
@@ -40,7 +40,7 @@ def body_of(airframe: AirframeConfig) -> Body:
 
 
 def derivative(motion: Motion, load: Load, body: Body) -> Motion:
-    """Time derivative of the motion (Newton, Euler, quaternion kinematics).
+    """Return the time derivative of the motion (Newton, Euler, quaternion kinematics).
 
     m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind);
     J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
@@ -66,7 +66,7 @@ def derivative(motion: Motion, load: Load, body: Body) -> Motion:
 
 
 def along(motion: Motion, rate: Motion, dt: float) -> Motion:
-    """The motion moved by `dt` seconds along a derivative."""
+    """Return motion + dt * rate."""
     a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = motion
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = rate
     return (
@@ -84,11 +84,12 @@ def along(motion: Motion, rate: Motion, dt: float) -> Motion:
 
 
 def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, Vector]:
-    """One classical Runge-Kutta step of `dt` seconds under a constant load.
+    """Integrate one step of `dt` seconds under a constant load (classical Runge-Kutta).
 
-    Returns the new motion, its quaternion normalised, and the displacement (NED, m). The position
-    is the integral of the velocity and nothing depends on it, so its own four stages collapse to
-    v dt + (k1 + k2 + k3) dt^2 / 6.
+    Returns:
+        The new motion with a normalised quaternion, and the displacement (NED, m). The derivative
+        does not depend on the position, so the position's stages reduce to
+        v dt + (k1 + k2 + k3) dt^2 / 6.
     """
     half = 0.5 * dt
     k1 = derivative(motion, load, body)
@@ -110,7 +111,7 @@ def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, 
     x += sixth * (a4 + 2.0 * (b4 + c4) + d4)
     y += sixth * (a5 + 2.0 * (b5 + c5) + d5)
     z += sixth * (a6 + 2.0 * (b6 + c6) + d6)
-    # The norm leaves 1 by less than 1e-9 a step, so one Newton step of 1/sqrt is exact enough.
+    # The norm drifts by less than 1e-9 a step, so one Newton step of 1/sqrt is exact enough.
     scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     moved = (
         vn + sixth * (a0 + 2.0 * (b0 + c0) + d0),

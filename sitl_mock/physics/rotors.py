@@ -13,7 +13,7 @@ Four = tuple[float, float, float, float]
 
 
 class Mix(NamedTuple):
-    """What the allocation gives: throttles 0..1, and what had to be cut short."""
+    """Result of the allocation: throttles 0..1, and which torques saturated."""
 
     throttles: Four
     tilt_saturated: bool
@@ -21,16 +21,16 @@ class Mix(NamedTuple):
 
 
 STOPPED = Mix((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
-"""Rotors off: whatever torque is asked for, none is given."""
+"""Rotors off: they give no torque."""
 
 
 def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
     """Allocate rotor throttles with PX4's priorities: roll and pitch, thrust, yaw.
 
-    Thrust gives way downwards only (no airmode): at throttle 0 nothing turns.
+    Saturation reduces thrust but never increases it (no airmode): at throttle 0 no rotor turns.
 
     Args:
-        throttle: collective, not negative; above 1 is full.
+        throttle: collective, not negative; values above 1 mean 1.
         roll: throttle difference about body x.
         pitch: throttle difference about body y.
         yaw: throttle difference about body z.
@@ -44,7 +44,7 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
         pitch *= scale
         demand = room
     throttle = min(throttle, 1.0 - demand)
-    # One diagonal carries pitch - roll and +yaw, the other pitch + roll and -yaw.
+    # One diagonal has pitch - roll and +yaw, the other pitch + roll and -yaw.
     counter, clockwise = abs(pitch - roll), abs(pitch + roll)
     if yaw < 0.0:
         counter, clockwise = clockwise, counter
@@ -68,8 +68,8 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
 class Rotors:
     """Thrust of the four rotors, each a first-order lag behind its throttle.
 
-    The lag is discretised exactly for a throttle constant over the step; `step` returns the mean
-    of the thrusts before and after it, which is what the body feels to second order.
+    The discretisation is exact for a throttle that is constant over the step. `step` returns the
+    mean of the thrusts before and after it, which is accurate to second order.
     """
 
     __slots__ = ("_arm", "_decay", "_drag_ratio", "_linear", "_low", "_offset", "_slope", "thrusts")
@@ -87,23 +87,23 @@ class Rotors:
         """Present thrust of each rotor, N."""
 
     def steady(self, throttle: float) -> float:
-        """Thrust in N that one rotor settles at, before battery sag."""
+        """Return the steady thrust of one rotor in N, with a full battery."""
         if throttle >= self._linear:
             return self._slope * throttle + self._offset
         return self._low * throttle
 
     def throttle(self, thrust: float) -> float:
-        """Inverse of `steady`: the throttle for a thrust (N) of one rotor, at most 1."""
+        """Return the throttle for a steady thrust (N) of one rotor, at most 1."""
         if thrust >= self.steady(self._linear):
             return min((thrust - self._offset) / self._slope, 1.0)
         return thrust / self._low
 
     def step(self, throttles: Four, sag: float) -> Four:
-        """One step towards the throttles.
+        """Advance one step towards the throttles.
 
         Args:
             throttles: 0..1 each.
-            sag: factor on the thrust for the battery's voltage.
+            sag: thrust factor of the battery voltage.
 
         Returns:
             Total thrust (N) and torques about body x, y, z (N m), means over the step.

@@ -1,4 +1,4 @@
-"""What the autopilot believes: the truth, later, with errors, and shifted by estimator resets."""
+"""The autopilot's estimate: the true motion with delay, noise, filter error, estimator resets."""
 
 from collections import deque
 from math import radians
@@ -8,6 +8,8 @@ from typing import NamedTuple
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_filter import NavigationError, NavigationFilter, Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
+
+_NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 class Estimate(NamedTuple):
@@ -21,14 +23,11 @@ class Estimate(NamedTuple):
     gyro: Vector  # rad/s, what the (bias-free) gyro measures
 
 
-_NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
 class Estimator:
-    """Delayed, noisy view of the truth, with one seeded generator for its white noise.
+    """Computes the estimate; one seeded generator draws its white noise.
 
-    Noise is drawn only by `estimate`, the same number of draws a call, so it depends on nothing
-    but the seed and the number of calls; that of the navigation filter, on the seed and time.
+    Only `estimate` draws white noise, and always the same number of draws. So the noise depends on
+    the seed and the number of calls; that of the navigation filter on the seed and the time.
     """
 
     __slots__ = (
@@ -67,24 +66,24 @@ class Estimator:
         """Estimator resets since boot."""
 
     def record(self, snapshot: Snapshot) -> None:
-        """Take in the truth after a physics step."""
+        """Record the true motion after a physics step."""
         self._history.append(snapshot)
 
     def shift(self, yaw: float, position_ned: Vector) -> None:
-        """An estimator reset: from now on the estimate is turned (rad) and moved (m) by this."""
+        """Reset the estimator: rotate (rad) and shift (m) the estimate from now on."""
         self._yaw = multiply(from_yaw(yaw), self._yaw)
         n, e, d = self._offset
         self._offset = (n + position_ned[0], e + position_ned[1], d + position_ned[2])
         self.reset_counter += 1
 
     def as_estimated(self, q: Quaternion) -> Quaternion:
-        """A true attitude in the world as the latest estimate believes it to lie."""
+        """Return a true attitude with the attitude error of the latest estimate."""
         roll, pitch, heading = self._rotation
         tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q)
         return multiply(self._yaw, tilted)
 
     def estimate(self, time: float) -> Estimate:
-        """The estimate now, at this time, s; draws fresh noise."""
+        """Return the estimate at ``time`` (s), which is now, with fresh noise."""
         config = self._config
         error = self._error(time)
         self._rotation = error.rotation
@@ -108,7 +107,7 @@ class Estimator:
         )
 
     def _error(self, time: float) -> NavigationError:
-        """The navigation filter's, of the motion that position and velocity are taken from."""
+        """Return the error of the navigation filter at the age of position and velocity."""
         if self._filter is None:
             return _NO_ERROR
         behind = max(self._horizon, self._position_delay)

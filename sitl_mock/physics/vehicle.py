@@ -1,4 +1,4 @@
-"""The vehicle: a multirotor with wind, battery, ground and sensors, in fixed steps."""
+"""The vehicle: multirotor, wind, battery, ground and sensors, in fixed steps."""
 
 from math import nan
 from typing import NamedTuple
@@ -19,14 +19,15 @@ from sitl_mock.physics.sensors import Estimate, Estimator
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 
 SLOW_STEP_S = 0.01
-"""Wind and battery change slowly; they move on this often."""
+"""Step of wind and battery, which change slowly."""
 
 
 class ActuatorCommand(NamedTuple):
-    """What the autopilot's upper layers ask of the rate loop.
+    """Setpoint of the rate loop and the rotors.
 
-    Rates in rad/s, body FRD, not clipped; NaN = hold the present rate, and so infinite with PX4's
-    rate loop (ArduPilot's spins away). Thrust 0..1; NaN or <= 0 = none, above 1 = full.
+    Rates in rad/s, body FRD, without limit; NaN = hold the present rate. Infinity also holds it in
+    PX4's rate loop; in ArduPilot's the rate grows without limit. Thrust 0..1; NaN or <= 0 = none,
+    above 1 = full.
     """
 
     armed: bool
@@ -37,7 +38,7 @@ class ActuatorCommand(NamedTuple):
 
 
 class TruthState(NamedTuple):
-    """What is really so. SI; world NED (origin: home on the ground), body FRD."""
+    """The true state. SI; world NED (origin: home on the ground), body FRD."""
 
     time: float  # s since boot
     position_ned: Vector
@@ -54,13 +55,13 @@ class TruthState(NamedTuple):
 
 
 class Vehicle:
-    """One vehicle, standing at home at the time 0. Everything is a function of (config, seed).
+    """One vehicle, on the ground at home at time 0; settings and seed determine its motion.
 
     Args:
         airframe: body and rotors.
         rate_loop: the body-rate controller.
-        wind: the air.
-        battery: the pack.
+        wind: steady wind and gusts.
+        battery: capacity and voltages.
         sensors: errors of the estimate.
         seed: of all noise.
         heading: at the start, rad clockwise from north.
@@ -111,7 +112,7 @@ class Vehicle:
 
     @property
     def truth(self) -> TruthState:
-        """What is really so after the latest step."""
+        """The true state after the latest step."""
         multirotor = self._multirotor
         vn, ve, vd, w, x, y, z, p, q, r = multirotor.motion
         return TruthState(
@@ -131,15 +132,15 @@ class Vehicle:
 
     @property
     def battery(self) -> BatteryState:
-        """The pack's voltage, current and charge."""
+        """Voltage, current and charge of the battery."""
         return self._battery.state
 
     def set_battery_remaining(self, remaining: float) -> None:
-        """Put the charge to a fraction 0..1 of the capacity."""
+        """Set the charge to a fraction 0..1 of the capacity."""
         self._battery.set_remaining(remaining)
 
     def throttle(self, specific_thrust: float) -> float:
-        """Return the collective throttle that settles at a specific thrust (m/s^2), at most 1."""
+        """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
         return self._multirotor.throttle(specific_thrust)
 
     @property
@@ -148,23 +149,23 @@ class Vehicle:
         return self._estimator.reset_counter
 
     def estimate(self) -> Estimate:
-        """What the autopilot believes now; every call draws fresh noise."""
+        """Return the autopilot's estimate now; every call draws fresh noise."""
         return self._estimator.estimate(self.time)
 
     @property
     def attitude_target(self) -> Shaped | None:
-        """The shaped attitude target in the world as estimated, and its rates; None: none."""
+        """The shaped attitude target, with the error of the estimate; None if not shaped."""
         shaped = self._multirotor.shaped
         if shaped is None:
             return None
         return shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
-        """An estimator reset: the estimate jumps by this yaw (rad) and position (m)."""
+        """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
         self._estimator.shift(yaw, position_ned)
 
     def step(self, command: ActuatorCommand) -> None:
-        """One physics step of `step_s` seconds under one command."""
+        """Advance by one physics step of `step_s` seconds."""
         multirotor = self._multirotor
         if self.steps % self._slow_steps == 0:
             self._wind.step()

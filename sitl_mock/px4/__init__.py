@@ -1,1 +1,1 @@
-"""PX4, as recorded and measured: its numbers, texts and rules."""
+"""PX4, simulated as recorded and measured: its numbers, texts and rules."""

@@ -12,14 +12,14 @@ from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.px4.arming import NOT_ARMABLE, ArmingChecks, AutoDisarm
 from sitl_mock.px4.failsafe import Failsafe
-from sitl_mock.px4.failsafe_actions import Announce
+from sitl_mock.px4.failsafe_actions import AnnounceEvent
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 from sitl_mock.px4.setpoints import decode_setpoint
 from sitl_mock.px4.sticks import Sticks
 
 STATUS_PERIOD_US = 500_000
-"""The vehicle's status is published this often, and whenever it changes (measured)."""
+"""Period of the vehicle status; it is also published at every change (measured)."""
 
 
 class Px4Commander:
@@ -28,9 +28,9 @@ class Px4Commander:
     Args:
         state: the autopilot's state.
         parameters: its parameters.
-        control: told of every mode entered.
+        control: begins every mode entered.
         stream: the offboard setpoints.
-        announce: tells the outside of an kind, with a detail.
+        announce: sends texts and events.
         checks: finds what forbids arming.
     """
 
@@ -40,7 +40,7 @@ class Px4Commander:
         parameters: ParameterTable,
         control: Px4ModeControl,
         stream: OffboardStream,
-        announce: Announce,
+        announce: AnnounceEvent,
         checks: ArmingChecks,
     ) -> None:
         self.refusal: str | None = None
@@ -56,7 +56,7 @@ class Px4Commander:
         self._control = control
         self._stream = stream
         self._announce = announce
-        self._asked_takeoff_z: float | None = None
+        self._requested_takeoff_z: float | None = None
         self._status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
@@ -81,7 +81,7 @@ class Px4Commander:
         return ACCEPTED
 
     def disarm(self, *, force: bool = False) -> int:
-        """Disarm, and return a MAV_RESULT; in the air only ``force`` does it."""
+        """Disarm, and return a MAV_RESULT; in the air this needs ``force``."""
         if not self._state.armed:
             return ACCEPTED
         if not self._state.landed and not force:
@@ -95,49 +95,49 @@ class Px4Commander:
     ) -> int:
         """Change the intended mode, and return a MAV_RESULT.
 
-        Disarmed, every mode is entered (arming is what fails then); armed, a mode that cannot run
-        is refused.
+        A disarmed vehicle enters every mode (arming may fail then). An armed one refuses a mode
+        that cannot run.
 
         Args:
-            mode: the mode asked.
+            mode: requested.
             takeoff_z: where TAKEOFF ends, m down; None = MIS_TAKEOFF_ALT above home.
             hold: where LOITER goes, NED; None = here.
         """
         state = self._state
         if state.armed and not self._can_run(mode):
-            asked = struct.pack("<I", custom_mode(mode))
-            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), asked)
+            requested = struct.pack("<I", custom_mode(mode))
+            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), requested)
             return TEMPORARILY_REJECTED
-        self._intend(mode)
+        self._set_intended(mode)
         self.failsafe.clear()
         if mode is Mode.TAKEOFF:
-            self._asked_takeoff_z = takeoff_z
+            self._requested_takeoff_z = takeoff_z
         self._enter(mode, hold=hold)
         return ACCEPTED
 
     def land(self) -> int:
-        """Land here, and return a MAV_RESULT; it is told, as a change of mode is not."""
+        """Land here, and return a MAV_RESULT; PX4 announces this, but not a change to LAND."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
             self._announce(EventKind.LANDING_COMMANDED, "")
         return result
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot's sticks change the mode (fault injection)."""
+        """Let the pilot take over in a mode (fault injection)."""
         self.pilot = True
         self._announce(EventKind.PILOT_TOOK_OVER, "")
         self.request_mode(mode)
 
-    def heard(self, heartbeat: Message) -> None:
-        """Note a heartbeat: the links that failsafes watch are told apart by its type."""
-        self.failsafe.heard(heartbeat.type)
+    def receive_heartbeat(self, heartbeat: Message) -> None:
+        """Record a heartbeat; its type says which link it belongs to."""
+        self.failsafe.receive_heartbeat(heartbeat.type)
 
     def manual_control(self, message: Message, _: Link) -> None:
-        """Take a pilot's sticks."""
-        self._sticks.heard(message, self._state.time_us)
+        """Handle MANUAL_CONTROL, a pilot's sticks."""
+        self._sticks.receive(message, self._state.time_us)
 
     def setpoint(self, message: Message) -> None:
-        """Take a setpoint if PX4 would count it, whatever the mode."""
+        """Accept a setpoint in any mode, if PX4 would."""
         setpoint = decode_setpoint(message)
         if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
             self._stream.accept(setpoint, self._state.time_us)
@@ -148,13 +148,13 @@ class Px4Commander:
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 
     def announce_problem(self) -> None:
-        """Say what forbids arming now, if anything does."""
+        """AnnounceEvent what forbids arming now, if anything does."""
         problem = self._problem()
         if problem is not None:
             self._announce(EventKind.PREFLIGHT_FAIL, problem)
 
     def step(self, *, crashed: bool) -> None:
-        """Run the rules once; called at 20 Hz of vehicle time."""
+        """Update arming, mode and failsafes; called at 20 Hz of vehicle time."""
         state = self._state
         self._checks.crashed = crashed
         if state.armed and crashed:
@@ -166,7 +166,7 @@ class Px4Commander:
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
-                    self._intend(Mode.LOITER)
+                    self._set_intended(Mode.LOITER)
                 self._enter(Mode.LOITER)
             kind = self._auto_disarm.due()
             if kind is not None:
@@ -175,7 +175,7 @@ class Px4Commander:
 
     @property
     def _at_sticks(self) -> bool:
-        """Whether a pilot is there, by fault injection or by MANUAL_CONTROL."""
+        """Whether a pilot holds the sticks, by fault injection or by MANUAL_CONTROL."""
         return self.pilot or self._sticks.present(self._state.time_us)
 
     def _problem(self) -> str | None:
@@ -184,7 +184,7 @@ class Px4Commander:
         )
 
     def _watch_sticks(self) -> None:
-        """A pilot who moves the sticks takes over, in the air and from any automatic mode."""
+        """Switch to POSCTL if a pilot moves the sticks in the air in an automatic mode."""
         state = self._state
         flies_itself = state.armed and not state.landed and state.mode not in PILOTED
         if not flies_itself or self.failsafe.holds_before_acting:
@@ -196,16 +196,16 @@ class Px4Commander:
     def _stop_motors(self, kind: EventKind) -> None:
         state = self._state
         state.armed = False
-        # Measured: a landing entered from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
+        # Measured: a landing from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
         state.intended_mode = state.after_disarming
         self.failsafe.clear()
         self._enter(state.intended_mode)
         self._announce(kind, "")
 
-    def _intend(self, mode: Mode) -> None:
-        """Note the mode that the user wants.
+    def _set_intended(self, mode: Mode) -> None:
+        """Set the mode that the user intends.
 
-        On disarming the last one comes back that may be armed; measured: TAKEOFF does not count.
+        Disarming returns to the last intended mode that can be armed, but not TAKEOFF (measured).
         """
         self._state.intended_mode = mode
         if mode not in NOT_ARMABLE and mode is not Mode.TAKEOFF:
@@ -226,15 +226,15 @@ class Px4Commander:
         return self._state.position_valid or mode not in NEEDS_POSITION
 
     def _enter(self, mode: Mode, *, hold: Vector | None = None) -> None:
-        """Enter a mode at the present estimate, whatever the intended one is."""
+        """Enter a mode at the present estimate; the intended mode stays."""
         self._state.mode = mode
         takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
         self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)
 
     def _takeoff_z(self) -> float:
-        """Return where TAKEOFF ends, m down: as asked, else MIS_TAKEOFF_ALT above home."""
-        if self._asked_takeoff_z is not None:
-            return self._asked_takeoff_z
+        """Return the down position at which TAKEOFF ends, m: as requested, or MIS_TAKEOFF_ALT."""
+        if self._requested_takeoff_z is not None:
+            return self._requested_takeoff_z
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
             packed = struct.pack("<f", altitude)

@@ -1,4 +1,4 @@
-"""What PX4 does on each MAV_CMD of its own way, and its result."""
+"""The MAV_CMDs that PX4 executes in its own way, and their results."""
 
 from math import isfinite, isnan
 
@@ -56,7 +56,7 @@ class Px4Commands(Commands):
         }
 
     def send(self, message_id: int, link: Link) -> int:
-        """Send a message once on a link, PROTOCOL_VERSION by its bytes: the dialect lacks it."""
+        """Send a message once; PROTOCOL_VERSION as bytes, because the dialect lacks it."""
         if message_id == _PROTOCOL_VERSION_ID:
             link.send_raw(_PROTOCOL_VERSION_ID, _PROTOCOL_VERSION_CRC, _PROTOCOL_VERSION)
             return ACCEPTED
@@ -81,10 +81,10 @@ class Px4Commands(Commands):
         changes = isfinite(flags) and int(flags) & _CHANGE_MODE
         if not changes and self._state.mode is not Mode.LOITER:
             return TEMPORARILY_REJECTED
-        return self._px4.request_mode(Mode.LOITER, hold=self._place(command))
+        return self._px4.request_mode(Mode.LOITER, hold=self._position(command))
 
-    def _place(self, command: Command) -> Vector:
-        """Return the local position that parameters 5 to 7 name; what is NaN stays as it is."""
+    def _position(self, command: Command) -> Vector:
+        """Return the local position in parameters 5 to 7; NaN keeps the present value."""
         latitude, longitude, altitude = command.parameters[4:]
         north, east, down = self._state.estimate.position_ned
         if isfinite(latitude) and isfinite(longitude):

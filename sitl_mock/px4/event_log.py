@@ -1,11 +1,11 @@
-"""PX4's events as it sends them: numbered, kept for a while, and sent again when asked for.
+"""PX4's announcements: events with sequence numbers, which it resends on request, and texts.
 
 Source: the MAVLink events interface; intervals and flags as recorded.
 """
 
 from collections import deque
 from collections.abc import Iterable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -22,12 +22,13 @@ from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 
 _KEPT = 20
-"""Events that can be asked for again."""
+"""Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 _RESET = 1
-"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the numbers begin anew; sent before the first event."""
+"""MAV_EVENT_CURRENT_SEQUENCE_FLAGS: the sequence restarts; sent before the first event."""
 _UNAVAILABLE = 0
 """MAV_EVENT_ERROR_REASON."""
+_CHUNK = 50
 
 
 class _Sent(NamedTuple):
@@ -48,7 +49,7 @@ class EventLog:
         self._links = links
         self._sent: deque[_Sent] = deque(maxlen=_KEPT)
         self._latest = 0
-        self._told_us = 0
+        self._sequence_sent_us = 0
 
     def send(
         self, event_id: int, severity: int, internal: int | None = None, arguments: bytes = b""
@@ -57,14 +58,14 @@ class EventLog:
 
         Args:
             event_id: see `px4_events.event_id`.
-            severity: MAV_SEVERITY (8: for programs only) that the user sees.
-            internal: the same for the vehicle's own log; None = as the user's.
-            arguments: its values, packed.
+            severity: MAV_SEVERITY for the user; 8 = for programs only.
+            internal: MAV_SEVERITY for the vehicle's log; None = the same.
+            arguments: packed.
         """
         first = not self._sent
         self._latest = (self._latest + 1) & 0xFFFF
         if first:
-            self._tell_sequence(_RESET)
+            self._send_sequence(_RESET)
         levels = (severity if internal is None else internal) << 4 | severity
         payload = EVENT.payload.pack(
             event_id, self._state.shown_us // 1000, self._latest, 0, 0, levels, arguments
@@ -74,14 +75,14 @@ class EventLog:
             _send(link, EVENT, payload)
 
     def step(self) -> None:
-        """Tell the latest number now and then, so that whoever missed an event finds out."""
-        if self._state.time_us - self._told_us >= _SEQUENCE_PERIOD_US:
-            self._tell_sequence(0 if self._sent else _RESET)
+        """Send the latest sequence number periodically, so that receivers notice lost events."""
+        if self._state.time_us - self._sequence_sent_us >= _SEQUENCE_PERIOD_US:
+            self._send_sequence(0 if self._sent else _RESET)
 
-    def requested(self, request: Message, link: Link) -> None:
-        """Answer a REQUEST_EVENT: each event again, or why it cannot be.
+    def answer_request(self, request: Message, link: Link) -> None:
+        """Answer a REQUEST_EVENT: resend each event, or send the reason why not.
 
-        Of a range that is longer than what is kept, one refusal stands for all the older ones.
+        If the range is longer than the log, one refusal covers all older events.
         """
         first, last = request.first_sequence, request.last_sequence
         wanted = (last - first & 0xFFFF) + 1
@@ -104,8 +105,8 @@ class EventLog:
         )
         _send(link, RESPONSE_EVENT_ERROR, payload)
 
-    def _tell_sequence(self, flags: int) -> None:
-        self._told_us = self._state.time_us
+    def _send_sequence(self, flags: int) -> None:
+        self._sequence_sent_us = self._state.time_us
         payload = CURRENT_EVENT_SEQUENCE.payload.pack(self._latest, flags)
         for link in self._links:
             _send(link, CURRENT_EVENT_SEQUENCE, payload)
@@ -115,52 +116,38 @@ def _send(link: Link, layout: Layout, payload: bytes) -> None:
     link.send_raw(layout.message_id, layout.crc_extra, payload)
 
 
-_CHUNK = 50
-
-
-class EventSender(Protocol):
-    """Sends numbered events; see `px4_event_log.EventLog`."""
-
-    def send(
-        self, event_id: int, severity: int, internal: int | None = None, arguments: bytes = b""
-    ) -> None:
-        """Send a new event."""
-
-
 class Announcer:
-    """Announces occasions on all links.
+    """Announces events on all links.
 
     Args:
-        personality: the words and numbers.
+        personality: texts and ids.
         links: where to.
-        events: sends the numbers; None = the family has none.
+        events: sends the events.
     """
 
-    def __init__(
-        self, personality: Personality, links: Iterable[Link], events: EventSender | None = None
-    ) -> None:
+    def __init__(self, personality: Personality, links: Iterable[Link], events: EventLog) -> None:
         self._personality = personality
         self._links = list(links)
         self._events = events
         self._text_id = 0
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
-        """Tell of an occasion.
+        """AnnounceEvent an event.
 
         Args:
             kind: what happened.
-            detail: goes where its text has room for it.
-            arguments: values of its event that differ from time to time, packed.
+            detail: for the placeholder of its text.
+            arguments: packed, instead of the constant ones of the event.
         """
         event = self._personality.events[kind]
-        if event.event_id and self._events is not None:
+        if event.event_id:
             self._events.send(
                 event.event_id, event.severity, event.internal, arguments or event.arguments
             )
         self._send_text(event.text.format(detail), event.severity)
 
     def _send_text(self, text: str, severity: int) -> None:
-        """Send a text, in chunks when it is long, only where a ground station listens."""
+        """Send a text, in chunks if it is long, on links with a ground station."""
         data = text.encode()
         chunks = [data[start : start + _CHUNK] for start in range(0, len(data), _CHUNK)]
         for link in self._links:

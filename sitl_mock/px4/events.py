@@ -1,7 +1,7 @@
-"""PX4's words and event numbers.
+"""PX4's texts and event ids.
 
-PX4 numbers an event by a hash of its name. Names and words are those of its source (main, 2026);
-the numbers of those that were recorded agree. Texts end in a tab.
+An event id is a hash of the event's name. Names and texts come from PX4's source (main, 2026); the
+recorded ids agree. Texts end in a tab.
 """
 
 from pymavlink.dialects.v20 import development as dialect
@@ -18,7 +18,7 @@ _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
 
 
 def event_id(name: str) -> int:
-    """Return an event's number: its component in the top byte, 24 bits of FNV-1a of its name."""
+    """Return an event's id: component in the top byte, then 24 bits of FNV-1a of the name."""
     value = _FNV_OFFSET
     for byte in name.encode():
         value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF

@@ -1,4 +1,4 @@
-"""What PX4 does when a link, the position or the battery is lost."""
+"""PX4's failsafes: loss of a link, of offboard setpoints, of position; low battery."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from sitl_mock.px4.failsafe_actions import (
     OFFBOARD_ACTIONS,
     POSITION,
     RETURN,
-    Announce,
+    AnnounceEvent,
     Cause,
     EnterMode,
     FailsafeActions,
@@ -21,34 +21,33 @@ from sitl_mock.px4.failsafe_actions import (
 from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
 
 _NO_MANUAL_CONTROL = 4
-"""COM_RC_IN_MODE: nobody expects a pilot."""
+"""COM_RC_IN_MODE without manual control."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT."""
 _GCS_MARGIN_US = 2_000_000
-"""A lost ground station is noticed this much after COM_DL_LOSS_T (measured 12 s for 10 s)."""
+"""The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
 _ACTED = -1
+"""Instead of the time of a loss: its failsafe has already acted."""
 _COMPANION_MARGIN_US = 1_500_000
-"""A lost companion is told of this much after COM_OBC_LOSS_T (measured 6.5 s for 5 s)."""
+"""The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
 _WARNINGS = {
     BatteryWarning.LOW: EventKind.BATTERY_LOW,
     BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
     BatteryWarning.EMERGENCY: EventKind.BATTERY_EMERGENCY,
 }
-
-
 _AUTO_MODES = frozenset({Mode.LOITER, Mode.TAKEOFF, Mode.RTL, Mode.LAND})
 
 
 class Failsafe:
-    """Watches and acts while armed.
+    """Detects losses, and starts failsafes while armed.
 
     Args:
         state: the autopilot's state.
         parameters: its parameters.
         stream: the offboard setpoints.
-        announce: tells of an occasion.
-        enter: enters a mode without touching the intended one.
-        stop: turns the motors off, and says so as an occasion.
+        announce: sends texts and events.
+        enter: enters a mode and leaves the intended mode as it is.
+        stop: stops the motors and announces the event.
     """
 
     def __init__(
@@ -56,7 +55,7 @@ class Failsafe:
         state: State,
         parameters: ParameterTable,
         stream: OffboardStream,
-        announce: Announce,
+        announce: AnnounceEvent,
         enter: EnterMode,
         stop: Callable[[EventKind], None],
     ) -> None:
@@ -76,16 +75,16 @@ class Failsafe:
         self._companion_lost = False
 
     def clear(self) -> None:
-        """End any failsafe: a mode was commanded, or the vehicle disarmed."""
+        """End any failsafe: a mode was requested, or the vehicle disarmed."""
         self._actions.clear()
-        # What was already acted on acts again only after being regained.
+        # A loss that has caused a failsafe causes the next one only after it was regained.
         if self._gcs_lost_us is not None:
             self._gcs_lost_us = _ACTED
         if self._pilot_lost_us is not None:
             self._pilot_lost_us = _ACTED
 
-    def heard(self, heartbeat_type: int) -> None:
-        """Note a heartbeat of a MAV_TYPE."""
+    def receive_heartbeat(self, heartbeat_type: int) -> None:
+        """Record a heartbeat of a MAV_TYPE."""
         now = self._state.time_us
         if heartbeat_type == dialect.MAV_TYPE_GCS:
             self._gcs_us = now
@@ -94,14 +93,14 @@ class Failsafe:
 
     @property
     def gcs_alive(self) -> bool:
-        """Whether a ground station is heard."""
+        """Whether a ground station is connected."""
         if self._gcs_us is None:
             return False
         limit = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
         return self._state.time_us - self._gcs_us <= limit
 
     def step(self, *, pilot: bool) -> None:
-        """Look once at everything that may be lost; ``pilot``: somebody is at the sticks."""
+        """Check every failsafe once; ``pilot``: a pilot holds the sticks."""
         self._watch_companion()
         self._watch_battery()
         self._watch_gcs()
@@ -113,11 +112,11 @@ class Failsafe:
 
     @property
     def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
         return self._actions.holds_before_acting
 
     def _exempt(self, parameter: str) -> bool:
-        """Whether a loss is of no matter in the intended mode."""
+        """Whether a parameter exempts the intended mode from a failsafe."""
         bits = int(self._parameters[parameter])
         mode = self._state.intended_mode
         if mode is Mode.OFFBOARD:
@@ -125,14 +124,14 @@ class Failsafe:
         return mode in _AUTO_MODES and bool(bits & _EXCEPT_AUTO)
 
     def _watch_pilot(self, *, pilot: bool) -> None:
-        """Sticks that were there, or that the mode needs, and are gone."""
+        """Detect the loss of sticks that were present, or that the mode needs."""
         state = self._state
         if pilot:
             self._pilot_lost_us = None
         elif self._pilot:
             self._announce(EventKind.PILOT_LOST, "")
         self._pilot = pilot
-        # A pilot who was not there at arming is not missed until he has been.
+        # A pilot who was not present at arming is optional until he appears.
         self._pilot_optional = not pilot and (self._pilot_optional or not state.armed)
         expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
         optional = not expected or self._pilot_optional or self._exempt("COM_RCL_EXCEPT")
@@ -158,7 +157,7 @@ class Failsafe:
             self._enter(Mode.OFFBOARD)
 
     def _warn_disarmed(self) -> None:
-        """Disarmed in OFFBOARD without a stream, it warns and does nothing (recorded)."""
+        """Warn, and do no more, if disarmed in OFFBOARD without setpoints (recorded)."""
         state = self._state
         alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         lost = not state.armed and state.mode is Mode.OFFBOARD and not alive

@@ -1,4 +1,4 @@
-"""What PX4's failsafes may do, by which parameter, and for which cause (source: PX4's failsafe)."""
+"""The actions of PX4's failsafes, their parameters and causes (source: PX4's failsafe)."""
 
 import struct
 from collections.abc import Callable
@@ -15,7 +15,7 @@ _ENTER = struct.Struct("<IBB")
 
 
 class Action(NamedTuple):
-    """What a failsafe does: its number in PX4's events and its mode, None = motors off."""
+    """Action of a failsafe: its number in PX4's events, and its mode; None = motors off."""
 
     number: int
     mode: Mode | None
@@ -36,15 +36,15 @@ OFFBOARD_ACTIONS = {
     6: TERMINATE,
     7: DISARM,
 }
-"""COM_OBL_RC_ACT -> action; without a pilot, those that need one return instead (measured)."""
+"""COM_OBL_RC_ACT -> action; without a pilot RETURN replaces those that need one (measured)."""
 LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: TERMINATE, 6: DISARM}
 """NAV_DLL_ACT and NAV_RCL_ACT -> action."""
 
 
 class Cause(Enum):
-    """Why a failsafe is active; a later one never replaces an earlier of a higher value.
+    """Cause of a failsafe: its severity, and its number in PX4's events (0 = none).
 
-    Each with its number in PX4's events, 0 where PX4 gives none.
+    A cause does not replace one of higher severity.
     """
 
     OFFBOARD_LOST = (1, 0)
@@ -54,8 +54,8 @@ class Cause(Enum):
     POSITION_LOST = (5, 0)
 
     @property
-    def rank(self) -> int:
-        """How grave it is."""
+    def severity(self) -> int:
+        """Severity; higher is worse."""
         return self.value[0]
 
     @property
@@ -67,11 +67,11 @@ class Cause(Enum):
 _DELAYED = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 
 
-class Announce(Protocol):
-    """Tells the outside of what happens."""
+class AnnounceEvent(Protocol):
+    """Sends texts and events."""
 
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
-        """Tell of an kind, with a detail for its text and the values of its event."""
+        """AnnounceEvent an event, with a detail for its text and packed arguments."""
 
 
 class EnterMode(Protocol):
@@ -82,21 +82,21 @@ class EnterMode(Protocol):
 
 
 class FailsafeActions:
-    """Carries out what a failsafe does, the gravest cause first.
+    """Executes the action of the failsafe with the most severe cause.
 
     Args:
         state: the autopilot's state; ``failsafe`` is written here.
         parameters: COM_FAIL_ACT_T, and the parameters that name actions.
         announce: sends texts and events.
         enter: enters a mode and leaves the intended mode as it is.
-        stop: stops the motors and announces the occasion.
+        stop: stops the motors and announces the event.
     """
 
     def __init__(
         self,
         state: State,
         parameters: ParameterTable,
-        announce: Announce,
+        announce: AnnounceEvent,
         enter: EnterMode,
         stop: Callable[[EventKind], None],
     ) -> None:
@@ -105,47 +105,47 @@ class FailsafeActions:
         self._announce = announce
         self._enter = enter
         self._stop = stop
-        self._told: tuple[Cause, Action] | None = None
+        self._announced: tuple[Cause, Action] | None = None
         self.cause: Cause | None = None
         """Of the active failsafe, None if none is active."""
 
     def clear(self) -> None:
         """End the active failsafe."""
-        self.cause = self._told = None
+        self.cause = self._announced = None
         self._state.failsafe = False
 
     @property
     def holds_before_acting(self) -> bool:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end that."""
-        return self._told is not None and self._told[1] is HOLD and self.cause in _DELAYED
+        return self._announced is not None and self._announced[1] is HOLD and self.cause in _DELAYED
 
     def act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
-        """Do something for a cause, unless a graver one acts; tell of it when it is new.
+        """Execute an action unless a more severe cause is active; announce it if it is new.
 
         Args:
-            cause: why.
-            action: what is done now.
-            then: what is done after COM_FAIL_ACT_T, when that is not it yet.
+            cause: of the failsafe.
+            action: to execute now.
+            then: action after COM_FAIL_ACT_T, None if ``action`` is the last.
         """
-        if self.cause is not None and self.cause.rank > cause.rank:
+        if self.cause is not None and self.cause.severity > cause.severity:
             return
         state = self._state
         if not state.position_valid and action.mode in NEEDS_POSITION:
             action = LAND
-        if self._told != (cause, action):
-            self._tell(cause, action, then)
-        self.cause, self._told = cause, (cause, action)
+        if self._announced != (cause, action):
+            self._announce_action(cause, action, then)
+        self.cause, self._announced = cause, (cause, action)
         state.failsafe = True
         mode = action.mode
         if mode is None:
             self._stop(EventKind.DISARMED_BY_FAILSAFE)
             return
         if state.landed:
-            mode = Mode.LOITER  # stays where it stands, and disarms
+            mode = Mode.LOITER  # it stays on the ground, and disarms
         if state.mode is not mode:
             self._enter(mode)
 
-    def _tell(self, cause: Cause, action: Action, then: Action | None) -> None:
+    def _announce_action(self, cause: Cause, action: Action, then: Action | None) -> None:
         intended = custom_mode(self._state.intended_mode)
         if then is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
@@ -159,7 +159,7 @@ class FailsafeActions:
             self._announce(EventKind.FAILSAFE_UNNAMED, "", values)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Hold for COM_FAIL_ACT_T, then do what a parameter says."""
+        """Hold for COM_FAIL_ACT_T, then execute the action of a parameter."""
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return

@@ -1,4 +1,4 @@
-"""What PX4's modes ask of the position controller; PX4 calls these flight tasks."""
+"""PX4's flight tasks: the setpoints of the position controller in each mode."""
 
 from math import hypot, isnan, radians, tan
 
@@ -9,14 +9,14 @@ from sitl_mock.autopilot.state import NAN, NAN_VECTOR, Mode, State
 from sitl_mock.physics.quaternion import Vector, along_heading, yaw
 
 CRAWL_HEIGHT_M = 0.65
-"""Below this height LAND goes at MPC_LAND_CRWL (recorded with a distance sensor)."""
+"""Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""Entering a hold, the point to hold lies this many seconds of velocity ahead."""
+"""A hold begins at the position plus the velocity times this."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, NAN)
 
 
 class FlightTasks:
-    """Turns the mode, or an offboard position setpoint, into a demand on the position controller.
+    """Computes the demand on the position controller, from the mode or from a setpoint.
 
     Args:
         state: the autopilot's state.
@@ -39,9 +39,9 @@ class FlightTasks:
         """Begin a mode at the present estimate.
 
         Args:
-            mode: the mode entered.
+            mode: entered.
             takeoff_z: where TAKEOFF ends, m down.
-            hold: where LOITER goes, NED; None = stop here.
+            hold: position of LOITER, NED; None = stop here.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us
@@ -57,7 +57,7 @@ class FlightTasks:
             self._begin_return()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        """Shift the held position and heading with an estimator reset (rad, m NED)."""
         x, y, z = self._hold
         dx, dy, dz = position_step
         self._hold = (x + dx, y + dy, z + dz)
@@ -66,7 +66,7 @@ class FlightTasks:
 
     @property
     def takeoff_reached(self) -> bool:
-        """Whether TAKEOFF is as good as at its height."""
+        """Whether TAKEOFF is almost at its height."""
         return self._state.estimate.position_ned[2] - self._takeoff_z < 0.3
 
     @property
@@ -76,7 +76,7 @@ class FlightTasks:
         return mode is Mode.LAND or (mode is Mode.RTL and self._descending)
 
     def demand(self) -> PositionDemand:
-        """Return what the present mode asks."""
+        """Return the demand of the present mode."""
         mode = self._state.mode
         if mode is Mode.TAKEOFF:
             return self._takeoff()
@@ -104,7 +104,7 @@ class FlightTasks:
         if not state.contact:
             target = (x, y, self._takeoff_z)
             return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, up_speed=speed)
-        # On the ground the climb rate asked grows from where it means no thrust at all.
+        # On the ground the climb rate ramps up from the value at which the thrust is zero.
         began = max(self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6)
         ramp = (state.time_us - began) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
         lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
@@ -131,7 +131,7 @@ class FlightTasks:
         return slow + (fast - slow) * share
 
     def _begin_return(self) -> None:
-        """Choose the height of the way home: the cone about home, at most RTL_RETURN_ALT."""
+        """Choose the return height: the cone around home, at most RTL_RETURN_ALT."""
         parameters, state = self._parameters, self._state
         home = state.home_ned
         x, y, z = state.estimate.position_ned
@@ -165,7 +165,7 @@ class FlightTasks:
         )
 
     def offboard_demand(self, setpoint: PositionSetpoint, dt: float) -> PositionDemand:
-        """Return what an offboard setpoint asks; its yaw rate turns the heading to hold."""
+        """Return the demand of an offboard setpoint; its yaw rate turns the held heading."""
         parameters = self._parameters
         if not isnan(setpoint.yaw):
             self.yaw = setpoint.yaw

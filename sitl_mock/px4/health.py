@@ -1,6 +1,6 @@
-"""PX4's health report: events that tell which checks fail, and in which modes it can be armed.
+"""PX4's health report: events with the failing checks, and the modes that can be armed.
 
-Recorded byte for byte; names are those of PX4's source, where one of that number was found.
+The bytes are recorded. Names come from PX4's source where a name with the id was found.
 """
 
 import struct
@@ -15,19 +15,19 @@ _CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
 
 _ALL_MODES = 0xFFFFFFFF
 _ARMABLE = 0x807F7AB0
-"""Modes in which it can be armed when nothing is wrong and no pilot is there, one bit each."""
+"""Modes that can be armed without a failing check and without a pilot, one bit each."""
 _PRESENT = 0x38020D02
 _GPS_PRESENT = 1 << 3
 _GCS_PRESENT = 1 << 12
 _PERIOD_US = 2_000_000
-"""No two reports are closer."""
+"""Minimum time between two reports."""
 
 _SUMMARY = struct.Struct("<BIIII")
-"""Chunk, components with errors, with warnings, modes that can be armed, that can be run."""
+"""Chunk; components with errors, with warnings; modes that can be armed, that can run."""
 _FAILURE = struct.Struct("<IB")
-"""Modes that it concerns, component."""
+"""Affected modes, component."""
 _HEALTH = struct.Struct("<BIII")
-"""Chunk, components present, with errors, with warnings."""
+"""Chunk; components present, with errors, with warnings."""
 
 
 class _Check(NamedTuple):
@@ -38,7 +38,7 @@ class _Check(NamedTuple):
 
 
 _HEADING = _Check(30203637, 0x7E00FC, 17, _ERROR)
-"""Seen only while the heading is not known; of its name nothing but the number was found."""
+"""Recorded only while the heading is unknown; its name is not known, only its id."""
 _OFFBOARD = _Check(event_id("check_modes_offboard_signal_lost"), 0x4000, 20, _ERROR)
 _ATTITUDE = _Check(event_id("check_modes_attitude"), 0x7ED1FE, 16, _CRITICAL)
 _LOCAL_POSITION = _Check(event_id("check_modes_local_pos"), 0x7E00FC, 17, _ERROR)
@@ -50,11 +50,11 @@ _GCS_REQUIRED = _NO_GCS._replace(severity=_ERROR)
 
 
 class HealthReport:
-    """Sends a report when something in it changed, and not before two seconds after the last.
+    """Sends a report when it changed, at least two seconds after the last one.
 
     Args:
         state: the autopilot's state.
-        events: sends them.
+        events: sends the report.
         ready_us: vehicle time at which the estimator is ready.
     """
 
@@ -68,7 +68,7 @@ class HealthReport:
     def step(
         self, *, offboard_alive: bool, pilot: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
-        """Look at what changed, and report it if it is time."""
+        """Send a report if it changed and is due."""
         state = self._state
         self._events.step()
         if state.time_us - self._reported_us < _PERIOD_US:

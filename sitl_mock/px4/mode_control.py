@@ -1,4 +1,4 @@
-"""What each of PX4's flight modes asks of the rate loop, period by period."""
+"""The actuator command of each period in each of PX4's modes."""
 
 from math import radians
 
@@ -16,12 +16,12 @@ from sitl_mock.physics.vehicle import ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED
 
-DEAD_ATTITUDE_US = 140_000
-"""A NaN quaternion under attitude control for longer kills PX4's attitude control until restart."""
+ATTITUDE_FAILS_US = 140_000
+"""After a NaN quaternion for longer, PX4's attitude control fails until a restart."""
 TOUCHDOWN_THRUST_RATE = 0.4
-"""After contact in LAND the thrust falls by this per second."""
+"""After contact in LAND the thrust decreases by this per second."""
 PRESSED_DOWN: Vector = (0.0, 0.0, 100.0)
-"""Disarmed, PX4's own modes ask this acceleration, m/s^2 (recorded)."""
+"""Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 _STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -42,7 +42,7 @@ class Px4ModeControl:
         self._position = PositionController(lambda: position_gains(parameters))
         self._thrust = 0.0
         self._nan_since_us: int | None = None
-        self._attitude_dead = False
+        self._attitude_failed = False
 
     def enter(
         self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
@@ -52,7 +52,7 @@ class Px4ModeControl:
         self._position.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Move what is held along with an estimator reset (rad, m NED), so the vehicle stays."""
+        """Shift the held position and heading with an estimator reset (rad, m NED)."""
         self._tasks.shift(yaw_step, position_step)
 
     @property
@@ -112,8 +112,8 @@ class Px4ModeControl:
         if setpoint.q is None:
             return self._rates(setpoint.rates or (0.0, 0.0, 0.0), setpoint.thrust)
         if setpoint.rates is not None and fresh:
-            # Attitude and rates both asked: each message's rates hold until the attitude
-            # controller's next turn, so the two fight.
+            # With attitude and rates, the rates apply until the next step of the attitude
+            # controller, so the two compete.
             return self._rates(setpoint.rates, setpoint.thrust)
         return self._attitude(setpoint.q, setpoint.yaw_rate, setpoint.thrust)
 
@@ -126,9 +126,9 @@ class Px4ModeControl:
             self._nan_since_us = None
         elif self._nan_since_us is None:
             self._nan_since_us = now
-        elif now - self._nan_since_us > DEAD_ATTITUDE_US:
-            self._attitude_dead = True
-        if self._attitude_dead or self._nan_since_us is not None:
+        elif now - self._nan_since_us > ATTITUDE_FAILS_US:
+            self._attitude_failed = True
+        if self._attitude_failed or self._nan_since_us is not None:
             return self._rates(NAN_VECTOR, thrust)
         self._state.attitude_target.q = target
         rates = attitude_rates(

@@ -1,4 +1,4 @@
-"""PX4's numbers for its modes: what HEARTBEAT and CURRENT_MODE carry (recorded from PX4 main)."""
+"""PX4's mode numbers in HEARTBEAT and CURRENT_MODE (recorded from PX4 main)."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -24,7 +24,7 @@ MODE_NUMBERS: dict[Mode, tuple[int, int]] = {
     Mode.OFFBOARD: (6, 0),
     Mode.STABILIZED: (7, 0),
 }
-"""(main mode, sub mode) of each mode; custom_mode carries them in bytes 2 and 3."""
+"""(main mode, sub mode) of each mode; bytes 2 and 3 of custom_mode."""
 
 _STANDARD_MODES = {
     Mode.ALTCTL: dialect.MAV_STANDARD_MODE_ALTITUDE_HOLD,
@@ -53,7 +53,7 @@ def custom_mode(mode: Mode) -> int:
 
 
 def mode_of(custom: int) -> Mode | None:
-    """Return the mode of a custom_mode, None if the mock has none such."""
+    """Return the mode of a custom_mode, None if the mock does not have it."""
     return MODES_BY_COMMAND.get((custom >> 16 & 0xFF, custom >> 24 & 0xFF))
 
 
@@ -63,7 +63,7 @@ def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     Args:
         mode: the flight mode.
         armed: whether the motors may turn.
-        attitude_controlled: tells apart the forms of OFFBOARD.
+        attitude_controlled: whether OFFBOARD has setpoints above body rates.
     """
     flags = _CUSTOM | (_ARMED if armed else 0)
     if mode is Mode.OFFBOARD:
@@ -74,5 +74,5 @@ def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
 
 
 def standard_mode(mode: Mode) -> int:
-    """Return CURRENT_MODE.standard_mode (MAV_STANDARD_MODE), 0 for what has none."""
+    """Return CURRENT_MODE.standard_mode (MAV_STANDARD_MODE), 0 if there is none."""
     return int(_STANDARD_MODES.get(mode, dialect.MAV_STANDARD_MODE_NON_STANDARD))

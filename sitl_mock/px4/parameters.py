@@ -1,7 +1,7 @@
 """PX4's parameters that matter to a companion, with PX4's types and defaults (SIH quadrotor X).
 
-An ``int`` is INT32, a ``float`` REAL32. Those marked * are obeyed by the mock; the others are there
-because clients read them, or because a user expects to find them.
+An ``int`` is INT32, a ``float`` REAL32. Those marked * have an effect in the mock. The others exist
+because clients read them or users look for them.
 """
 
 from sitl_mock.autopilot.parameters import Parameter

@@ -1,4 +1,4 @@
-"""PX4's personality: its numbers, and its rules put together (recorded from PX4 main, SIH)."""
+"""PX4's personality: its numbers and its behaviour (recorded from PX4 main, SIH)."""
 
 from collections.abc import Collection, Mapping
 from random import Random
@@ -28,9 +28,9 @@ from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
 
 CONVERGED_SHARE = 0.7
-"""The position becomes valid this far into the time before arming is possible (recorded: 3.2 s)."""
+"""The position becomes valid at this share of the time to arming (recorded: 3.2 s)."""
 LANDED_AFTER_US = 1_100_000
-"""Contact with little thrust for this long is a landing (measured 1.1 s)."""
+"""Contact with low thrust for this time is a landing (measured 1.1 s)."""
 
 _COMPANION_RATES: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
@@ -101,25 +101,25 @@ class Px4:
         return section
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the slot period that the inner loop sets."""
+        """Return the slot period of the inner loop rate."""
         return SLOT_US[settings.inner_loop_hz]
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the measured onboard rates, and lower ones for the ground station's link."""
+        """Return the recorded rates of the companion link, or those of the ground station link."""
         lockstep = settings.lockstep.enabled
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
         if lockstep and link == "companion":
-            del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # there, that message is the beacon
+            del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # in lockstep this message is the beacon
         exact = lockstep if settings.exact_rates is None else settings.exact_rates
         busy = settings.inner_loop_hz == 250 and not exact
-        return Px4Streams(rates, luck=Random(f"{settings.seed}/{link}") if busy else None)
+        return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if busy else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode a custom_mode means, None if there is no such mode."""
+        """Return the mode of a custom_mode, None if there is no such mode."""
         return mode_of(custom_mode)
 
     def rules(self, parts: VehicleParts) -> Rules:
-        """Put PX4's rules together."""
+        """Build PX4's behaviour for one vehicle."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)
         announce = Announcer(self, parts.links, events)
@@ -155,7 +155,7 @@ class Px4:
             builders,
             handlers={
                 "MANUAL_CONTROL": commander.manual_control,
-                "REQUEST_EVENT": events.requested,
+                "REQUEST_EVENT": events.answer_request,
             },
             converged_us=CONVERGED_SHARE * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],

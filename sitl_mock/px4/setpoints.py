@@ -1,4 +1,4 @@
-"""What an offboard setpoint message asks, by PX4's type-mask rules (docs/mock-vehicle.md)."""
+"""Decodes offboard setpoints by PX4's type-mask rules (docs/mock-vehicle.md)."""
 
 import math
 import struct
@@ -23,16 +23,16 @@ _MAGIC_V2 = 0xFD
 
 
 def decode_setpoint(message: Message) -> Setpoint | None:
-    """Return what a setpoint message asks, or None when PX4 would not count it."""
+    """Decode a setpoint message; None if PX4 would ignore it."""
     if message.get_type() == "SET_ATTITUDE_TARGET":
         return attitude_setpoint(message)
     return position_setpoint(message)
 
 
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
-    """Return what a SET_ATTITUDE_TARGET asks, or None when PX4 would not count it.
+    """Decode a SET_ATTITUDE_TARGET; None if PX4 would ignore it.
 
-    Rates are not clipped; NaN and infinite ones hold the present rate, NaN thrust is none.
+    Rates are not limited. NaN and infinite rates hold the present rate; NaN thrust means none.
     """
     mask = message.type_mask
     if mask & THROTTLE_IGNORED:
@@ -54,7 +54,7 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
 
 
 def _thrust_body_down(message: Message) -> float:
-    """Return the down component of the extension field thrust_body, which the dialect lacks."""
+    """Return the down component of the field thrust_body, which the dialect lacks."""
     frame = message.get_msgbuf()
     payload = bytes(frame[10 : 10 + frame[1]]) if frame[0] == _MAGIC_V2 else b""
     return float(_THRUST_BODY_FIELD.unpack_from(payload.ljust(_FULL_LENGTH, b"\0"), 39)[2])

@@ -1,4 +1,4 @@
-"""A pilot's sticks as PX4 knows them: MANUAL_CONTROL, there or lost, at rest or moving."""
+"""A pilot's sticks from MANUAL_CONTROL: present or lost, at rest or moving."""
 
 from math import exp, isfinite
 
@@ -6,13 +6,13 @@ from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.link.framing import Message
 
 _MAVLINK_SOURCES = frozenset({1, 2, 3, 5, 6, 7, 8})
-"""Values of COM_RC_IN_MODE that take sticks from MAVLink; 0 is a receiver only, 4 nothing."""
+"""Values of COM_RC_IN_MODE that accept sticks from MAVLink."""
 _FILTER_S = 0.1
 _FULL_TRAVEL = 1000.0
 
 
 class Sticks:
-    """What the pilot does.
+    """Tracks presence and speed of the sticks.
 
     Args:
         parameters: COM_RC_IN_MODE, COM_RC_LOSS_T, MAN_OVERRIDE_SPD.
@@ -24,8 +24,8 @@ class Sticks:
         self._axes: tuple[float, ...] = ()
         self._speeds: tuple[float, ...] = ()
 
-    def heard(self, message: Message, now_us: int) -> None:
-        """Take a MANUAL_CONTROL."""
+    def receive(self, message: Message, now_us: int) -> None:
+        """Handle a MANUAL_CONTROL."""
         if int(self._parameters["COM_RC_IN_MODE"]) not in _MAVLINK_SOURCES:
             return
         axes = tuple(float(axis) / _FULL_TRAVEL for axis in (message.x, message.y, message.r))
@@ -41,14 +41,14 @@ class Sticks:
         self._axes, self._last_us = axes, now_us
 
     def present(self, now_us: int) -> bool:
-        """Whether sticks were heard in the last COM_RC_LOSS_T."""
+        """Whether sticks were received within COM_RC_LOSS_T."""
         limit = self._parameters["COM_RC_LOSS_T"] * 1e6
         return self._last_us is not None and now_us - self._last_us <= limit
 
     def override(self, now_us: int) -> bool:
-        """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels a s; negative: never).
+        """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels/s; negative: never).
 
-        The speed is filtered with 0.1 s, as PX4 does against noise.
+        As in PX4, a low pass of 0.1 s filters the speed.
         """
         limit = self._parameters["MAN_OVERRIDE_SPD"]
         if limit < 0.0 or not isfinite(limit) or not self.present(now_us):

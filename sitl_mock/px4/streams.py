@@ -1,10 +1,10 @@
-"""When PX4 sends each telemetry message of a link: intervals asked, slots served.
+"""PX4's stream schedule: requested intervals, rounded to the slots of its MAVLink loop.
 
-A stream is served in *slots*, the turns of the autopilot's MAVLink loop. With a 250 Hz inner loop a
-slot comes every 4 ms, with 800 Hz every 2.5 ms. What arrives therefore differs from what was asked;
-the rules below reproduce the rates measured on PX4 (asked 100/200/400/500/1000 Hz gave
-99/124/191/189/199 with the 250 Hz loop, 98/196/392/392/392 with 800 Hz; asked 250 Hz gave 190 to
-235, in steps of 4 and 8 ms; a position at 50 Hz comes in steps of 16 and 24 ms).
+A slot comes every 4 ms with a 250 Hz inner loop, every 2.5 ms with 800 Hz. So the achieved rate
+differs from the requested one. The rules below reproduce the rates measured on PX4: requested
+100/200/400/500/1000 Hz gave 99/124/191/189/199 with the 250 Hz loop and 98/196/392/392/392 with 800
+Hz; 250 Hz gave 190 to 235, in steps of 4 and 8 ms; a position at 50 Hz comes in steps of 16 and
+24 ms.
 """
 
 from collections.abc import Mapping
@@ -16,11 +16,11 @@ SLOT_US = {250: 4000, 800: 2500}
 HEARTBEAT, LOCAL_POSITION_NED, CURRENT_MODE = 0, 32, 436
 
 BUSY_SHARE = 0.22
-"""Where a stream was sent in the slot before, this is the probability that it misses the next one
-(250 Hz loop only; measured: 0.17 in one flight, 0.23 in another)."""
+"""Probability that a stream sent in one slot misses the next (250 Hz loop only; measured: 0.17 in
+one flight, 0.23 in another)."""
 
 NEW_EVERY_US = {LOCAL_POSITION_NED: 8000}
-"""A new position comes this often, and none is sent twice."""
+"""Message id -> period of new values; a value is not sent twice."""
 
 
 class _Stream:
@@ -34,26 +34,26 @@ class _Stream:
 
 
 class Px4Streams:
-    """The streams of one link, as PX4 serves them.
+    """The stream schedule of one link.
 
     Args:
         rates: message id -> Hz, the rates at boot.
-        luck: by which a stream at the full slot rate misses a slot, and positions come when they
-            are new; None: every slot is served.
+        random: draws the slots that a stream at the full slot rate misses, and lets positions
+            wait for a new value; None = no slot is missed.
     """
 
-    def __init__(self, rates: Mapping[int, float], *, luck: Random | None) -> None:
+    def __init__(self, rates: Mapping[int, float], *, random: Random | None) -> None:
         self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
-        self._luck = luck
+        self._random = random
         self._streams = {
             message: _Stream(interval, -interval) for message, interval in self._defaults.items()
         }
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
-        """Ask for a message every ``interval_us``; 0 = the rate at boot, negative = never.
+        """Set the interval of a message; 0 = the rate at boot, negative = never.
 
         Returns:
-            why it is refused, None if it is not; PX4 refuses nothing but to change HEARTBEAT.
+            the reason for a refusal, None if accepted; PX4 refuses only HEARTBEAT.
         """
         if message_id == HEARTBEAT:
             return "the rate of HEARTBEAT is fixed"
@@ -67,15 +67,15 @@ class Px4Streams:
         return None
 
     def interval(self, message_id: int) -> int:
-        """Return the interval in us that is set for a message, -1 if it is not streamed."""
+        """Return the interval of a message in us, -1 if it is not streamed."""
         stream = self._streams.get(message_id)
         return -1 if stream is None else stream.interval_us
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
-        """Return the ids of the messages to send in the slot at ``slot_us``; they count as sent.
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
-        CURRENT_MODE is sent once for each publication of the vehicle's status, the newest of which
-        came at ``status_us``, however often the message is asked for (measured: 2 Hz of 20 asked).
+        CURRENT_MODE is sent at most once per publication of the vehicle status, the latest of which
+        was at ``status_us`` (measured: 2 Hz of 20 Hz requested).
         """
         due = []
         for message_id, stream in self._streams.items():
@@ -84,7 +84,7 @@ class Px4Streams:
             if waited < stream.interval_us or nothing_new or self._missed(message_id, slot_us):
                 stream.in_slot_before = False
                 continue
-            # Keep the phase while it is nearly met; start a new one when the slots are too coarse.
+            # Keep the phase while the stream is nearly on time, else restart it.
             on_time = 2 * waited < 3 * stream.interval_us
             stream.last_us = stream.last_us + stream.interval_us if on_time else slot_us
             stream.in_slot_before = True
@@ -93,9 +93,9 @@ class Px4Streams:
         return due
 
     def _missed(self, message_id: int, slot_us: int) -> bool:
-        """Whether a message that is due misses this slot."""
-        if self._luck is None:
+        """Whether a due message misses this slot."""
+        if self._random is None:
             return False
         if slot_us % NEW_EVERY_US.get(message_id, 1):
             return True
-        return self._streams[message_id].in_slot_before and self._luck.random() < BUSY_SHARE
+        return self._streams[message_id].in_slot_before and self._random.random() < BUSY_SHARE

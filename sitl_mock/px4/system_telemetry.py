@@ -1,4 +1,4 @@
-"""The messages that tell how the vehicle and its autopilot are, in PX4's conventions."""
+"""Telemetry of the autopilot's state in PX4's conventions."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -26,9 +26,9 @@ class Px4SystemTelemetry(SystemTelemetry):
     Args:
         state: the autopilot's state.
         origin: of the local frame.
-        identity: what AUTOPILOT_VERSION says.
-        vehicle: for the battery and the resets.
-        stream: tells in which form OFFBOARD runs.
+        identity: content of AUTOPILOT_VERSION.
+        vehicle: for the battery.
+        stream: says which setpoints OFFBOARD has.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         )
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS; the prearm bit is what clients call armable."""
+        """Return SYS_STATUS; clients read its prearm bit as armable."""
         battery = self._vehicle.battery
         return dialect.MAVLink_sys_status_message(
             _SENSORS_PRESENT,
@@ -107,7 +107,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         )
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS; the whole pack's voltage is in the first cell, as PX4 sends it."""
+        """Return BATTERY_STATUS; as in PX4, the first cell has the voltage of all cells."""
         battery = self._vehicle.battery
         return dialect.MAVLink_battery_status_message(
             0,

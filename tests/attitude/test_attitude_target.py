@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.target_frame import OLDEST, TargetFrame
+from companion.attitude.yaw import OLDEST, TargetFrame
 from tests.attitude.independent import attitudes, coefficients_of
 from tests.attitude.simulate import quaternion
 

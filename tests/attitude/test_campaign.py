@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from companion.attitude import Limits, Target
-from companion.attitude.constants import make_constants
+from companion.attitude.limits import make_constants
 from companion.attitude.reference_model import ReferenceModel
 from tests.attitude.campaign import CALM, Fleet, fly_random, outward, random_targets, tilt_of
 

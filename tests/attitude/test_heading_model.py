@@ -5,10 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from companion.attitude import Limits, Target
-from companion.attitude.constants import make_constants
-from companion.attitude.heading_model import HeadingModel
+from companion.attitude.limits import make_constants
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.yaw_model import YawModel
+from companion.attitude.yaw import HeadingModel, YawModel
 
 UNLIMITED = Limits()
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from companion.attitude.margin import largest_gain
+from companion.attitude.rate_response import largest_gain
 
 NODES = 24
 

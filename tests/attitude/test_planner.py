@@ -17,8 +17,8 @@ from companion.attitude import (
     attitude,
     make_planner,
 )
-from companion.attitude.constants import make_constants
-from companion.attitude.target import admissible
+from companion.attitude.limits import make_constants
+from companion.attitude.representation import admissible
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 Q = attitude(Coefficients(0.3, -0.2), 1.0)

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from companion.attitude import Coefficients, Limits, Target
-from companion.attitude.constants import make_constants
 from companion.attitude.kinematics import into_body
+from companion.attitude.limits import make_constants
 from companion.attitude.reference_model import ReferenceModel, rates_along
 from tests.attitude.independent import attitudes, coefficients_of, headings_of, held, rate_between
 

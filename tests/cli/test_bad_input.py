@@ -55,7 +55,7 @@ def config(tmp_path, text):
         ),
         ("limits: {max_tilt_deg: 10}", "steps.coefficient must not exceed the sine"),
         ("circle: {radius_m: 1, speed_m_s: 4}", "° of tilt, limits.max_tilt_deg allows 35"),
-        ("circle: {radius_m: 26}", "circle: from 33.75 s on it leaves the fence, by up to 2.0 m"),
+        ("circle: {radius_m: 26}", "circle: from 33.85 s on it leaves the fence, by up to 2.0 m"),
         (
             "flight: {maneuvers: [identify]}\nlimits: {max_tilt_deg: 15}",
             "identify.tilt_rate_deg_s × identify.tilt_duration_s must not exceed 0.75 × limits",
@@ -130,7 +130,7 @@ def test_a_recording_folder_that_cannot_be_made_is_named(capsys, tmp_path):
 def test_an_unknown_maneuver_names_the_known(capsys, tmp_path):
     code, _, err = run(capsys, "fly", "--config", config(tmp_path, ""), "--maneuvers", "loop")
     assert code == 2
-    assert "known: hover, steps, circle" in err
+    assert "'hover', 'steps', 'circle'" in err
 
 
 def test_check_config_refuses_what_a_flight_would_refuse(capsys, tmp_path):

@@ -16,7 +16,7 @@ from companion.cli.main import main
 from companion.mavlink import lockstep
 from tests.flight.fly import free_port
 from tests.mavlink.fakes import frames_of
-from tests.preflight.patients import FAMILIES, config_file, configured, met, shipped_vehicle
+from tests.preflight.vehicles import FAMILIES, config_file, configured, met, shipped_vehicle
 
 WRONG = {
     "px4": {"COM_OF_LOSS_T": 5.0, "COM_OBL_RC_ACT": 7, "CBRK_SUPPLY_CHK": 894281},

@@ -4,7 +4,7 @@ import pytest
 
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, parse
-from companion.preflight.undo import Undo
+from companion.preflight.parameter_fixes import Undo
 from companion.study.custom_case import Case
 
 _BELOW = {"minimum", "exclusiveMinimum"}

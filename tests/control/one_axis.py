@@ -12,12 +12,11 @@ import numpy as np
 
 from companion.attitude import BodyRates
 from companion.config import Config
-from companion.control.command import Command
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.inner_loop import planner
 from companion.control.outer_loop import linear_guidance, motion_estimate
-from companion.flight.assembly import planner
 from companion.guidance import GRAVITY, Reference
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 
 DT = 0.004
 _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
@@ -64,10 +63,10 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             position = LocalPosition(time, at, (0.0, east, -5.0), (0.0, fast, 0.0))
             estimate.note_position(position, offboard_active=True)
         if n % _GUIDANCE == 0:
-            situation = estimate.situation(time, guidance.acts_after, (2.0, 18.0))
+            inputs = estimate.guidance_input(time, guidance.acts_after, (2.0, 18.0))
             held = Reference((0.0, 0.0, -5.0))
-            target, later, down = guidance.command(lambda _, held=held: held, time, situation)
-            command = Command(target, down, time, later=later, period=_GUIDANCE * DT)
+            target, later, down = guidance.command(lambda _, held=held: held, time, inputs)
+            command = GuidanceCommand(target, down, time, later=later, period=_GUIDANCE * DT)
         asked.append(law.rates(q, command.target_at(time), DT, rates).roll)
         rate = asked[0] + fade * (rate - asked[0])
         roll += DT * rate

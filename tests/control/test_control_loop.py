@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
-from companion.control.command import Command
 from companion.control.control_loop import ControlLoop, Deadlines
-from companion.control.unanswered import Unanswered
+from companion.control.guidance_command import GuidanceCommand
+from companion.control.loop_record import Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
+from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.records import AttitudeTarget
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 TARGET = Target(0.1, 0.0, 0.0)
@@ -52,7 +52,7 @@ class Bench:
         self.asked += 1
 
     def refresh(self, **changes):
-        self.loop.command = Command(TARGET, 0.0, self.time)._replace(**changes)
+        self.loop.command = GuidanceCommand(TARGET, 0.0, self.time)._replace(**changes)
 
     def sample(self, vehicle_time=None, q=LEVEL, late=0.0, lead=0):
         """One sample; `vehicle_time` is ours less 7 s unless told otherwise."""
@@ -82,7 +82,7 @@ class Bench:
 def test_every_fresh_sample_gets_one_answer_with_its_own_stamp():
     bench = Bench()
     bench.run(50)
-    assert len(bench.sent) == bench.loop.setpoints == bench.loop.samples == 50
+    assert len(bench.sent) == bench.loop.record.setpoints == bench.loop.record.samples == 50
     stamps = [stamp for stamp, _, _ in bench.sent]
     assert stamps == [3000 + 4 * k for k in range(1, 51)]
     _, rates, thrust = bench.sent[0]
@@ -102,17 +102,17 @@ def test_a_process_that_is_stopped_while_it_answers_does_not_send():
     bench.run(10)
     away = 3.0
     bench.run(1)
-    assert (len(bench.sent), bench.loop.reason) == (10, Unanswered.LATE)
+    assert (len(bench.sent), bench.loop.record.reason) == (10, Unanswered.LATE)
 
 
 def test_nothing_is_sent_while_off_or_before_the_first_target():
     bench = Bench()
     bench.loop.on = False
     bench.run(5)
-    assert (bench.sent, bench.loop.samples) == ([], 0)
+    assert (bench.sent, bench.loop.record.samples) == ([], 0)
     bench.loop.on, bench.loop.command = True, None
     bench.sample(vehicle_time=9.0)
-    assert (bench.sent, bench.loop.stale) == ([], 1)
+    assert (bench.sent, bench.loop.record.stale) == ([], 1)
 
 
 def test_an_old_target_is_not_answered():
@@ -123,7 +123,7 @@ def test_an_old_target_is_not_answered():
         bench.sample()
     answered = len(bench.sent) - 2
     assert answered == 37  # 0.15 s of 4 ms samples
-    assert bench.loop.stale == 60 - answered
+    assert bench.loop.record.stale == 60 - answered
 
 
 @pytest.mark.parametrize("stamp", [3.02, None])
@@ -132,7 +132,7 @@ def test_repeated_and_reordered_samples_are_not_answered(stamp):
     bench.run(10)
     bench.sample(vehicle_time=stamp)
     assert len(bench.sent) == 10
-    assert bench.loop.stale == 1
+    assert bench.loop.record.stale == 1
 
 
 def test_a_duplicate_in_the_same_instant_is_not_answered_twice():
@@ -147,7 +147,7 @@ def test_a_sample_that_was_long_under_way_is_not_answered():
     bench.run(10)
     bench.time += 0.004
     bench.sample(late=0.11)
-    assert (len(bench.sent), bench.loop.stale) == (10, 1)
+    assert (len(bench.sent), bench.loop.record.stale) == (10, 1)
 
 
 @pytest.mark.parametrize("rates", [None, BodyRates(0.3, -0.4, 0.5)])
@@ -168,17 +168,17 @@ def test_an_unusable_attitude_is_refused_and_counted(q, rates):
         bench.time += 0.004
         bench.refresh(body_rates=rates)
         bench.sample(q=q)
-    assert (bench.sent, bench.loop.refused, bench.loop.setpoints) == ([], 3, 0)
+    assert (bench.sent, bench.loop.record.refused, bench.loop.record.setpoints) == ([], 3, 0)
 
 
 def test_a_setpoint_that_could_not_leave_is_no_answer():
     bench = Bench()
     bench.run(3)
-    last = bench.loop.last_answer
+    last = bench.loop.record.last_answer
     bench.connected = False
     bench.run(3)
-    assert (bench.loop.setpoints, bench.loop.refused) == (3, 3)
-    assert bench.loop.last_answer == last
+    assert (bench.loop.record.setpoints, bench.loop.record.refused) == (3, 3)
+    assert bench.loop.record.last_answer == last
 
 
 def test_idle_sends_neither_rates_nor_thrust():
@@ -219,12 +219,13 @@ def test_without_guard_a_gap_needs_no_confirmation():
 def test_a_late_answer_counts_as_a_missed_deadline():
     bench = Bench()
     bench.run(3, lead=-1_000_000_000)  # in time, however busy this computer is
-    assert bench.loop.missed_deadlines == 0
+    assert bench.loop.record.missed_deadlines == 0
     bench.run(2, lead=5_000_000)
-    assert bench.loop.missed_deadlines == 2
+    assert bench.loop.record.missed_deadlines == 2
 
 
-def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
+def test_each_unanswered_sample_has_one_reason_which_is_counted():
+    """Every reason of the enumeration occurs here."""
     bench = Bench()
     bench.loop.offboard_active = True
     bench.run(10)
@@ -244,8 +245,14 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
     bench.loop.command = None
     bench.time += 0.004
     bench.sample()
-    counted = {reason: n for reason, n in bench.loop.unanswered.items() if n}
-    assert counted == {
+    bench.loop.is_same_vehicle = lambda: False
+    bench.run(3)
+    bench.loop.is_same_vehicle = lambda: True
+    bench.loop._send = refuse_setpoint
+    bench.run(1)
+    assert bench.loop.record.unanswered == {
+        Unanswered.ANOTHER_VEHICLE: 3,
+        Unanswered.INVALID_SETPOINT: 1,
         Unanswered.NOT_NEWER: 1,
         Unanswered.AHEAD: 1,
         Unanswered.LATE: 1,
@@ -256,10 +263,14 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
         Unanswered.NO_TARGET: 1,
     }
     loop = bench.loop
-    assert (loop.stale, loop.refused) == (6, 3)
-    assert loop.samples == loop.setpoints + loop.stale + loop.refused
-    assert loop.reason is Unanswered.NO_TARGET
+    assert (loop.record.stale, loop.record.refused) == (9, 4)
+    assert loop.record.samples == loop.record.setpoints + loop.record.stale + loop.record.refused
+    assert loop.record.reason is Unanswered.INVALID_SETPOINT
     assert all(reason.words for reason in Unanswered)
+
+
+def refuse_setpoint(*_):
+    raise InvalidSetpoint("out of range")
 
 
 @pytest.mark.parametrize(
@@ -274,27 +285,27 @@ def test_each_sample_that_is_not_answered_has_one_reason_which_is_counted():
 def test_the_rate_of_answers_counts_bursts_as_what_they_are(intervals, rate):
     bench = Bench()
     bench.run(10)
-    before, stamp = bench.loop.held.copy(), bench.time - 7.0
+    before, stamp = bench.loop.record.held.copy(), bench.time - 7.0
     for interval in intervals:
         bench.time += interval
         stamp += sum(intervals) / len(intervals)
         bench.refresh()
         bench.sample(vehicle_time=min(stamp, bench.time - 7.0))
-    assert bench.loop.held.rate_since(before) == pytest.approx(rate, rel=0.01)
+    assert bench.loop.record.held.rate_since(before) == pytest.approx(rate, rel=0.01)
 
 
 def test_gaps_are_counted_and_are_no_part_of_the_rate():
     bench = Bench()
     bench.loop.offboard_active = True
     bench.run(50)
-    before = bench.loop.held.copy()
+    before = bench.loop.record.held.copy()
     for _ in range(3):
         bench.time += 0.2
         bench.run(1)
         bench.loop.resume()
         bench.run(10)
-    assert len(bench.loop.gaps) == 3
-    assert bench.loop.held.rate_since(before) == pytest.approx(250.0)
+    assert len(bench.loop.record.gaps) == 3
+    assert bench.loop.record.held.rate_since(before) == pytest.approx(250.0)
 
 
 ASKED = BodyRates(0.3, -0.4, 0.5)
@@ -339,7 +350,7 @@ def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
     bench.sample(vehicle_time=3.1)
     bench.time += 0.2  # the command is older than 0.15 s
     bench.sample(vehicle_time=3.3)
-    assert (len(bench.sent), bench.loop.stale) == (1, 1)
+    assert (len(bench.sent), bench.loop.record.stale) == (1, 1)
     encoder = SetpointEncoder(1, 191, 1, 1, signed=False)
 
     def send(stamp, rates, thrust):
@@ -349,7 +360,7 @@ def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
     bench = Bench(send=send)
     bench.refresh(body_rates=BodyRates(math.nan, 0.0, 0.0))
     bench.sample(vehicle_time=3.1)
-    assert (bench.loop.setpoints, bench.loop.refused) == (0, 1)
+    assert (bench.loop.record.setpoints, bench.loop.record.refused) == (0, 1)
 
 
 def test_after_them_the_planner_begins_anew():
@@ -418,7 +429,7 @@ def facing(heading):
 def test_the_attitude_target_is_passed_on_once_with_its_age_at_the_sample():
     bench = Bench(planner := NotingPlanner())
     told = None
-    bench.loop.attitude_target = lambda: told
+    bench.loop.planner.attitude_target = lambda: told
     bench.run(3)
     assert planner.noted == []
     told = AttitudeTarget(3000 + 4 * 3 - 10, facing(0.3))
@@ -435,7 +446,7 @@ def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
     """What was told before the jump may be in either frame, and is passed over."""
     bench = Bench(planner := NotingPlanner())
     told = None
-    bench.loop.attitude_target = lambda: told
+    bench.loop.planner.attitude_target = lambda: told
     bench.run(3)
     told = AttitudeTarget(3000 + 4 * 4, facing(0.3))
     bench.run(1, q=facing(0.5))

@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Target, coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
-from companion.vehicle.records import LocalPosition
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.flight.fly import fly, mock_vehicle
 
 

@@ -18,7 +18,7 @@ from companion.mavlink.commands import (
     CommandClient,
 )
 from companion.mavlink.errors import CommandRefused
-from companion.safety.ending import Exit
+from companion.safety.actions import Exit
 from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
 from companion.vehicle.records import Landed

@@ -262,8 +262,8 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
 
     def freezing(guidance_loop):
         if not (
-            guidance_loop.begun_at is not None
-            and guidance_loop._clock() > guidance_loop.begun_at + 1.0
+            guidance_loop.flown.begun_at is not None
+            and guidance_loop._clock() > guidance_loop.flown.begun_at + 1.0
         ):
             flown(guidance_loop)
 
@@ -285,7 +285,7 @@ def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
         summary = fly(mock, tmp_path / "log", observer)
         state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
-    assert "letting go" in summary.events[-1][1]
+    assert "releasing control" in summary.events[-1][1]
     assert not state["crashed"]
     assert state["time"] < setpoints(summary)[-1]._timestamp + 8.0
 

@@ -13,7 +13,7 @@ from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predicted
 from companion.guidance.trajectory.demand import Motion
-from companion.safety.fence import braking
+from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Motion as Now
 from companion.safety.snapshot import Snapshot
 from companion.safety.table import fence_of

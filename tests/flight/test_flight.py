@@ -8,8 +8,8 @@ import pytest
 from companion.flight.flight import Flight
 from companion.flight.observer import Silent
 from companion.flight.phases import Phase
-from companion.flight.same_vehicle import ChecksVoid
-from companion.safety.ending import Exit
+from companion.flight.vehicle_identity import ChecksVoid
+from companion.safety.actions import Exit
 
 
 class Bench:
@@ -63,7 +63,7 @@ def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch
     bench = Bench(monkeypatch, judge)
     result, events = bench.fly()
     assert (result, bench.done) == ("ok", ["checks", "checks", "maneuvers"])
-    assert events == ["another vehicle answers; the checks are made anew"]
+    assert events == ["another vehicle answers; the checks are repeated"]
 
 
 def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):

@@ -3,9 +3,9 @@
 import pytest
 
 from companion.config.flight import FlightConfig
-from companion.flight.mode_roles import require_role, roles_of
+from companion.flight.commands import require_role, roles_of
 from companion.flight.phases import exit_phases, flight_phases, ground_phases
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 from companion.vehicle.registry import AUTOPILOTS, autopilot_for
 

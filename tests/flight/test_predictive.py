@@ -64,7 +64,9 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
     async def kill(session):
         def begun():
             assembled = session._assembled
-            return assembled is not None and assembled.context.guidance_loop.begun_at is not None
+            return (
+                assembled is not None and assembled.context.guidance_loop.flown.begun_at is not None
+            )
 
         while not begun():  # noqa: ASYNC110
             await asyncio.sleep(0.1)

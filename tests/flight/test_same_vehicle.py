@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.same_vehicle import ChecksVoid, SameVehicle
+from companion.flight.vehicle_identity import ChecksVoid, SameVehicle
 from companion.preflight.evidence import Identity
-from companion.safety.ending import Exit, FlightEnded
+from companion.safety.actions import Exit, FlightEnded
 
 
 class Link(SimpleNamespace):

@@ -98,7 +98,7 @@ def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
     assert bench.learning.mismatch_warning() is None  # the vehicle never hung on it
     bench.hover(0.02, offboard_active=True)
     expected = (
-        "the vehicle hovers at a thrust of 0.40, and thrust.hover_thrust says 0.50; set it to 0.40"
+        "the vehicle hovers at a thrust of 0.40, but thrust.hover_thrust is 0.50; set it to 0.40"
     )
     assert bench.learning.mismatch_warning() == (expected if learned == 0.4 else None)
 

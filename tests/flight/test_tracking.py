@@ -74,7 +74,7 @@ def test_a_drag_that_nobody_configured_is_learned_and_told(tmp_path):
     summary = flown(tmp_path, "circle5.yaml", guidance={"drag_per_s": None})
     assert summary.tracking()["position_rms_m"] <= 0.12
     (told,) = [text for _, text in summary.events if "drag" in text]
-    assert re.search(r"at 5\.\d m/s is (0.9[5-9]|1.0[0-4]) 1/s, and 0.30 was assumed", told), told
+    assert re.search(r"at 5\.\d m/s is (0.9[5-9]|1.0[0-4]) 1/s, but 0.30 was assumed", told), told
     assert re.search(r"guidance.drag_per_s to \d.\d\d and guidance.quadratic_drag_per_m to 0", told)
 
 

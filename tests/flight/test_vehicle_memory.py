@@ -7,7 +7,7 @@ from companion.drag import Drag
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.vehicle_memory import VehicleMemory
+from companion.flight.vehicle_identity import VehicleMemory
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
@@ -56,7 +56,7 @@ def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
         update={"guidance": config.guidance.model_copy(update={"drag_per_s": 0.2})}
     )
     configured_maneuvers(told)
-    with pytest.raises(ConfigError, match=r"not known: up to 0.7 1/s is reckoned with"):
+    with pytest.raises(ConfigError, match=r"not known: assumed up to 0.7 1/s"):
         configured_maneuvers(
             parse(
                 bounded_yaml.dump(

@@ -15,9 +15,10 @@ from companion.attitude import BodyRates
 from companion.cli.main import main
 from companion.config import Config
 from companion.config.files import load
+from companion.control.inner_loop import planner, rate_limits
 from companion.control.outer_loop import predictive_settings
 from companion.files.yaml_file import ConfigError
-from companion.flight.assembly import assemble, link_settings, planner, rate_limits
+from companion.flight.assembly import assemble, link_settings
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Silent
 from companion.vehicle.link import Link

@@ -18,7 +18,7 @@ from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing
 from companion.vehicle.link import Link
-from companion.vehicle.samples import AttitudeSample
+from companion.vehicle.records import AttitudeSample
 from tests.fuzz import virtual_time
 from tests.fuzz.target import Case, Target
 from tests.fuzz.wires import Wire

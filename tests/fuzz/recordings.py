@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError, load
-from companion.preflight.undo import Undo
+from companion.preflight.parameter_fixes import Undo
 from tests.fuzz.configuration import one_sentence
 from tests.fuzz.target import Case, Target
 from tests.fuzz.texts import folder_of, mutated, numbers, scalars

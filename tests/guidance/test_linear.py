@@ -24,7 +24,7 @@ from companion.guidance import (
     chain_gains,
     specific_thrust,
 )
-from companion.guidance.lqr import ChainGains
+from companion.guidance.feedback import ChainGains
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²

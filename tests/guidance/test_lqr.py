@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
-from companion.guidance.lqr import Weights, chain_gains
+from companion.guidance.feedback import Weights, chain_gains
 
 
 def chain(lag, drag):

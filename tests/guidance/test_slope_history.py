@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from companion.guidance.slope_history import SlopeHistory
+from companion.guidance.motion_observer import SlopeHistory
 
 DT = 0.004
 

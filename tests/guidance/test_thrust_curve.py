@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.guidance.thrust_curve import BatterySag, ThrustCurve
+from companion.guidance.thrust import BatterySag, ThrustCurve
 
 shares = st.floats(0.0, 1.0)
 

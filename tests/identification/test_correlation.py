@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from companion.identification import dead_time_by_correlation
-from companion.identification.first_order_lag import held, lagged, slewed
+from companion.identification.lags import held, lagged, slewed
 
 from .vehicles import RATE_NOISE, Doublets, irregular, lag_with_dead_time, mock_axis, regular
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.identification.first_order_lag import held, lagged, slewed, value_at
+from companion.identification.lags import held, lagged, slewed, value_at
 
 
 def recursion(commands, lag, at):

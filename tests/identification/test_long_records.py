@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.identification import fit_rate_response, models
+from companion.identification import delayed_model, fit_rate_response
 from companion.identification.record import most_excited, stretches
 
 from .vehicles import RATE_NOISE, Doublets, lag_with_dead_time, regular
@@ -38,7 +38,7 @@ def work(monkeypatch):
         return count
 
     for name in ("lagged", "second_order"):
-        monkeypatch.setattr(models, name, counted(getattr(models, name)))
+        monkeypatch.setattr(delayed_model, name, counted(getattr(delayed_model, name)))
     return sizes
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from companion.identification.first_order_lag import held, slewed, value_at
-from companion.identification.second_order_lag import second_order, second_order_decay
+from companion.identification.lags import held, second_order, second_order_decay, slewed, value_at
 
 LOOPS = [(6.0, 0.44), (19.6, 0.73), (10.0, 1.0), (10.0, 1.0 + 1e-9), (8.0, 1.3), (60.0, 3.0)]
 

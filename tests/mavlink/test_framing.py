@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as dialect
+from pymavlink.generator.mavcrc import x25crc
 
 from companion.mavlink.framing import FrameScanner, build_frame
 from companion.mavlink.messages import CRC_EXTRA
@@ -69,11 +70,22 @@ def test_garbage_that_looks_like_frames_costs_no_frame_after_it(junk):
     assert stats.unknown or raws[-len(wanted) :] == wanted
 
 
+def flagged(frame, flags):
+    """The frame with other incompatibility flags, and the checksum that belongs to them."""
+    body = bytes((*frame[:2], flags, *frame[3:-2]))
+    crc = x25crc(body[1:] + CRC_EXTRA[0])
+    return body + crc.crc.to_bytes(2, "little")
+
+
 @pytest.mark.parametrize("flag", [0x02, 0x80])
 def test_unknown_incompatible_flags_are_refused(flag):
     frame = bytearray(frames_of(heartbeat())[0])
-    frame[2] |= flag
-    assert scanner().feed(bytes(frame)) == []
+    assert len(scanner().feed(flagged(frame, 0))) == 1  # so it is the flag that is refused below
+    assert scanner().feed(flagged(frame, flag)) == []
+    # With a signature behind it, too, as a scanner that ignored the flag would expect one.
+    assert scanner().feed(flagged(frame, flag) + bytes(13)) == []
+    assert scanner().feed(flagged(frame, flag | 0x01) + bytes(13)) == []
+    assert len(scanner().feed(flagged(frame, 0x01) + bytes(13))) == 1
 
 
 def test_every_single_bit_error_is_noticed():

@@ -11,7 +11,12 @@ from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import Signing, Verdict, key_from_hex, key_from_passphrase_file
+from companion.mavlink.signing import (
+    SignatureResult,
+    Signing,
+    key_from_hex,
+    key_from_passphrase_file,
+)
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
 
@@ -41,42 +46,42 @@ def test_pymavlinks_signature_is_accepted_once():
     mav = signer()
     first, second = (frame_of(heartbeat().pack(mav)) for _ in range(2))
     assert first.signed
-    assert ours.judge(first) is Verdict.GOOD
-    assert ours.judge(second) is Verdict.GOOD
-    assert ours.judge(second) is Verdict.REPLAYED
-    assert ours.judge(first) is Verdict.REPLAYED
+    assert ours.check(first) is SignatureResult.GOOD
+    assert ours.check(second) is SignatureResult.GOOD
+    assert ours.check(second) is SignatureResult.REPLAYED
+    assert ours.check(first) is SignatureResult.REPLAYED
 
 
 def test_another_key_a_changed_byte_and_no_signature_are_refused():
     ours = signing()
-    assert ours.judge(frame_of(heartbeat().pack(signer(bytes(32))))) is Verdict.WRONG_KEY
+    assert ours.check(frame_of(heartbeat().pack(signer(bytes(32))))) is SignatureResult.WRONG_KEY
     unsigned = frame_of(heartbeat().pack(dialect.MAVLink(None, 1, 1)))
-    assert ours.judge(unsigned) is Verdict.UNSIGNED
+    assert ours.check(unsigned) is SignatureResult.UNSIGNED
     packed = bytearray(heartbeat().pack(signer()))
     packed[-1] ^= 1
-    assert ours.judge(frame_of(bytes(packed))) is Verdict.WRONG_KEY
+    assert ours.check(frame_of(bytes(packed))) is SignatureResult.WRONG_KEY
 
 
 def test_a_forged_stamp_does_not_silence_the_true_sender():
     ours = signing()
     forged = frame_of(heartbeat().pack(signer(bytes(32), ticks=TICKS + 10**9)))
-    assert ours.judge(forged) is Verdict.WRONG_KEY
-    assert ours.judge(frame_of(heartbeat().pack(signer()))) is Verdict.GOOD
+    assert ours.check(forged) is SignatureResult.WRONG_KEY
+    assert ours.check(frame_of(heartbeat().pack(signer()))) is SignatureResult.GOOD
 
 
 def test_a_recording_of_an_old_flight_is_refused():
     def played(seconds):
-        return signing().judge(frame_of(heartbeat().pack(signer(ticks=TICKS - seconds * 100_000))))
+        return signing().check(frame_of(heartbeat().pack(signer(ticks=TICKS - seconds * 100_000))))
 
-    assert played(61) is Verdict.REPLAYED
-    assert played(59) is Verdict.GOOD
+    assert played(61) is SignatureResult.REPLAYED
+    assert played(59) is SignatureResult.GOOD
 
 
 def test_streams_are_kept_apart():
     ours = signing()
     for ticks, link_id in ((TICKS + 50, 1), (TICKS + 10, 2)):
         frame = frame_of(heartbeat().pack(signer(ticks=ticks, link_id=link_id)))
-        assert ours.judge(frame) is Verdict.GOOD
+        assert ours.check(frame) is SignatureResult.GOOD
 
 
 def test_our_stamps_rise_even_when_no_time_passes():

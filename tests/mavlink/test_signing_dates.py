@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.mavlink.framing import FrameScanner, build_frame
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import Signing, Verdict
+from companion.mavlink.signing import SignatureResult, Signing
 from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.stamp_judge import EPOCH_UNIX_S
 from companion.mavlink.stamp_keeper import StampKeeper
@@ -61,7 +61,7 @@ def run_once(clock, *frames):
     ours = signing(clock, file)
     keeper = StampKeeper(ours, file)
     keeper.start()
-    verdicts = [ours.judge(one) for one in frames]
+    verdicts = [ours.check(one) for one in frames]
     keeper.stop()
     return verdicts, ours
 
@@ -79,16 +79,16 @@ def question(ours, ts1=123_456_789_000):
 
 def test_a_recording_of_the_last_minute_is_refused_after_a_restart():
     recorded = [frame(NOW - 30), frame(NOW - 10)]
-    assert run_once(NOW, *recorded)[0] == [Verdict.GOOD] * 2
+    assert run_once(NOW, *recorded)[0] == [SignatureResult.GOOD] * 2
     verdicts, _ = run_once(NOW + 5, *recorded, frame(NOW + 4))
-    assert verdicts == [Verdict.REPLAYED, Verdict.REPLAYED, Verdict.GOOD]
+    assert verdicts == [SignatureResult.REPLAYED, SignatureResult.REPLAYED, SignatureResult.GOOD]
 
 
 def test_with_the_clock_set_back_old_recordings_are_refused_and_our_stamps_go_on():
     _, ours = run_once(NOW, frame(NOW))
     last = stamp_of(ours)
     verdicts, ours = run_once(NOW - 90 * DAY, frame(NOW - 10 * DAY), frame(NOW + 5))
-    assert verdicts == [Verdict.REPLAYED, Verdict.GOOD]
+    assert verdicts == [SignatureResult.REPLAYED, SignatureResult.GOOD]
     assert stamp_of(ours) > last
     assert "clock is not to be trusted: it says 2026-10-17" in ours.remarks[0]
 
@@ -96,7 +96,7 @@ def test_with_the_clock_set_back_old_recordings_are_refused_and_our_stamps_go_on
 def test_without_a_past_a_recording_is_not_taken_for_the_date():
     """The first run of all, the clock 90 days back: the recording is 80 days in its future."""
     ours = signing(NOW - 90 * DAY)
-    assert ours.judge(frame(NOW - 10 * DAY)) is Verdict.AHEAD
+    assert ours.check(frame(NOW - 10 * DAY)) is SignatureResult.AHEAD
     [remark] = ours.remarks
     assert "dated 80 days ahead of our date, and refused until the vehicle answers" in remark
 
@@ -105,23 +105,23 @@ def test_a_vehicle_that_answers_is_the_better_clock():
     """No recording answers a question of this run."""
     ours = signing(NOW - 90 * DAY)
     old_answer = question(signing(NOW - 10 * DAY), ts1=55)
-    assert ours.judge(frame(NOW)) is Verdict.AHEAD
+    assert ours.check(frame(NOW)) is SignatureResult.AHEAD
     assert stamp_of(ours) > NOW  # or the vehicle would not hear our question
     asked = question(ours)
-    assert ours.judge(frame(NOW - 10 * DAY, old_answer)) is Verdict.AHEAD
+    assert ours.check(frame(NOW - 10 * DAY, old_answer)) is SignatureResult.AHEAD
     not_an_answer = dialect.MAVLink_timesync_message(0, asked.ts1)
-    assert ours.judge(frame(NOW, not_an_answer)) is Verdict.AHEAD
+    assert ours.check(frame(NOW, not_an_answer)) is SignatureResult.AHEAD
     our_answer = build_frame(
         TIMESYNC, bytes([9] * 16), b"\x22", sequence=0, system=1, component=191
     )
     ours.sign(our_answer)
     repeats_it = dialect.MAVLink_timesync_message(1, int.from_bytes(bytes([9] * 8), "little"))
-    assert ours.judge(frame(NOW, repeats_it)) is Verdict.AHEAD
-    assert ours.judge(frame(NOW + 1, asked)) is Verdict.GOOD
-    assert ours.judge(frame(NOW + 2)) is Verdict.GOOD
+    assert ours.check(frame(NOW, repeats_it)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW + 1, asked)) is SignatureResult.GOOD
+    assert ours.check(frame(NOW + 2)) is SignatureResult.GOOD
     assert "90 days behind the vehicle, which has our key and answers us" in ours.remarks[-1]
     recording_of_another_link = frame(NOW - 10 * DAY, link_id=4)
-    assert ours.judge(recording_of_another_link) is Verdict.REPLAYED
+    assert ours.check(recording_of_another_link) is SignatureResult.REPLAYED
 
 
 def test_what_was_heard_with_a_wrong_clock_is_refused_after_the_next_start_too():
@@ -130,20 +130,20 @@ def test_what_was_heard_with_a_wrong_clock_is_refused_after_the_next_start_too()
     keeper = StampKeeper(ours, file)
     keeper.start()
     heard = frame(NOW, question(ours))
-    assert ours.judge(heard) is Verdict.GOOD
+    assert ours.check(heard) is SignatureResult.GOOD
     keeper.stop()
     for clock in (NOW - 90 * DAY, NOW):  # as wrong as before, and mended
-        assert signing(clock, file).judge(heard) is Verdict.REPLAYED
-    assert signing(NOW, file).judge(frame(NOW + 1)) is Verdict.GOOD
+        assert signing(clock, file).check(heard) is SignatureResult.REPLAYED
+    assert signing(NOW, file).check(frame(NOW + 1)) is SignatureResult.GOOD
 
 
 @pytest.mark.parametrize("years", [6, 10, 70])
 def test_a_stamp_of_the_far_future_moves_nothing(years):
     verdicts, ours = run_once(NOW, frame(NOW + years * YEAR), frame(NOW))
-    assert verdicts == [Verdict.AHEAD, Verdict.GOOD]
+    assert verdicts == [SignatureResult.AHEAD, SignatureResult.GOOD]
     assert stamp_of(ours) < NOW + 1
     assert f"dated {365 * years} days ahead of our date, and not believed" in ours.remarks[0]
-    assert run_once(NOW + 1, frame(NOW + 1))[0] == [Verdict.GOOD]
+    assert run_once(NOW + 1, frame(NOW + 1))[0] == [SignatureResult.GOOD]
 
 
 def test_a_key_holder_ahead_does_not_silence_the_vehicle_even_if_it_answers():
@@ -151,10 +151,10 @@ def test_a_key_holder_ahead_does_not_silence_the_vehicle_even_if_it_answers():
     ours = signing(NOW, file)
     keeper = StampKeeper(ours, file)
     keeper.start()
-    assert ours.judge(frame(NOW + 90 * DAY, question(ours))) is Verdict.GOOD
-    assert ours.judge(frame(NOW + 1)) is Verdict.GOOD
+    assert ours.check(frame(NOW + 90 * DAY, question(ours))) is SignatureResult.GOOD
+    assert ours.check(frame(NOW + 1)) is SignatureResult.GOOD
     keeper.stop()
-    assert signing(NOW + 5, file).judge(frame(NOW + 6)) is Verdict.GOOD
+    assert signing(NOW + 5, file).check(frame(NOW + 6)) is SignatureResult.GOOD
 
 
 def test_a_clock_before_this_program_was_made_does_not_count():
@@ -167,7 +167,7 @@ def test_a_clock_before_this_program_was_made_does_not_count():
 def test_a_clock_beyond_the_48_bits_of_a_stamp_breaks_nothing():
     ours = signing(datetime(2200, 1, 1, tzinfo=UTC).timestamp())
     assert stamp_of(ours) < datetime(2095, 1, 1, tzinfo=UTC).timestamp()
-    assert ours.judge(frame(NOW)) is Verdict.REPLAYED
+    assert ours.check(frame(NOW)) is SignatureResult.REPLAYED
 
 
 def test_a_step_of_the_clock_in_flight_changes_nothing():
@@ -176,13 +176,13 @@ def test_a_step_of_the_clock_in_flight_changes_nothing():
     ours = Signing(KEY, clock=lambda: next(clock), elapsed=lambda: now[0])
     for second in range(1, 4):
         now[0] = float(second)
-        assert ours.judge(frame(NOW + second)) is Verdict.GOOD
+        assert ours.check(frame(NOW + second)) is SignatureResult.GOOD
         assert stamp_of(ours) == pytest.approx(NOW + second, abs=0.01)
 
 
 def test_a_vehicle_without_a_date_is_told_as_such():
     ours = signing()
-    assert ours.judge(frame(NOW - 100 * DAY)) is Verdict.REPLAYED
+    assert ours.check(frame(NOW - 100 * DAY)) is SignatureResult.REPLAYED
     assert "100 days before our date" in ours.remarks[0]
 
 
@@ -205,16 +205,16 @@ def test_after_a_kill_our_stamps_rise_and_nothing_heard_before_is_heard_again():
     keeper = StampKeeper(ours, file)
     keeper.start()
     heard = frame(NOW)
-    ours.judge(heard)
+    ours.check(heard)
     wait_for(lambda: file.load()[0].streams)
     last = stamp_of(ours)
     killed_here = file.load()
     keeper.stop()
     file.save(killed_here[0])
     again = signing(NOW - 5.0, file)
-    assert again.judge(heard) is Verdict.REPLAYED
+    assert again.check(heard) is SignatureResult.REPLAYED
     assert stamp_of(again) > last
-    assert again.judge(frame(NOW + 16.0)) is Verdict.GOOD
+    assert again.check(frame(NOW + 16.0)) is SignatureResult.GOOD
 
 
 def test_streams_of_another_vehicle_with_the_same_key_stay():
@@ -240,7 +240,7 @@ def test_a_damaged_file_is_told_and_replaced(text):
     file.path.parent.mkdir(parents=True)
     file.path.write_bytes(text)
     verdicts, ours = run_once(NOW, frame(NOW))
-    assert verdicts == [Verdict.GOOD]
+    assert verdicts == [SignatureResult.GOOD]
     [remark] = ours.remarks
     assert "cannot be read (it is damaged)" in remark
     assert file.load()[1] is None

@@ -11,19 +11,19 @@ from companion.config import Config
 from companion.config.files import changed
 from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, OtherNodes, SampleTimes
-from companion.preflight.examination import examine, forbidding, result
+from companion.preflight.examination import blocking, examine, overall_result
 from companion.preflight.finding import Key
-from companion.preflight.parameter_findings import parameters
 from companion.preflight.parameter_survey import Survey
+from companion.preflight.parameters import parameters
 from companion.vehicle.autopilot import Readiness
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.records import Battery, GlobalPosition
 from companion.vehicle.registry import autopilot_for
 from companion.vehicle.streams import StreamRate
-from tests.preflight.patients import amiss
+from tests.preflight.vehicles import amiss
 
-SAFE, UNSAFE, INEFFECTIVE = Verdict.SAFE, Verdict.UNSAFE, Verdict.INEFFECTIVE
-NOT_READY = Verdict.NOT_READY
+SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
+NOT_READY = CheckResult.NOT_READY
 PX4, ARDUPILOT = autopilot_for(12, 2), autopilot_for(3, 2)
 QUALITY = LinkQuality(1000, 0, 0, 0, 0, 0.004, 0.001)
 READY = Readiness(prearm_good=True, estimator_flags=0x3FF, position=True, home=True)
@@ -61,7 +61,7 @@ GOOD = Evidence(
     window=1.0,
     link=QUALITY,
     samples=SampleTimes(200, 0.006, 0, 1.0001),
-    company=OtherNodes(),
+    other_nodes=OtherNodes(),
     resets=0,
     identity=Identity("1.18.0", ATTITUDE_TARGET_CAPABILITY, "00ab"),
 )
@@ -155,7 +155,7 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
 
 
 @pytest.mark.parametrize(
-    ("company", "expected"),
+    ("other_nodes", "expected"),
     [
         (OtherNodes(sources=frozenset({(255, 190), (1, 154)})), {}),
         (OtherNodes(sources=frozenset({(1, 191)})), {Key.OUR_IDS: UNSAFE}),
@@ -167,8 +167,8 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
         (OtherNodes(echo=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )
-def test_others_on_the_link(company, expected):
-    assert found(link_checks.company, replace(GOOD, company=company)) == expected
+def test_others_on_the_link(other_nodes, expected):
+    assert found(link_checks.other_nodes, replace(GOOD, other_nodes=other_nodes)) == expected
 
 
 def test_rates_that_are_refused_cut_or_not_reached():
@@ -203,8 +203,8 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
     notice = "the vehicle signs its frames and we do not; set link.signing_key_file"
     evidence = replace(GOOD, link=QUALITY._replace(notices=(notice,)))
     (finding,) = link_checks.signing(CONFIG, evidence)
-    assert (finding.key, finding.verdict) == (Key.SIGNING, INEFFECTIVE)
-    assert finding.mend == "set link.signing_key_file"
+    assert (finding.key, finding.result) == (Key.SIGNING, INEFFECTIVE)
+    assert finding.fix == "set link.signing_key_file"
 
 
 @pytest.mark.parametrize(
@@ -242,8 +242,8 @@ def test_a_vehicle_without_a_position_yet_is_not_ready_and_nothing_else(readines
     evidence = without_position(readiness)
     findings = examine(CONFIG, evidence)
     assert amiss(findings) == {Key.READY: NOT_READY}
-    assert [finding.key for finding in forbidding(CONFIG, findings)] == [Key.READY]
-    assert result(CONFIG, findings) is NOT_READY
+    assert [finding.key for finding in blocking(CONFIG, findings)] == [Key.READY]
+    assert overall_result(CONFIG, findings) is NOT_READY
     fenced = changed(CONFIG, {"safety": {"fence_polygon_deg": SQUARE}}, "test")
     assert amiss(examine(fenced, evidence)) == {Key.READY: NOT_READY, Key.FENCE: NOT_READY}
 
@@ -265,9 +265,7 @@ def test_no_remedy_is_to_lower_a_safety_limit():
     slow = {name: StreamRate(50.0, 50.0, 1.0) for name in GOOD.streams}
     evidence = replace(GOOD, streams=slow)
     remedies = [
-        finding.mend
-        for finding in link_checks.streams(CONFIG, evidence)
-        if finding.verdict is UNSAFE
+        finding.fix for finding in link_checks.streams(CONFIG, evidence) if finding.result is UNSAFE
     ]
     assert len(remedies) == 2
     for remedy in remedies:
@@ -355,7 +353,7 @@ def test_what_other_versions_have_in_its_place_stands_for_it():
 def test_a_parameter_that_is_no_number_is_told_and_nothing_is_proposed():
     evidence = replace(GOOD, survey=GOOD.survey._replace(values={"COM_OF_LOSS_T": math.nan}))
     (finding,) = parameters(CONFIG, evidence)
-    assert (finding.verdict, finding.change) == (UNSAFE, None)
+    assert (finding.result, finding.change) == (UNSAFE, None)
     assert "COM_OF_LOSS_T is nan" in finding.sentence()
 
 
@@ -390,6 +388,6 @@ def test_an_exception_lets_one_finding_pass_and_no_other():
     evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.names))
     evidence = replace(evidence, link=QUALITY._replace(round_trip=0.5))
     accepting = changed(CONFIG, {"flight": {"accept": ("COM_OF_LOSS_T",)}}, "test")
-    refused = [finding.key for finding in forbidding(accepting, examine(accepting, evidence))]
+    refused = [finding.key for finding in blocking(accepting, examine(accepting, evidence))]
     assert refused == [Key.ROUND_TRIP]
-    assert len(forbidding(CONFIG, examine(CONFIG, evidence))) == 2
+    assert len(blocking(CONFIG, examine(CONFIG, evidence))) == 2

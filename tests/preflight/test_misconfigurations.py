@@ -11,13 +11,13 @@ import pytest
 from companion.config.files import changed
 from companion.mavlink import lockstep
 from companion.preflight.examination import examine
-from companion.preflight.gathering import gather
 from companion.preflight.parameter_survey import survey
-from companion.vehicle.parameter_rules import Verdict
-from tests.preflight.patients import FAMILIES, amiss, configured, met, shipped_vehicle
+from companion.preflight.session import gather
+from companion.vehicle.parameter_rules import CheckResult
+from tests.preflight.vehicles import FAMILIES, amiss, configured, met, shipped_vehicle
 
-UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
-NOT_READY = Verdict.NOT_READY
+UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
+NOT_READY = CheckResult.NOT_READY
 TO_US = {"direction": "to_companion"}
 
 PARAMETERS = {
@@ -119,7 +119,7 @@ def visit(request, tmp_path_factory):
 async def _visit(folder, mock):
     config = configured(folder, mock)
     async with met(config) as vehicle:
-        evidence = await vehicle.evidence(10.0)
+        evidence = await vehicle.gather(10.0)
         found = {"good": amiss(examine(config, evidence))}
         link = vehicle.link
         for name, value, _ in PARAMETERS[mock.autopilot]:

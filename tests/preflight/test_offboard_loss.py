@@ -10,11 +10,11 @@ from companion.flight.maneuvers import configured_maneuvers, unbegun
 from companion.preflight.finding import Key
 from companion.preflight.offboard_loss import offboard_loss
 from companion.preflight.parameter_survey import Survey
-from companion.vehicle.parameter_rules import Verdict
+from companion.vehicle.parameter_rules import CheckResult
 from tests.flight.fly import CONFIGS
 from tests.preflight.test_checks import ARDUPILOT, GOOD
 
-INEFFECTIVE, SAFE = Verdict.INEFFECTIVE, Verdict.SAFE
+INEFFECTIVE, SAFE = CheckResult.INEFFECTIVE, CheckResult.SAFE
 WIDE = {
     "limits": {"fence_radius_m": 200.0, "fence_ceiling_m": 100.0, "fence_floor_m": 0.1},
     "safety": {"fence_polygon_m": ()},
@@ -50,7 +50,7 @@ def flying(*changes):
 
 def test_a_circle_that_stays_inside_whatever_happens_is_safe_and_says_how_far():
     finding = judged(flying())
-    assert finding.verdict is SAFE
+    assert finding.result is SAFE
     assert "held for 1 s (COM_OF_LOSS_T), and can carry the vehicle 17 m away" in finding.found
 
 
@@ -65,19 +65,19 @@ def test_a_circle_that_stays_inside_whatever_happens_is_safe_and_says_how_far():
 )
 def test_each_side_of_the_fence_counts(change, words):
     finding = judged(flying(change))
-    assert finding.verdict is INEFFECTIVE
+    assert finding.result is INEFFECTIVE
     assert words in finding.because
-    assert finding.mend.startswith("set COM_OF_LOSS_T to 0.75, fly more slowly")
-    assert "widen" not in finding.mend
-    assert "raise" not in finding.mend
+    assert finding.fix.startswith("set COM_OF_LOSS_T to 0.75, fly more slowly")
+    assert "widen" not in finding.fix
+    assert "raise" not in finding.fix
 
 
 def test_what_is_advised_mends_it():
     tight = flying({"limits": {"fence_radius_m": 17.0}})
-    assert judged(tight).verdict is INEFFECTIVE
-    assert judged(tight, held=0.75).verdict is SAFE
-    assert judged(changed(tight, {"circle": {"speed_m_s": 3.0}}, "test")).verdict is SAFE
-    assert "set COM_OF_LOSS_T" not in judged(tight, held=0.6).mend
+    assert judged(tight).result is INEFFECTIVE
+    assert judged(tight, held=0.75).result is SAFE
+    assert judged(changed(tight, {"circle": {"speed_m_s": 3.0}}, "test")).result is SAFE
+    assert "set COM_OF_LOSS_T" not in judged(tight, held=0.6).fix
 
 
 def test_a_step_is_the_worst_moment_and_a_lower_rate_limit_mends_it():
@@ -85,19 +85,19 @@ def test_a_step_is_the_worst_moment_and_a_lower_rate_limit_mends_it():
     steps = flying({"flight": {"maneuvers": ("steps",), "takeoff_height_m": 5.0}})
     assert "below limits.fence_floor_m" in judged(steps).because
     slower = changed(steps, {"limits": {"max_tilt_rate_deg_s": 30.0}}, "test")
-    assert judged(slower).verdict is SAFE
+    assert judged(slower).result is SAFE
 
 
 def test_doublets_of_body_rates_are_weighed_too():
     identify = flying({"flight": {"maneuvers": ("identify",), "takeoff_height_m": 5.0}})
-    assert judged(identify).verdict is INEFFECTIVE
-    assert judged(identify, held=0.75).verdict is SAFE
+    assert judged(identify).result is INEFFECTIVE
+    assert judged(identify, held=0.75).result is SAFE
 
 
 def test_an_autopilot_that_does_not_hold_drifts_farther():
-    assert judged(flying(NARROW)).verdict is SAFE
+    assert judged(flying(NARROW)).result is SAFE
     finding = judged(flying({"guidance": {"drag_per_s": 0.36}, **NARROW}), autopilot=ARDUPILOT)
-    assert finding.verdict is INEFFECTIVE
+    assert finding.result is INEFFECTIVE
     assert "beyond limits.fence_radius_m" in finding.because
 
 
@@ -126,6 +126,6 @@ def test_the_shipped_configurations_are_clean(name):
     """The bundled vehicles hold the last rates for 0.75 s, as advised; real ones for 1 s."""
     autopilot = ARDUPILOT if "ardupilot" in name else GOOD.autopilot
     held = 0.75 if "mock" in name else 1.0
-    assert judged(load(CONFIGS / f"{name}.yaml"), held, autopilot).verdict is SAFE
+    assert judged(load(CONFIGS / f"{name}.yaml"), held, autopilot).result is SAFE
     if "mock" in name:
-        assert judged(load(CONFIGS / f"{name}.yaml"), 1.0, autopilot).verdict is INEFFECTIVE
+        assert judged(load(CONFIGS / f"{name}.yaml"), 1.0, autopilot).result is INEFFECTIVE

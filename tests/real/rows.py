@@ -16,7 +16,7 @@ FROZEN_GUIDANCE = """
 from companion.control.guidance_loop import GuidanceLoop
 flown = GuidanceLoop.step
 def freezing(guide):
-    if guide.begun_at is None or guide._clock() < guide.begun_at + 5.0:
+    if guide.flown.begun_at is None or guide._clock() < guide.flown.begun_at + 5.0:
         flown(guide)
 GuidanceLoop.step = freezing
 """

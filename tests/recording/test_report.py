@@ -24,12 +24,13 @@ AS_CONFIGURED = DeadTimes(
 )
 
 
-def table(trace, dead_times=AS_CONFIGURED):
+COUNTS = LoopCounts(7, 6, 1)
+
+
+def table(trace, dead_times=AS_CONFIGURED, counts=COUNTS):
     """The rows of the table as a user sees them, without its lines."""
     trace.add_rates(1.0, 2.0, BodyRates(0.1, 0.2, 0.3), 0.5, BodyRates(0.0, 0.0, 0.0), 0.003)
-    summary = Summary(
-        "ok", "disarm", "exact", 5.0, LoopCounts(7, 6, 1), {}, trace, dead_times=dead_times
-    )
+    summary = Summary("ok", "disarm", "exact", 5.0, counts, {}, trace, dead_times=dead_times)
     out = io.StringIO()
     Console(file=out, width=80).print(flight_table(summary))
     assert max(len(line) for line in out.getvalue().splitlines()) <= 80
@@ -54,6 +55,13 @@ def test_straightness_and_the_nearest_second_order_stand_in_it():
     assert cells(lines, "dead time")[0] == f"{1e3 * model.dead_time:.0f} ms"
     deviation = cells(lines, "largest deviation from it")[0]
     assert float(deviation) == pytest.approx(response.second_order_deviation_max, abs=1e-4)
+
+
+def test_the_reasons_of_unanswered_samples_stand_below_it():
+    unanswered = {"late": 2, "not_newer": 0, "awaiting_mode": 1}
+    lines = table(FlightTrace(), counts=LoopCounts(9, 6, 1, 3, unanswered=unanswered))
+    assert "unanswered samples: 2 late, 1 awaiting mode" in lines
+    assert not any("unanswered" in line for line in table(FlightTrace()))
 
 
 def test_dead_times_stand_beside_what_was_configured():

@@ -5,8 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from companion.recording.response import measure_response
-from companion.recording.second_order import nearest_second_order
-from companion.recording.step_run import StepRun, step_runs
+from companion.recording.second_order import StepRun, nearest_second_order, step_runs
 from tests.attitude.independent import attitudes
 
 STILL = ((0.0, 0.0), (0.0, 0.0))

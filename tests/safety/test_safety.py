@@ -6,13 +6,12 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
-from companion.control.unanswered import Unanswered
-from companion.flight.snapshot_builder import SnapshotBuilder
+from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
-from companion.vehicle.held_rates import HeldRates
+from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import Battery, Estimator, Gps
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
@@ -86,7 +85,7 @@ BREACHES = [
     ("silence", unanswered(Unanswered.OLD_TARGET), HAND_BACK, 0.0, "guidance makes no"),
     ("silence", unanswered(Unanswered.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
     ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
-    ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot leave"),
+    ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot be sent"),
     ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
     ("disarmed", autopilot(armed=False), RELEASE, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
@@ -148,7 +147,7 @@ def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     state = SimpleNamespace(reset_counter=None, positions=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)
-    loop = SimpleNamespace(resets=resets, setpoints=0, missed_deadlines=0, held=HeldRates())
+    loop = SimpleNamespace(resets=resets, record=LoopRecord())
     snapshot_builder = SnapshotBuilder(link, loop, None, real_time=True)
     for now in (0.0, 0.02, 0.05, 0.48, 0.5):
         snapshot_builder.listen(now)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from companion.vehicle.clock import Misfit, VehicleClock
+from companion.vehicle.clock import VehicleClock
+from companion.vehicle.clock_jumps import Misfit
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 STALE = 0.1

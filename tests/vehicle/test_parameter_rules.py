@@ -5,12 +5,12 @@ from math import inf, nan, radians
 import pytest
 
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from companion.vehicle.parameter_rules import Setup, Verdict, judge
+from companion.vehicle.parameter_rules import CheckResult, CompanionSettings, judge
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from companion.vehicle.registry import AUTOPILOTS
 
-UNSAFE, INEFFECTIVE = Verdict.UNSAFE, Verdict.INEFFECTIVE
-PX4_SETUP = Setup(
+UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
+PX4_SETUP = CompanionSettings(
     source_system=1,
     attitude_rate_hz=250.0,
     silence_limit=0.5,
@@ -94,7 +94,7 @@ def complaints(autopilot, changes=None, **setup):
     """What is found amiss after `changes` of a good vehicle's values, and of our setup."""
     rules, good, ours = autopilot
     findings = judge(rules, good | (changes or {}), ours._replace(**setup))
-    return [finding for finding in findings if finding.verdict is not Verdict.SAFE]
+    return [finding for finding in findings if finding.result is not CheckResult.SAFE]
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
@@ -102,7 +102,7 @@ def test_a_good_vehicle_is_found_good_by_every_rule(autopilot):
     rules, good, ours = autopilot
     findings = judge(rules, good, ours)
     assert [finding.rule.name for finding in findings] == [rule.name for rule in rules]
-    assert {finding.verdict for finding in findings} == {Verdict.SAFE}
+    assert {finding.result for finding in findings} == {CheckResult.SAFE}
 
 
 MISTAKES = [
@@ -160,7 +160,7 @@ def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
 ):
     (found,) = complaints(autopilot, changes)
     assert found.rule.name in changes
-    assert (found.verdict, found.set_to, found.value) == (verdict, set_to, changes[found.rule.name])
+    assert (found.result, found.set_to, found.value) == (verdict, set_to, changes[found.rule.name])
     assert found.because
     if set_to is not None:
         assert not complaints(autopilot, changes | {found.rule.name: set_to})
@@ -199,7 +199,7 @@ def test_what_the_autopilot_has_not_is_left_out():
 def test_what_is_no_number_is_unsafe_whatever_the_rule(autopilot, value):
     for rule in autopilot[0]:
         (found,) = (f for f in complaints(autopilot, {rule.name: value}) if f.rule is rule)
-        assert (found.verdict, found.set_to) == (UNSAFE, None)
+        assert (found.result, found.set_to) == (UNSAFE, None)
         assert found.because
 
 
@@ -210,14 +210,14 @@ def test_what_is_no_number_tells_other_rules_nothing():
 
 
 @pytest.mark.parametrize("unread", [{"FD_FAIL_R"}, {"FD_FAIL_P"}, {"FD_FAIL_R", "FD_FAIL_P"}])
-@pytest.mark.parametrize(("termination", "verdict"), [(0.0, UNSAFE), (121212.0, Verdict.SAFE)])
+@pytest.mark.parametrize(("termination", "verdict"), [(0.0, UNSAFE), (121212.0, CheckResult.SAFE)])
 def test_motors_that_may_stop_at_a_tilt_that_was_not_told_are_not_safe(
     unread, termination, verdict
 ):
     values = {name: v for name, v in GOOD_PX4.items() if name not in unread}
     findings = judge(PX4_PARAMETERS, values | {"CBRK_FLIGHTTERM": termination}, PX4_SETUP)
     (found,) = (finding for finding in findings if finding.rule.name == "CBRK_FLIGHTTERM")
-    assert found.verdict is verdict
+    assert found.result is verdict
 
 
 def test_every_rule_that_can_be_unsafe_is_missed_where_it_is_not_told():

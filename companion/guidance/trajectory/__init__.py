@@ -1,10 +1,9 @@
 """What can be followed: curves in space with a time law, sampled up to the jerk."""
 
-from companion.guidance.trajectory.computable import computable
 from companion.guidance.trajectory.csv_file import Table
 from companion.guidance.trajectory.csv_file import read as read_csv
 from companion.guidance.trajectory.demand import Motion
-from companion.guidance.trajectory.facing import turned_first
+from companion.guidance.trajectory.derived import Slowed, turned_first
 from companion.guidance.trajectory.feasibility import (
     Envelope,
     Violation,
@@ -20,6 +19,7 @@ from companion.guidance.trajectory.figures import (
     gerono_eight,
     helix,
     line,
+    steady_circle,
 )
 from companion.guidance.trajectory.from_samples import (
     Frame,
@@ -27,7 +27,6 @@ from companion.guidance.trajectory.from_samples import (
     SampleOptions,
     from_samples,
 )
-from companion.guidance.trajectory.retimed import Slowed
 from companion.guidance.trajectory.sample import (
     FARTHEST,
     FASTEST,
@@ -36,6 +35,7 @@ from companion.guidance.trajectory.sample import (
     Trajectory,
     TrajectoryError,
     Vector,
+    computable,
 )
 from companion.guidance.trajectory.waypoints import waypoints
 
@@ -67,6 +67,7 @@ __all__ = [
     "line",
     "read_csv",
     "slow_down",
+    "steady_circle",
     "turned_first",
     "violations",
     "waypoints",

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.computable import computable
 from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
-from companion.guidance.trajectory.retimed import Slowed
-from companion.guidance.trajectory.sample import Trajectory, TrajectoryError
+from companion.guidance.trajectory.derived import Slowed
+from companion.guidance.trajectory.sample import Trajectory, TrajectoryError, computable
 
 _ROUNDING = 1e-9
 """Share of a limit by which it may be missed: the fastest place may be meant to lie on it."""

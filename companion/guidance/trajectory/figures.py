@@ -12,12 +12,15 @@ from companion.guidance.trajectory.curves import (
     Turned,
 )
 from companion.guidance.trajectory.sample import LEAST_WAY, Sample, TrajectoryError, Vector
-from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJerk
+from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJerk, cosine_ramp
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LARGEST_RAMP = 0.5
 """Of the time that the whole way takes at the steady rate. A ramp then takes a quarter of the way
 at most, and the fastest place of a single lap of any figure here lies between the two."""
+
+_RAMP_ACCELERATION = 1.0
+"""Mean acceleration on a ramp of `steady_circle`, m/s²."""
 
 _REST = (0.0, 0.0, 0.0)
 
@@ -101,6 +104,23 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
         TrajectoryError: the radius, the speed, the laps or the acceleration is not positive.
     """
     return _rounds("circle", radius, Helix(radius), laps, TangentHeading(pi / 2.0, -1.0))
+
+
+def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
+    """Laps of a circle whose centre lies north of the start, set off eastwards, heading held.
+
+    The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s².
+
+    Args:
+        radius: m.
+        speed: between the ramps, m/s.
+        laps: how often round, with the ramps.
+        longest: it is refused if it lasts longer than this, s.
+    """
+    length = tau * radius * laps
+    ramp = min(speed / _RAMP_ACCELERATION, length / speed)
+    law = Cruise(tau * laps, speed / radius, ramp, ramp, cosine_ramp)
+    return TimedCurve("circle", Helix(radius), law, HeldHeading(), longest)
 
 
 def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from companion.guidance.trajectory.check_times import require_duration
 from companion.guidance.trajectory.csv_file import Table
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats, SepticSpline
@@ -18,7 +17,12 @@ from companion.guidance.trajectory.spline_curve import (
     tangent_heading,
 )
 from companion.guidance.trajectory.time_laws import STEEPEST, Cruise
-from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
+from companion.guidance.trajectory.timed_curve import (
+    Heading,
+    HeldHeading,
+    TimedCurve,
+    require_duration,
+)
 
 _AT_REST = 0.1
 """Samples that begin or end slower than this are meant to be at rest there, m/s."""
@@ -130,11 +134,11 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
     resting = speeds[0] < _AT_REST, speeds[1] < _AT_REST
     spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
-    ramps = [
+    gathering, losing = [
         0.0 if rests else min(STEEPEST * speed / options.acceleration, _LARGEST_RAMP * spline.end)
         for rests, speed in zip(resting, speeds, strict=True)
     ]
-    law = Cruise(spline.end, 1.0, *ramps)
+    law = Cruise(spline.end, 1.0, gathering, losing)
     heading = _heading(spline, table, options, resting)
     step = inf if isinstance(heading, HeldHeading) else HEADING_LOOKS
     return TimedCurve(name, SplineCurve(spline, _LOOKS, step), law, heading)

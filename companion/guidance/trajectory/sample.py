@@ -1,7 +1,10 @@
 """The words of the trajectory room. World NED, SI units, radians; plain floats."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NamedTuple, Protocol
+
+import numpy as np
 
 Vector = tuple[float, float, float]
 """(north, east, down)."""
@@ -74,3 +77,21 @@ class Trajectory(Protocol):
             TrajectoryError: it is too long to be judged.
         """
         ...
+
+
+@contextmanager
+def computable() -> Iterator[None]:
+    """Turn what overflows, or determines nothing, into an error for the user.
+
+    The ranges of files exclude what is known to; this is for what nobody thought of.
+
+    Raises:
+        TrajectoryError: an overflow, a division by zero, equations without a solution.
+    """
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            yield
+    except (ArithmeticError, np.linalg.LinAlgError) as error:
+        raise TrajectoryError(
+            "its numbers cannot be computed with: they are too large, too small or too far apart"
+        ) from error

@@ -1,8 +1,8 @@
 """Time laws: how far along a curve, and how fast, at which time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import cos, pi, sin, sqrt
 from typing import NamedTuple, Protocol
 
 from companion.guidance.trajectory.sample import TrajectoryError
@@ -55,23 +55,55 @@ class TimeLaw(Protocol):
         ...
 
 
+Ramp = Callable[[float, float, float], Progress]
+"""A rate that rises from 0 to a steady one: (steady rate per s, duration in s, time in s)."""
+
+
+def septic_ramp(rate: float, duration: float, time: float) -> Progress:
+    """A rate that rises as 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷, u = time/duration: snap is continuous."""
+    u = time / duration
+    v = 1.0 - u
+    u3 = u * u * u
+    return Progress(
+        rate * duration * u3 * u * u * (7.0 + u * (-14.0 + u * (10.0 - 2.5 * u))),
+        rate * u3 * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
+        rate / duration * 140.0 * u3 * v * v * v,
+        rate / (duration * duration) * 420.0 * u * u * v * v * (1.0 - 2.0 * u),
+    )
+
+
+def cosine_ramp(rate: float, duration: float, time: float) -> Progress:
+    """A rate that rises as a raised cosine: the jerk jumps where the ramp begins and ends."""
+    turn = pi / duration
+    phase = turn * time
+    return Progress(
+        0.5 * rate * (time - sin(phase) / turn),
+        0.5 * rate * (1.0 - cos(phase)),
+        0.5 * rate * turn * sin(phase),
+        0.5 * rate * turn * turn * cos(phase),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Cruise:
-    """A steady rate, gathered and lost by the septic blend: snap is still continuous.
+    """A steady rate with a ramp at each end.
 
     With both ramps 0 the rate is there at once, which is for curves that rest at their ends.
 
     Attributes:
         length: of the whole phase.
         rate: steady, per s.
-        gathering: how long the rate is gathered, s.
-        losing: how long it is lost, s.
+        gathering: how long the rate rises, s.
+        losing: how long the rate falls, s.
+        ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in
+            s) → progress. The mean rate of a ramp is half the steady rate.
     """
 
     length: float
     rate: float
     gathering: float = 0.0
     losing: float = 0.0
+    ramp: Ramp = septic_ramp
 
     @property
     def duration(self) -> float:
@@ -95,24 +127,11 @@ class Cruise:
         if left < 0.0:
             return Progress(self.length)
         if time < self.gathering:
-            return _ramp(self.rate, self.gathering, time)
+            return self.ramp(self.rate, self.gathering, time)
         if left < self.losing:
-            phase, first, second, third = _ramp(self.rate, self.losing, left)
+            phase, first, second, third = self.ramp(self.rate, self.losing, left)
             return Progress(self.length - phase, first, -second, third)
         return Progress(self.rate * (time - 0.5 * self.gathering), self.rate)
-
-
-def _ramp(rate: float, duration: float, time: float) -> Progress:
-    """A rate gathered as 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷ of itself, u = time/duration."""
-    u = time / duration
-    v = 1.0 - u
-    u3 = u * u * u
-    return Progress(
-        rate * duration * u3 * u * u * (7.0 + u * (-14.0 + u * (10.0 - 2.5 * u))),
-        rate * u3 * u * (35.0 + u * (-84.0 + u * (70.0 - 20.0 * u))),
-        rate / duration * 140.0 * u3 * v * v * v,
-        rate / (duration * duration) * 420.0 * u * u * v * v * (1.0 - 2.0 * u),
-    )
 
 
 _CRUISING = 3

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.guidance.trajectory.check_times import require_duration
 from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
 from companion.guidance.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
@@ -16,7 +15,12 @@ from companion.guidance.trajectory.spline_curve import (
     tangent_heading,
 )
 from companion.guidance.trajectory.time_laws import Cruise
-from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
+from companion.guidance.trajectory.timed_curve import (
+    Heading,
+    HeldHeading,
+    TimedCurve,
+    require_duration,
+)
 
 _LOOKS = 200
 """In each segment, for its largest speed and acceleration."""

@@ -79,9 +79,7 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
     _draw_errors(panels["example errors"], example.wrong)
-    panels["example errors"].set_title(
-        f"Wrong knowledge, the case in full, {EXAMPLE_ERRORS_HZ:.0f} Hz"
-    )
+    panels["example errors"].set_title(f"Wrong times, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz")
     _draw_inner_loop_errors(panels["loop errors"], complete)
     _draw_paths(panels["loop path"], complete.shown)
     panels["loop path"].set_title(f"Path, complete inner loop, {COMPLETE_HZ:.0f} Hz")
@@ -153,7 +151,7 @@ def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
         across = [scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
         line = {"color": FOLLOWING.colour, "linewidth": 1.3, **look}
         axes.plot(errors, across, label=f"lag {in_percent(lag)}", **line)
-    axes.set(xlabel="error of the believed dead time, %", ylabel=_ACROSS, ylim=(0.0, None))
+    axes.set(xlabel="error of the assumed dead time, %", ylabel=_ACROSS, ylim=(0.0, None))
     axes.legend(ncols=2)
 
 
@@ -165,7 +163,7 @@ def _draw_inner_loop_errors(axes: Axes, complete: Complete) -> None:
     axes.axhline(across, **LIMIT)
     axes.annotate(f"{other.label}, the best of the others", (50, across), ha="right", va="bottom")
     axes.set(
-        title=f"Wrong knowledge, complete inner loop, {COMPLETE_HZ:.0f} Hz",
+        title=f"Wrong times, complete inner loop, {COMPLETE_HZ:.0f} Hz",
         ylim=(0.0, 1.1 * max(across, flown.worst)),
     )
 

@@ -47,14 +47,14 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
     bent = max(score(response).cross_track for response in example.limited.values())
     return (
         Finding(
-            "asked",
+            "ours",
             "Behind dead time and lag the proposed method keeps closest to the straight line.",
             across[PROPOSED] <= across[best],
             f"Cross-track at 100 Hz: first-order {across[PROPOSED]:.2g}, {best.label}"
             f" {across[best]:.2g}.",
         ),
         Finding(
-            "asked",
+            "ours",
             "There model-following is the straightest, even with lag and dead time wrong by up to"
             " 50 %.",
             worst < across[best],
@@ -62,7 +62,7 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
             f" wrong ones; the best of the others has {across[best]:.2g}.",
         ),
         Finding(
-            "asked",
+            "ours",
             "model-following keeps the limit of the tilt rate.",
             rate <= MAX_TILT_RATE * (1.0 + _ROUNDING),
             f"With W_M = {MAX_TILT_RATE:.3f} rad/s it commands at most {rate:.3f} rad/s,"
@@ -79,7 +79,7 @@ def _over_the_grid(grid: Grid) -> Finding:
     closest = max(grid, key=ratio)
     bent = max(place.right[FOLLOWING].cross_track for place in grid.values())
     return Finding(
-        "asked",
+        "ours",
         "With the right times model-following is the straightest at every dead time, lag and"
         " sample rate.",
         ratio(closest) < 1.0,
@@ -94,7 +94,7 @@ def _wrong_over_the_grid(grid: Grid) -> Finding:
     worse = [cell for cell, at in grid.items() if at.ratio >= 1.0]
     where = f", from {min(cell.dead_time_ms for cell in worse)} ms of dead time on" if worse else ""
     return Finding(
-        "asked",
+        "ours",
         "It still is with lag and dead time wrong by ±50 %, in every combination.",
         not worse,
         f"Worse than the best other method in {len(worse)} of {len(grid)} cells{where}. The largest"
@@ -115,7 +115,7 @@ def _rather_too_long(grid: Grid, complete: Complete) -> Finding:
     straighter = sum(one.cross_track < other.cross_track for one, other in pairs)
     loop = complete.by_rate[COMPLETE_HZ].wrong
     return Finding(
-        "asked",
+        "ours",
         "Both times 50 % too long are better than both 50 % too short.",
         too_long < too_short and loop[long].cross_track < loop[short].cross_track,
         f"Largest cross-track {too_long:.2g} against {too_short:.2g}, with the complete inner loop"
@@ -134,7 +134,7 @@ def _with_the_complete_loop(
     at = by_rate[last]
     return (
         Finding(
-            "asked",
+            "ours",
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
@@ -145,14 +145,14 @@ def _with_the_complete_loop(
             f" {bent[PROPOSED]:.2g}, quaternion {bent[QUATERNION]:.2g}.",
         ),
         Finding(
-            "asked",
+            "ours",
             "It still is with the fitted times wrong by up to ±50 %.",
             at.ratio < 1.0,
             f"The largest ratio is at {last:.0f} Hz, with {at.worst_error}: {at.worst:.2g} against"
             f" {at.right[at.best_other].cross_track:.2g} of {at.best_other.label}.",
         ),
         Finding(
-            "asked",
+            "ours",
             "Its response is the nearest to second order with dead time.",
             from_fit[FOLLOWING] < from_fit[nearest],
             f"It stays within {from_fit[FOLLOWING]:.2g} of the fitted model; {nearest.label}, the"

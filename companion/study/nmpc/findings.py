@@ -30,7 +30,7 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
     """All findings."""
     return (
         _solved_faster("paper", ("euler", "quaternion"), flown),
-        _solved_faster("asked", ("euler-reduced",), flown),
+        _solved_faster("ours", ("euler-reduced",), flown),
         _from_cold(counts),
         _settles("limited", flown),
         _settles("proposed", flown),
@@ -70,7 +70,7 @@ def _from_cold(counts: ColdStarts) -> Finding:
     others = max(reached[model] for model in UNLIMITED)
     reaching = ", ".join(f"{LOOKS[model].label} {reached[model]}" for model in MODELS)
     return Finding(
-        "asked",
+        "ours",
         "With limits as constraints the solver converges from more states.",
         reached["limited"] > others,
         f"States out of {len(STATES)} from which it reaches the tolerance: {reaching}.",
@@ -81,7 +81,7 @@ def _settles(model: ModelName, flown: Flights) -> Finding:
     flight = flown[CIRCLE.name, Variant(model)]
     last = max(flight.errors[-_LAST:])
     return Finding(
-        "asked",
+        "ours",
         f"From a standing start, {LOOKS[model].label} settles on the circle within 4 s.",
         last < _SETTLED_M,
         f"The error is {max(flight.errors):.2g} m at most, and {last:.2g} m in the last 2 s of 6 s"
@@ -96,7 +96,7 @@ def _smallest_error(flown: Flights) -> Finding:
         other = min((errors[model], LOOKS[model].label) for model in UNLIMITED)
         compared.append((task.name, errors["limited"], *other))
     return Finding(
-        "asked",
+        "ours",
         "If all models know the dead time, ours has the smallest error on both trajectories.",
         all(ours < theirs for _, ours, theirs, _ in compared),
         "; ".join(
@@ -116,7 +116,7 @@ def _dead_time(flown: Flights) -> Finding:
     }
     ratios = ", ".join(f"{LOOKS[model].label} {gain:.2g} ×" for model, gain in gains.items())
     return Finding(
-        "asked",
+        "ours",
         "Predicting past the dead time helps every model.",
         min(gains.values()) > 1.0,
         f"Error on the figure-eight without it, divided by the error with it: {ratios}.",
@@ -126,7 +126,7 @@ def _dead_time(flown: Flights) -> Finding:
 def _in_time(times: ProcessTimes) -> Finding:
     p99 = float(np.percentile(times.answer_ms, 99))
     return Finding(
-        "asked",
+        "ours",
         f"The solver process answers within {_MAX_ANSWER_MS:.0f} ms at 50 Hz.",
         p99 < _MAX_ANSWER_MS and times.troubles == 0,
         f"p99 of the answer time, data exchange included, {p99:.2g} ms; {times.troubles} of"

@@ -174,9 +174,9 @@ Flights = dict[tuple[str, Variant], Flight]
 
 
 def fly_all(tick: Tick) -> Flights:
-    """Fly all variants, one period of each in turn, so that disturbances of the machine hit all.
+    """Fly all variants, one period of each in turn.
 
-    The order rotates with every period.
+    A disturbance of the machine then hits all of them. The order rotates with every period.
     """
     flown = _all_flights()
     turns = list(flown.values())

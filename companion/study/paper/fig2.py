@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Quaternion, Target, body_error
-from companion.attitude.constants import Constants
+from companion.attitude.limits import Constants
 from companion.attitude.planner import LawPlanner
 from companion.study.drawing import (
     draw,
@@ -177,7 +177,7 @@ def _findings(
             + ". The error must be taken in the body frame, q⁻¹ ⊗ q_d.",
         ),
         Finding(
-            "asked",
+            "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
             heading_effect(printed) < _SAME,

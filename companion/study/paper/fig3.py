@@ -48,7 +48,7 @@ def run(tick: Tick) -> Outcome:
         ),
         findings=(
             Finding(
-                "asked",
+                "ours",
                 "The Euler-angle method is much better at some headings than at others.",
                 bool(away[best] < 0.5 * away[worst]),
                 f"Largest deviation {away[best]:.2g} at the best heading, {at[best]}°, and"
@@ -74,7 +74,7 @@ def _figure(response: Response, reference: Floats) -> Figure:
     draw_reference(north, east, time, reference)
     label_response(north, east)
     plane.set(
-        title="Paths (a straight line at $a_E$ = −0.5 is asked)", xlabel="$a_E$", ylabel="$a_N$"
+        title="Paths (ideal: a straight line at $a_E$ = −0.5)", xlabel="$a_E$", ylabel="$a_N$"
     )
     largest = largest_deviation(response, reference)
     away.scatter(headings, largest, c=colours, s=14, zorder=3)

@@ -124,7 +124,7 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
             f" follows the limited first-order reference within {away:.2g}.",
         ),
         Finding(
-            "asked",
+            "ours",
             "That limit makes full use of W_M.",
             rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
             f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of W_M and takes"
@@ -133,7 +133,7 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
             f" along the same straight line (cross-track {across[PROPOSED]:.2g}).",
         ),
         Finding(
-            "asked",
+            "ours",
             "Under the limit the proposed method is the quickest.",
             min(arrived, key=lambda method: arrived[method]) in (PROPOSED, PAPER_LIMIT),
             f"so3 takes {arrived[SO3]:.3f} s, the quaternion method {arrived[QUATERNION]:.3f} s,"

@@ -166,12 +166,12 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
     ahead = [t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)]
     return (
         _straightest("paper", "quick", quick),
-        _straightest("asked", "as slow as measured", measured),
+        _straightest("ours", "as slow as measured", measured),
         Finding(
-            "asked",
+            "ours",
             "The proposed method is the straightest with every inner loop.",
             len(ahead) == len(sweep),
-            "At heading 0 it is with loops of "
+            "At heading 0 it is the straightest with loops of "
             + (", ".join(f"{1e3 * t:.0f}" for t in ahead) or "no")
             + " ms (63 % of a rate step). Its cross-track is "
             + ", ".join(f"{across[PROPOSED]:.2g}" for across in sweep.values())
@@ -180,7 +180,7 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
             + " ms.",
         ),
         Finding(
-            "asked",
+            "ours",
             "Heading does not change the response with a complete inner loop either.",
             max(heading_effect(measured.responses[m]) for m in (PROPOSED, QUATERNION, SO3)) < 1e-3,
             "Largest difference of the paths between any two headings, measured inner loop: "
@@ -188,7 +188,7 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
             + " (required: 0.001).",
         ),
         _second_order("paper", "quick", quick),
-        _second_order("asked", "as slow as measured", measured),
+        _second_order("ours", "as slow as measured", measured),
     )
 
 

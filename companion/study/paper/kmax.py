@@ -20,6 +20,9 @@ _LIMIT = radians(60.0)
 _DIRECTIONS = 72
 PARTS = 2
 
+_Row = tuple[int, float, float, float, float]
+"""Tilt in degrees, largest K, its bound, smallest K, mean body rate over the largest."""
+
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
     """K = (ω_x² + ω_y²)/(ė_N² + ė_E²) when the coefficients move towards `direction` (rad)."""
@@ -41,7 +44,7 @@ def run(tick: Tick) -> Outcome:
         for tilt in TILTS
     }
     tick("disc")
-    rows = tuple(
+    rows: tuple[_Row, ...] = tuple(
         (
             round(degrees(tilt)),
             float(k.max()),
@@ -51,8 +54,6 @@ def run(tick: Tick) -> Outcome:
         )
         for tilt, k in by_tilt.items()
     )
-    computed = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
-    share = {row[0]: row[4] for row in rows}
     return Outcome(
         name="kmax",
         title="Appendix A: the scaling factor K over the tilt disc",
@@ -79,22 +80,28 @@ def run(tick: Tick) -> Outcome:
                 rows,
             ),
         ),
-        findings=(
-            Finding(
-                "paper",
-                "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
-                all(abs(computed[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
-                and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
-                "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed.items()) + ".",
-            ),
-            Finding(
-                "asked",
-                "A movement in any direction needs K_max.",
-                min(row[3] / row[1] for row in rows) > 0.99,
-                f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
-                f" depending on direction. The mean body rate is {100.0 * share[40]:.0f} % of the"
-                f" largest at 40° of tilt and {100.0 * share[60]:.0f} % at 60°.",
-            ),
+        findings=_findings(rows, by_tilt),
+    )
+
+
+def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Finding, ...]:
+    computed = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
+    share = {row[0]: row[4] for row in rows}
+    return (
+        Finding(
+            "paper",
+            "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
+            all(abs(computed[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
+            and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
+            "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed.items()) + ".",
+        ),
+        Finding(
+            "ours",
+            "A movement in any direction needs K_max.",
+            min(row[3] / row[1] for row in rows) > 0.99,
+            f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
+            f" depending on direction. The mean body rate is {100.0 * share[40]:.0f} % of the"
+            f" largest at 40° of tilt and {100.0 * share[60]:.0f} % at 60°.",
         ),
     )
 

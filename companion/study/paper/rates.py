@@ -38,8 +38,6 @@ def run(tick: Tick) -> Outcome:
         )
         for hz in RATES_HZ
     )
-    slowest, quickest = min(RATES_HZ), max(RATES_HZ)
-    largest = max(worst[EXACT, hz] for hz in RATES_HZ)
     return Outcome(
         name="rates",
         title="Sample rates: the discretisation error, and the planner without it",
@@ -63,17 +61,20 @@ def run(tick: Tick) -> Outcome:
                 rows,
             ),
         ),
-        findings=(
-            Finding(
-                "paper",
-                "The deviation of the proposed method comes from discretisation.",
-                worst[PROPOSED, slowest] > 10.0 * worst[PROPOSED, quickest]
-                and largest <= _ROUNDING,
-                f"It grows from {worst[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
-                f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With `exact`, which solves"
-                f" each sample in closed form, it is at most {largest:.1g} at every rate.",
-            ),
-        ),
+        findings=(_finding(worst),),
+    )
+
+
+def _finding(worst: dict[tuple[Method, float], float]) -> Finding:
+    slowest, quickest = min(RATES_HZ), max(RATES_HZ)
+    largest = max(worst[EXACT, hz] for hz in RATES_HZ)
+    return Finding(
+        "paper",
+        "The deviation of the proposed method comes from discretisation.",
+        worst[PROPOSED, slowest] > 10.0 * worst[PROPOSED, quickest] and largest <= _ROUNDING,
+        f"It grows from {worst[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
+        f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With `exact`, which solves"
+        f" each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
 
 

@@ -62,7 +62,7 @@ def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
     draw(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
     not_led_line = {"color": _NOT_LED_COLOUR, "linewidth": 1.0}
     draw(axes, not_led.path[:, 3], not_led.path[:, 2], not_led_line, "not led")
-    draw(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "asked for")
+    draw(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "reference")
     axes.set(title=f"Path: {course}", xlabel="east, m", ylabel="north, m", aspect="equal")
 
 

@@ -72,7 +72,7 @@ def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
         for course in beaten
     )
     return Finding(
-        "asked",
+        "ours",
         statement,
         not beaten,
         f"Smaller than all others by more than {1e3 * _EQUAL:g} mm on {len(ahead)} of"
@@ -90,7 +90,7 @@ def _in_wind(flown: Flown) -> Finding:
         for course in COURSES
     }
     return Finding(
-        "asked",
+        "ours",
         f"In {WINDY:g} m/s of wind model-following has a smaller error than first-order.",
         all(following < first for following, first in pairs.values()),
         "; ".join(
@@ -107,7 +107,7 @@ def _lead(flown: Flown, wind: float) -> Finding:
         task = Task(course, MODEL_FOLLOWING, LINEAR, wind)
         times[course] = _by_telemetry(flown[task._replace(lead=False)]) / _by_telemetry(flown[task])
     return Finding(
-        "asked",
+        "ours",
         f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'} the error without lead is"
         f" at least {_REQUIRED_RATIO:g} times the error with lead.",
         all(ratio >= _REQUIRED_RATIO for ratio in times.values()),
@@ -117,12 +117,14 @@ def _lead(flown: Flown, wind: float) -> Finding:
 
 def _small_enough(flown: Flown) -> Finding:
     found = {task: _by_telemetry(flown[task]) for task in _REQUIRED}
-    told = (f"{task}: {_in_mm(found[task])} of {_in_mm(most)}" for task, most in _REQUIRED.items())
+    errors = (
+        f"{task}: {_in_mm(found[task])} of {_in_mm(most)}" for task, most in _REQUIRED.items()
+    )
     return Finding(
-        "asked",
+        "ours",
         "model-following with linear guidance has an error as small as required.",
         all(found[task] <= most for task, most in _REQUIRED.items()),
-        "; ".join(told) + ".",
+        "; ".join(errors) + ".",
     )
 
 

@@ -187,8 +187,8 @@ async def _never() -> bool:
 class TruthRecorder(Silent):
     """Asks the vehicle's control channel for its true position during the measured phase.
 
-    In lockstep the vehicle stands still until its sample is answered. So a request may block our
-    event loop, and its answer belongs to the present vehicle time.
+    In lockstep vehicle time stops until its sample is answered. So a request may block our event
+    loop, and its answer belongs to the present vehicle time.
 
     Args:
         port: of the control channel, on this machine.

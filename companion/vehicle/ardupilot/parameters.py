@@ -20,7 +20,7 @@ from companion.vehicle.parameter_checks import (
     required,
     thrust_curve,
 )
-from companion.vehicle.parameter_rules import Complaint, ParameterRule, Setup, Values
+from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
 
 _REFERENCE = "ArduCopter parameter reference"
 _MEASURED = "measured on ArduCopter 4.7, 2025"
@@ -29,16 +29,16 @@ _THRUST_AS_THRUST = 8
 _CENTI = 0.01
 
 
-def _angle_boost(value: float, _: Values, setup: Setup) -> Complaint | None:
-    if value and not setup.tilt_compensated:
-        return Complaint(
+def _angle_boost(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+    if value and not settings.tilt_compensated:
+        return Problem(
             UNSAFE,
             "ArduPilot divides thrust by cos(tilt) and so do we, so that the vehicle climbs when "
             "it tilts (thrust.autopilot_compensates_tilt is false)",
             0.0,
         )
-    if not value and setup.tilt_compensated:
-        return Complaint(
+    if not value and settings.tilt_compensated:
+        return Problem(
             UNSAFE,
             "neither ArduPilot nor we divide thrust by cos(tilt), so that the vehicle sinks when "
             "it tilts; set thrust.autopilot_compensates_tilt to false",
@@ -46,10 +46,10 @@ def _angle_boost(value: float, _: Values, setup: Setup) -> Complaint | None:
     return None
 
 
-def _transmitter_failsafe(value: float, values: Values, _: Setup) -> Complaint | None:
+def _transmitter_failsafe(value: float, values: Values, _: CompanionSettings) -> Problem | None:
     if value or values.get("FS_GCS_ENABLE"):
         return None
-    return Complaint(
+    return Problem(
         UNSAFE,
         "nothing is done when the pilot's transmitter is lost, nor (FS_GCS_ENABLE) when the ground "
         "station is",
@@ -57,43 +57,43 @@ def _transmitter_failsafe(value: float, values: Values, _: Setup) -> Complaint |
     )
 
 
-def _ground_station(value: float, values: Values, setup: Setup) -> Complaint | None:
-    if value != setup.source_system or not values.get("FS_GCS_ENABLE"):
+def _ground_station(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
+    if value != settings.source_system or not values.get("FS_GCS_ENABLE"):
         return None
-    return Complaint(
+    return Problem(
         INEFFECTIVE,
-        f"our own heartbeat, of system {setup.source_system}, counts as the ground station's, so "
-        "that its loss is not noticed",
-        255.0 if setup.source_system != 255 else None,
+        f"our own heartbeat, of system {settings.source_system}, counts as the ground "
+        "station's, so that its loss is not noticed",
+        255.0 if settings.source_system != 255 else None,
     )
 
 
-def _loop_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
-    if value >= setup.attitude_rate_hz:
+def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+    if value >= settings.attitude_rate_hz:
         return None
-    return Complaint(
+    return Problem(
         INEFFECTIVE,
-        f"no message is sent more often, so that link.attitude_rate_hz {setup.attitude_rate_hz:g} "
-        "is denied; ask for less",
+        f"no message is sent more often, so that link.attitude_rate_hz "
+        f"{settings.attitude_rate_hz:g} is denied; ask for less",
     )
 
 
-def _fence(value: float, values: Values, _: Setup) -> Complaint | None:
+def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
     if value or not values.get("FENCE_ENABLE"):
         return None
-    return Complaint(INEFFECTIVE, "the fence is on (FENCE_ENABLE) and only reports", 1.0)
+    return Problem(INEFFECTIVE, "the fence is on (FENCE_ENABLE) and only reports", 1.0)
 
 
-def _any_value(_: float, __: Values, ___: Setup) -> None:
-    """Read for the sake of another rule; without a fence of ArduPilot's there still is ours."""
+def _any_value(_: float, __: Values, ___: CompanionSettings) -> None:
+    """Read because another rule needs it; without ArduPilot's fence there is still ours."""
 
 
-def _battery_failsafe(value: float, values: Values, _: Setup) -> Complaint | None:
+def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Problem | None:
     if value == 5.0:
-        return Complaint(UNSAFE, _STOPS_MOTORS, 1.0)
+        return Problem(UNSAFE, _STOPS_MOTORS, 1.0)
     if value or values.get("BATT_FS_LOW_ACT"):
         return None
-    return Complaint(
+    return Problem(
         INEFFECTIVE,
         "ArduPilot does nothing about an empty battery; nobody lands should our program have ended",
         1.0,
@@ -189,13 +189,13 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(("MOT_THST_HOVER",), "at which thrust ArduPilot hovers", hover_thrust, _MEASURED),
     ParameterRule(
         ("MOT_THST_EXPO",),
-        "whether ArduPilot makes up for the thrust curve",
+        "whether ArduPilot compensates the thrust curve",
         thrust_curve,
         _REFERENCE,
     ),
     ParameterRule(
         ("MOT_BAT_VOLT_MAX",),
-        "whether ArduPilot makes up for the battery's voltage (0: it does not)",
+        "whether ArduPilot compensates the battery voltage (0: it does not)",
         battery_scaling,
         _REFERENCE,
     ),

@@ -20,7 +20,7 @@ from companion.vehicle.parameter_checks import (
     required,
     thrust_curve,
 )
-from companion.vehicle.parameter_rules import Complaint, ParameterRule, Setup, Values
+from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
 
 _REFERENCE = "PX4 parameter reference"
 _MEASURED = "measured on PX4 main, 2026"
@@ -35,12 +35,12 @@ _OVERSHOOT = 15.0
 """By which a gust or a step may carry the tilt over its limit, degrees."""
 
 
-def _attitude_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
-    wanted = setup.attitude_rate_hz
+def _attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+    wanted = settings.attitude_rate_hz
     if value >= min(wanted, _INTEGRATION_RATES[-1]):
         return None
     enough = [rate for rate in _INTEGRATION_RATES if rate >= wanted]
-    return Complaint(
+    return Problem(
         INEFFECTIVE,
         f"attitude is estimated no faster than that, so link.attitude_rate_hz {wanted:g} is not "
         "reached",
@@ -48,45 +48,45 @@ def _attitude_rate(value: float, _: Values, setup: Setup) -> Complaint | None:
     )
 
 
-def _termination(value: float, values: Values, setup: Setup) -> Complaint | None:
+def _termination(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
     """Flight termination is only to be armed where our own tilt cannot set it off."""
     if value == _TERMINATION_OFF:
         return None
     if not all(name in values for name in _FAILURE_ANGLES):
-        return Complaint(
+        return Problem(
             UNSAFE,
-            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; mend the link",
+            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; fix the link",
         )
     angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
-    if not angles or min(angles) > degrees(setup.max_tilt) + _OVERSHOOT:
+    if not angles or min(angles) > degrees(settings.max_tilt) + _OVERSHOOT:
         return None
-    return Complaint(
+    return Problem(
         UNSAFE,
         f"a tilt of {min(angles):g}° ({_NAMED_ANGLES}) stops the motors, and "
-        f"limits.max_tilt_deg is {degrees(setup.max_tilt):g}; lower limits.max_tilt_deg to "
+        f"limits.max_tilt_deg is {degrees(settings.max_tilt):g}; lower limits.max_tilt_deg to "
         f"{_OVERSHOOT:g}° below it, for gusts and steps",
     )
 
 
-def _failure_tilt(value: float, values: Values, setup: Setup) -> Complaint | None:
+def _failure_tilt(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
     """The failure detector's angle matters by itself only where it is below our own tilt."""
-    if value == 0.0 or value > degrees(setup.max_tilt):
+    if value == 0.0 or value > degrees(settings.max_tilt):
         return None
-    raised = degrees(setup.max_tilt) < _DEFAULT_FAILURE_ANGLE
-    return Complaint(
+    raised = degrees(settings.max_tilt) < _DEFAULT_FAILURE_ANGLE
+    return Problem(
         INEFFECTIVE,
-        f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(setup.max_tilt):g} "
+        f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(settings.max_tilt):g} "
         "allows" + ("" if raised else f"; lower limits.max_tilt_deg below {value:g}"),
         # Beyond PX4's own default a detector would be weakened for the sake of our limit.
         _DEFAULT_FAILURE_ANGLE if raised else None,
     )
 
 
-def _signing(value: float, _: Values, setup: Setup) -> Complaint | None:
+def _signing(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """The reverse needs no rule: a vehicle that does not sign is not heard where we do."""
-    if not value or setup.signs:
+    if not value or settings.signs:
         return None
-    return Complaint(
+    return Problem(
         INEFFECTIVE, "PX4 obeys only what is signed, and we sign nothing; set link.signing_key_file"
     )
 
@@ -171,11 +171,11 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         ("MPC_THR_HOVER",), "at which thrust PX4 expects to hover", hover_thrust, _REFERENCE
     ),
     ParameterRule(
-        ("THR_MDL_FAC",), "whether PX4 makes up for the thrust curve", thrust_curve, _REFERENCE
+        ("THR_MDL_FAC",), "whether PX4 compensates the thrust curve", thrust_curve, _REFERENCE
     ),
     ParameterRule(
         ("MC_BAT_SCALE_EN",),
-        "whether PX4 makes up for the battery's voltage",
+        "whether PX4 compensates the battery voltage",
         battery_scaling,
         _REFERENCE,
     ),

@@ -1,0 +1,160 @@
+"""How `model-following` plans the heading: second order, the short way, within the limits."""
+
+from bisect import bisect_right
+from math import inf
+
+from companion.attitude.limits import Constants
+from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.reference import behind
+from companion.attitude.representation import wrap_angle
+from companion.attitude.rotation import within
+from companion.attitude.types import Target
+
+
+class HeadingModel:
+    """ψ̈ = (v − ψ̇)/τ with v = k·(ψ_d − ψ) + ψ̇_d, limited in itself and in how fast it changes.
+
+    Args:
+        constants: gains and limits.
+        yaw: the vehicle's response; τ is its lag.
+
+    Attributes:
+        heading: rad, not wrapped.
+        turn_rate: its speed, rad/s.
+    """
+
+    __slots__ = ("_acceleration", "_fastest", "_gain", "_lag", "_v", "heading", "turn_rate")
+
+    def __init__(self, constants: Constants, yaw: AxisResponse) -> None:
+        self._gain = constants.yaw_gain
+        self._lag = yaw.lag
+        self._acceleration = yaw.acceleration
+        # Near the target v falls by k·v a second.
+        self._fastest = constants.max_yaw_rate
+        if self._gain > 0.0:
+            self._fastest = min(self._fastest, yaw.acceleration / self._gain)
+        self.place(0.0, 0.0)
+
+    def place(self, heading: float, turn_rate: float) -> None:
+        """Start at this heading (rad), turning at this rate (rad/s)."""
+        self.heading = heading
+        self.turn_rate = self._v = turn_rate
+
+    def advance(self, target: Target, dt: float) -> None:
+        """Move on by `dt` seconds towards an admissible target."""
+        wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
+        change = within(wanted, self._fastest) - self._v
+        v = self._v = self._v + within(change, self._acceleration * dt)
+        moved, self.turn_rate = behind(self.turn_rate, v, self._lag, dt)
+        self.heading += moved
+
+
+class YawModel:
+    """The yaw axis's answer but for its dead time: limit of acceleration, then lag.
+
+    Attributes:
+        rate: rad/s.
+        turned: its integral, rad.
+
+    Args:
+        response: of yaw.
+    """
+
+    __slots__ = ("_acceleration", "_aimed", "_lag", "rate", "turned")
+
+    def __init__(self, response: AxisResponse) -> None:
+        self._lag = response.lag
+        self._acceleration = response.acceleration
+        self.start(0.0)
+
+    def start(self, rate: float) -> None:
+        """Turn steadily at `rate` rad/s, and count from here."""
+        self.rate = self._aimed = rate
+        self.turned = 0.0
+
+    def advance(self, command: float, dt: float) -> None:
+        """Hold the yaw rate `command` (rad/s) for `dt` seconds."""
+        before, most = self._aimed, self._acceleration * dt
+        aimed = self._aimed = before + within(command - before, most) if most < inf else command
+        # The aim as it stands at the end of a short sample: within half a sample of the truth.
+        moved, self.rate = behind(self.rate, aimed, self._lag, dt)
+        self.turned += moved
+
+
+OLDEST = 0.25
+"""Told longer ago than this, s, the target's attitude is not used any more."""
+
+_BEHIND_TARGET = 0.008
+"""Of the dead time of roll and pitch, this part lies between target and body, s (measured)."""
+
+_TRIMMED = 128
+"""Rows that are too old are dropped by so many at once."""
+
+
+class TargetFrame:
+    """The heading of these axes, carried on from when it was told.
+
+    Args:
+        response: of the vehicle's rate loop.
+    """
+
+    __slots__ = (
+        "_acceleration",
+        "_aim",
+        "_delay",
+        "_offset",
+        "_time",
+        "_times",
+        "_told_at",
+        "_ways",
+    )
+
+    def __init__(self, response: RateResponse) -> None:
+        self._acceleration = response.yaw.acceleration
+        self._delay = max(0.0, response.tilt.dead_time - _BEHIND_TARGET)
+        self._times: list[float] = []
+        self._ways: list[float] = []
+        self.forget()
+
+    def forget(self) -> None:
+        """Where these axes stand is not known."""
+        self._time, self._told_at = 0.0, -inf
+        self._offset = self._aim = 0.0
+        self._times[:], self._ways[:] = [0.0], [0.0]
+
+    def note(self, heading: float, age: float) -> None:
+        """They had this heading (rad) so long ago, s, by the time of the newest sample."""
+        if not 0.0 <= age <= OLDEST:
+            return
+        self._told_at = self._time - age
+        self._offset = heading - self._way(self._told_at - self._delay)
+
+    def advance(self, yaw: float, still: float, dt: float) -> None:
+        """The yaw rate is sent for `dt` seconds; `still` of it keeps the heading (rad/s)."""
+        if self._told_at == -inf:
+            return  # the body's own axes, as far as is known
+        self._aim += within(yaw - self._aim, self._acceleration * dt)
+        self._time += dt
+        times = self._times
+        times.append(self._time)
+        self._ways.append(self._ways[-1] + (self._aim - still) * dt)
+        if len(times) > _TRIMMED and times[_TRIMMED] < self._time - OLDEST - self._delay:
+            del times[:_TRIMMED], self._ways[:_TRIMMED]
+
+    def heading(self) -> float | None:
+        """Their heading when what is answered now turns them, rad; None: it is not known."""
+        if self._time - self._told_at > OLDEST:
+            return None
+        return self._offset + self._ways[-1]
+
+    def _way(self, time: float) -> float:
+        """How far what was sent until `time` turns them, rad: linear between samples."""
+        times, ways = self._times, self._ways
+        later = bisect_right(times, time)
+        if later == 0:
+            return ways[0]
+        if later == len(times):
+            return ways[-1]
+        start = times[later - 1]
+        share = (time - start) / (times[later] - start)
+        return ways[later - 1] + share * (ways[later] - ways[later - 1])

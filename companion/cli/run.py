@@ -1,0 +1,67 @@
+"""Runs a command, and turns each of its errors into one sentence and an exit code."""
+
+import argparse
+import asyncio
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+
+from rich.console import Console
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_USAGE
+from companion.demo import VehicleStoppedError
+from companion.extras import MissingExtraError
+from companion.files.yaml_file import ConfigError
+from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
+from companion.realtime import RealtimeError
+from companion.recording.figure import FigureError
+
+_USAGE = (
+    ConfigError,
+    EndpointError,
+    FigureError,
+    LogError,
+    MissingExtraError,
+    RealtimeError,
+    SigningError,
+)
+"""The command line or the configuration is wrong."""
+_FLIGHT = LinkError, OSError, VehicleStoppedError
+"""The flight failed, or what it needs did."""
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def command_of(options: argparse.Namespace) -> Command:
+    """Import the function that the command line asks for, such as `flights.fly`."""
+    module, _, function = options.run.partition(".")
+    command: Command = getattr(import_module(f"companion.cli.{module}"), function)
+    return command
+
+
+def run(command: Command, options: argparse.Namespace) -> int:
+    """Run a command; returns the exit code.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C where no flight handles it.
+    """
+    try:
+        return command(options)
+    except _USAGE as error:
+        _say(str(error))
+        return EXIT_USAGE
+    except _FLIGHT as error:
+        _say(str(error))
+        return EXIT_FLIGHT
+    except asyncio.CancelledError:
+        _say("interrupted before anything was sent")
+        return EXIT_FLIGHT
+    except Exception as error:
+        if options.debug:
+            traceback.print_exc()
+        _say(f"internal error: {error!r}; run again with --debug for where it happened")
+        return EXIT_FLIGHT
+
+
+def _say(text: str) -> None:
+    Console(stderr=True).print(f"companion: {text}", markup=False, highlight=False, soft_wrap=True)

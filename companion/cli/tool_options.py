@@ -1,0 +1,121 @@
+"""The options of the commands that do not fly."""
+
+import argparse
+from collections.abc import Callable
+from math import nan
+from pathlib import Path
+from typing import TypeAlias
+
+from companion.study import registry
+
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+_STARTS = "px4", "ardupilot", "mock"
+
+
+def add_benches(commands: Commands) -> None:
+    """Add `bench link` and `bench planner`."""
+    bench = commands.add_parser("bench", help="measure this program's speed")
+    benches = bench.add_subparsers(required=True, metavar="WHAT")
+    link = benches.add_parser(
+        "link", help="sample in → setpoint out: ours, echo, pymavlink, MAVSDK"
+    )
+    link.add_argument(
+        "--seconds", type=number(0.1, 3600.0), default=20.0, help="for each program (20)"
+    )
+    link.add_argument(
+        "--rate", type=number(1.0, 2000.0), default=250.0, help="samples a second (250)"
+    )
+    link.set_defaults(run="tools.bench_link")
+    step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
+    step.add_argument("--seconds", type=number(0.001, 3600.0), default=5.0, help="of measuring (5)")
+    step.set_defaults(run="tools.bench_planner")
+    for each in (link, step):
+        each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
+
+
+def add_study(commands: Commands) -> None:
+    """Add `study`."""
+    study = commands.add_parser(
+        "study",
+        help="the paper's experiments, as figures, tables and a page (extra `study`)",
+        epilog=f"studies:\n{registry.help_table()}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    study.add_argument(
+        "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
+    )
+    study.add_argument(
+        "--case",
+        type=Path,
+        metavar="FILE",
+        help=f"for {registry.names_with_case()}: such as configs/study-case.yaml",
+    )
+    study.add_argument(
+        "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
+    )
+    study.add_argument(
+        "--json",
+        action="store_true",
+        help=f"for {registry.names_with_json()}: print its rows as one JSON list",
+    )
+    study.set_defaults(run="tools.study")
+
+
+def add_tools(commands: Commands) -> None:
+    """Add `plot`."""
+    plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
+    plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
+    plot.set_defaults(run="tools.plot")
+
+
+def add_config(commands: Commands) -> None:
+    """Add `config`, `init` and `check-config`."""
+    show = commands.add_parser(
+        "config",
+        help="print the configuration: every key, its default, unit, range and meaning",
+        description="Print every key as commented YAML, with the values of FILE or the defaults.",
+    )
+    which = show.add_mutually_exclusive_group()
+    which.add_argument("file", type=Path, nargs="?", metavar="FILE")
+    which.add_argument("--diff", type=Path, metavar="FILE", help="only what FILE changes")
+    which.add_argument("--get", metavar="KEY", help="only this key, such as limits.max_tilt_deg")
+    which.add_argument("--schema", action="store_true", help="the JSON Schema, for editors")
+    which.add_argument("--markdown", action="store_true", help="tables: docs/configuration.md")
+    show.set_defaults(run="config.show")
+
+    start = commands.add_parser("init", help="write a commented starting configuration")
+    start.add_argument("name", choices=_STARTS, help="for which vehicle")
+    start.add_argument(
+        "--out",
+        type=Path,
+        default=Path("companion.yaml"),
+        metavar="FILE",
+        help="default: companion.yaml; an existing file is never replaced",
+    )
+    start.set_defaults(run="config.init")
+
+    check = commands.add_parser(
+        "check-config",
+        help="check a configuration file",
+        description="Check a configuration file and what it includes. It is read as YAML 1.2 "
+        "(010 is ten, yes is a text; no aliases, no tags), up to 250 kB and 6000 values; "
+        "`companion config` names the smallest and the largest value of each key.",
+    )
+    check.add_argument("file", type=Path, metavar="FILE")
+    check.set_defaults(run="config.check")
+
+
+def number(least: float, most: float) -> Callable[[str], float]:
+    """A number of the command line within bounds, NaN not among them."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = nan
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
+        return value
+
+    return read

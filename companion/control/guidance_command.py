@@ -1,0 +1,48 @@
+"""The command that guidance leaves for the control loop."""
+
+from typing import NamedTuple
+
+from companion.attitude import BodyRates, Target
+from companion.attitude.representation import wrap_angle
+
+
+class GuidanceCommand(NamedTuple):
+    """One command from guidance; it holds until the next one.
+
+    Attributes:
+        target: for the planner; its heading is in the frame without resets (`EstimatorResets`).
+        acceleration_down: wanted vertical acceleration, m/s².
+        made_at: when guidance made the command, s on our clock.
+        idle: zero rates and zero thrust, on the ground.
+        is_step: whether this is an open-loop step whose response is measured.
+        body_rates: sent within the limits instead of the planner's answer, rad/s; None: plan.
+        turn: sum of the heading resets when the command was made, rad.
+        later: the target `period` after `made_at`. The target moves there on a straight line and
+            then stays. None: `target` stays.
+        period: of the guidance loop, s.
+    """
+
+    target: Target
+    acceleration_down: float
+    made_at: float
+    idle: bool = False
+    is_step: bool = False
+    body_rates: BodyRates | None = None
+    turn: float = 0.0
+    later: Target | None = None
+    period: float = 0.0
+
+    def target_at(self, time: float) -> Target:
+        """The target at `time`, s on our clock: `target`, `later`, or interpolated between them."""
+        before, after, elapsed = self.target, self.later, time - self.made_at
+        if after is None or not elapsed > 0.0:
+            return before
+        if elapsed >= self.period:
+            return after
+        share = elapsed / self.period
+        return Target(
+            before.north + share * (after.north - before.north),
+            before.east + share * (after.east - before.east),
+            before.heading + share * wrap_angle(after.heading - before.heading),
+            before.heading_rate + share * (after.heading_rate - before.heading_rate),
+        )

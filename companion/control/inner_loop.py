@@ -1,0 +1,90 @@
+"""The inner loop from the configuration: planner, limits, thrust map, vehicle response."""
+
+from companion.attitude import Limits, Planner, make_planner
+from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.reference_model import model_lag, model_response
+from companion.config import Config
+from companion.config.known_drag import drag_prior
+from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
+
+
+def planner(config: Config) -> Planner:
+    """The planner with its limits, and with the vehicle's response if it plans with that."""
+    following = config.planner_name == MODEL_FOLLOWING
+    return make_planner(
+        config.planner_name,
+        gain=config.planner.gain_per_s,
+        yaw_gain=config.planner.yaw_gain_per_s,
+        limits=rate_limits(config),
+        recovery_angle=config.limits.recovery_angle,
+        **(config.vehicle.response if following else {}),
+    )
+
+
+def rate_limits(config: Config) -> Limits:
+    """The limits that every commanded attitude and body rate obeys."""
+    limits = config.limits
+    return Limits(
+        max_tilt=limits.max_tilt,
+        max_tilt_rate=limits.max_tilt_rate,
+        max_yaw_rate=limits.max_yaw_rate,
+        shape=limits.rate_limit,
+    )
+
+
+def hover_thrust(config: Config) -> HoverThrust:
+    """The map from specific thrust to normalised thrust, 0..1."""
+    thrust = config.thrust
+    return HoverThrust(
+        ThrustSettings(
+            hover=thrust.hover_thrust,
+            correction_limit=thrust.correction_limit,
+            correction_time=thrust.correction_time_s,
+            lowest=config.limits.min_thrust,
+            highest=config.limits.max_thrust,
+            curve_factor=thrust.curve_factor,
+            battery_exponent=thrust.battery_exponent,
+            lag=thrust.lag,
+            tilt_compensated=thrust.autopilot_compensates_tilt,
+            drag=drag_prior(config).drag.linear,
+        )
+    )
+
+
+def thrust_limits(config: Config) -> tuple[float, float]:
+    """Smallest and largest specific thrust by the configured hover thrust, m/s²."""
+    per_thrust = GRAVITY / config.thrust.hover_thrust
+    return config.limits.min_thrust * per_thrust, config.limits.max_thrust * per_thrust
+
+
+def tilt_response(config: Config) -> InnerResponse:
+    """Response of the coefficients to their targets: planner and rate loop together."""
+    gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
+    follows = config.planner_name == MODEL_FOLLOWING
+    if follows:
+        gain, lag = model_response(gain, model_lag(gain, lag))
+    return InnerResponse(gain, lag, dead_time, follows)
+
+
+def slower_tilt(config: Config) -> tuple[float, float]:
+    """Lag and dead time of the slower of roll and pitch, s; 0 where unknown.
+
+    The quicker axis waits for the slower one, so the coefficients respond like this.
+    """
+    axes = config.vehicle.axes
+    tilt = axes["roll"], axes["pitch"]
+    return (
+        max(axis.lag or 0.0 for axis in tilt),
+        max(axis.dead_time or 0.0 for axis in tilt),
+    )
+
+
+def heading_response(config: Config) -> InnerResponse:
+    """Response of the heading to its target."""
+    yaw = config.vehicle.axes["yaw"]
+    return InnerResponse(
+        config.planner.yaw_gain_per_s,
+        yaw.lag or 0.0,
+        yaw.dead_time or 0.0,
+        config.planner_name == MODEL_FOLLOWING,
+    )

@@ -1,0 +1,126 @@
+"""The control loop's record: its counters, its latest times, and why samples are unanswered."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from enum import Enum
+from math import inf
+
+from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.records import AttitudeSample
+
+_KEPT_GAPS = 32
+"""Number of latest gaps that are kept; far fewer end a flight."""
+
+
+class Unanswered(Enum):
+    """Why a sample is unanswered. The value names the reason in `summary.json` and in reports."""
+
+    ANOTHER_VEHICLE = "another_vehicle"
+    NOT_NEWER = "not_newer"
+    AHEAD = "stamped_ahead"
+    LATE = "late"
+    NO_TARGET = "no_target"
+    OLD_TARGET = "old_target"
+    AWAITING_MODE = "awaiting_mode"
+    INVALID_ATTITUDE = "invalid_attitude"
+    INVALID_SETPOINT = "invalid_setpoint"
+    NOT_SENT = "not_sent"
+
+    @property
+    def words(self) -> str:
+        """The fault in words, for messages while it lasts."""
+        return _WORDS[self]
+
+    @property
+    def is_refusal(self) -> bool:
+        """Whether the sample was fresh but had no valid answer; otherwise the data were stale."""
+        return self in _REFUSALS
+
+
+_WORDS = {
+    Unanswered.ANOTHER_VEHICLE: "this may be another vehicle than the one that was checked",
+    Unanswered.NOT_NEWER: "the vehicle's clock stands still: new attitude samples carry no later "
+    "time stamp",
+    Unanswered.AHEAD: "attitude is stamped far ahead of the vehicle's clock",
+    Unanswered.LATE: "attitude arrives later than deadman.telemetry_stale_ms",
+    Unanswered.NO_TARGET: "guidance makes no commands",
+    Unanswered.OLD_TARGET: "guidance makes no commands any more",
+    Unanswered.AWAITING_MODE: "after a gap in telemetry the autopilot did not confirm offboard",
+    Unanswered.INVALID_ATTITUDE: "attitude from the vehicle cannot be used: it is no unit "
+    "quaternion",
+    Unanswered.INVALID_SETPOINT: "the setpoints cannot be used: they are not finite or out of "
+    "range",
+    Unanswered.NOT_SENT: "setpoints cannot be sent: the connection does not accept them",
+}
+_REFUSALS = {
+    Unanswered.INVALID_ATTITUDE,
+    Unanswered.INVALID_SETPOINT,
+    Unanswered.NOT_SENT,
+}
+
+
+@dataclass(slots=True)
+class LoopRecord:
+    """Counters since the loop was made, and latest times in s on our clock.
+
+    Attributes:
+        samples: samples received while the loop was on.
+        setpoints: setpoints sent.
+        missed_deadlines: setpoints sent later than `Deadlines.deadline` after their sample.
+        unanswered: unanswered samples, by reason.
+        reason: why the newest sample is unanswered, or None.
+        thrust: as last sent, 0..1.
+        last_sample: when the newest sample arrived.
+        last_vehicle_time: vehicle time of the newest usable sample, s.
+        last_answer: arrival time of the newest sample that was answered.
+        gap_from: `last_answer`, or inf before the first answer and after a confirmed gap.
+        gaps: when the latest gaps ended. A gap is longer than `Deadlines.telemetry_stale` without
+            an answer while the autopilot may obey us.
+        held: how long each setpoint was in force until the next one; gaps are left out.
+    """
+
+    samples: int = 0
+    setpoints: int = 0
+    missed_deadlines: int = 0
+    unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
+    reason: Unanswered | None = None
+    thrust: float = 0.0
+    last_sample: float = -inf
+    last_vehicle_time: float = -inf
+    last_answer: float = -inf
+    gap_from: float = inf
+    gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
+    held: HeldRates = field(default_factory=HeldRates)
+
+    def note_arrival(self, sample: AttitudeSample) -> float:
+        """Note an arrived sample; returns the vehicle time since the last usable one, s."""
+        self.last_sample = sample.received
+        period = sample.vehicle_time - self.last_vehicle_time
+        if sample.misfit is None:
+            self.last_vehicle_time = sample.vehicle_time
+        return period
+
+    def note_answer(self, received: float, thrust: float, telemetry_stale: float) -> None:
+        """Note that a setpoint left.
+
+        Args:
+            received: when its sample arrived, s on our clock.
+            thrust: as sent, 0..1.
+            telemetry_stale: a longer interval is a gap, s.
+        """
+        self.setpoints += 1
+        self.thrust = thrust
+        interval = received - self.last_answer
+        if interval <= telemetry_stale:
+            self.held.add(interval)
+        self.last_answer = self.gap_from = received
+
+    @property
+    def stale(self) -> int:
+        """Unanswered samples that were, or whose target was, too old or out of order."""
+        return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
+
+    @property
+    def refused(self) -> int:
+        """Unanswered samples that had no valid answer, or whose answer could not be sent."""
+        return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)

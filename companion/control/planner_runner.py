@@ -1,0 +1,74 @@
+"""Runs the planner on each sample: its period, its restarts, and its view without resets."""
+
+from collections.abc import Callable
+from math import inf
+
+from companion.attitude import BodyRates, Planner, Target
+from companion.control.estimator_resets import EstimatorResets
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
+
+_LONGEST_STEP = 0.1
+"""A planner never integrates over a longer time, s."""
+
+
+class PlannerRunner:
+    """Asks the planner for body rates, in the frame without estimator resets.
+
+    Attributes:
+        attitude_target: returns the newest ATTITUDE_TARGET, or None. It tells the axes along which
+            the autopilot takes our rates, where they differ from the body axes.
+
+    Args:
+        planner: the attitude law.
+        resets: of the estimator, which the planner must not see.
+    """
+
+    def __init__(self, planner: Planner, resets: EstimatorResets) -> None:
+        self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
+        self._planner = planner
+        self._resets = resets
+        self._planned_at = -inf
+        self._period = 0.0
+        self._noted: AttitudeTarget | None = None
+        self._turn, self._turned_ms = 0.0, -1
+
+    def restart(self) -> None:
+        """Reset the planner at the next sample: its state does not hold any more."""
+        self._planned_at = -inf
+
+    def rates(self, sample: AttitudeSample, target: Target, arrival_period: float) -> BodyRates:
+        """Body rates for a sample, rad/s; resets the planner first after a gap or a restart.
+
+        Args:
+            sample: to answer.
+            target: in the frame without resets.
+            arrival_period: vehicle time since the sample before, s.
+
+        Raises:
+            AttitudeError: the planner has no answer to this attitude or target.
+        """
+        q = self._resets.attitude(sample.q)
+        period = sample.vehicle_time - self._planned_at
+        if period > _LONGEST_STEP:
+            self._planner.reset(q, sample.body_rates)
+            # The length of a gap says nothing about when the next sample comes.
+            period = self._period or min(arrival_period, _LONGEST_STEP)
+        self._period = period
+        self._planned_at = sample.vehicle_time
+        self._note_attitude_target(sample)
+        return self._planner.rates(q, target, period, sample.body_rates)
+
+    def _note_attitude_target(self, sample: AttitudeSample) -> None:
+        """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.
+
+        One from before a heading reset is ignored: we cannot tell in which frame it is.
+        """
+        if self._resets.turn != self._turn:
+            self._turn, self._turned_ms = self._resets.turn, sample.time_boot_ms
+        told = self.attitude_target()
+        if told is None or told is self._noted:
+            return
+        if self._turned_ms < told.time_boot_ms <= sample.time_boot_ms:
+            self._noted = told
+            age = 1e-3 * (sample.time_boot_ms - told.time_boot_ms)
+            self._planner.note_attitude_target(self._resets.attitude(told.q), age)

@@ -1,0 +1,169 @@
+"""Commands to a vehicle that a pilot or another station may take at any moment.
+
+Every command of a flight goes through `command_if_ours`, which checks first whose vehicle it is.
+"""
+
+import asyncio
+from collections.abc import Callable, Set
+
+from companion.flight.context import FlightContext
+from companion.mavlink.commands import Command, command_name
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.safety.actions import Exit, FlightEnded
+from companion.vehicle.autopilot import Role
+from companion.vehicle.link import Link
+
+_TRIES = 4
+_SHOWS = 3.0
+"""Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
+_ENTERED = 1.0
+"""A mode that was accepted and does not show within this time was left again, s."""
+_OFFBOARD = frozenset({Role.OFFBOARD})
+
+Done = Callable[[], bool]
+"""Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
+Ours = Callable[[], None]
+"""Raises `FlightEnded` where the vehicle is not ours to command, for example `in_roles`."""
+
+
+def roles_of(link: Link) -> frozenset[Role]:
+    """The present mode's roles in a flight; empty for an unknown mode or one that is not ours."""
+    mode = link.state.mode
+    return frozenset() if mode is None else link.autopilot.roles(mode)
+
+
+def in_role(link: Link, role: Role) -> bool:
+    """Whether the present mode has this role."""
+    return role in roles_of(link)
+
+
+def require_role(link: Link, allowed: Set[Role]) -> None:
+    """Release control if the present mode has none of the allowed roles.
+
+    Raises:
+        FlightEnded: names who took over, as far as known.
+    """
+    if roles_of(link) & allowed:
+        return
+    who = (
+        "the autopilot's failsafe took over"
+        if link.state.mode_by_failsafe
+        else "the pilot or another station took over"
+    )
+    raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
+
+
+def in_roles(link: Link, allowed: Set[Role]) -> Ours:
+    """`require_role` as a function without arguments."""
+    return lambda: require_role(link, allowed)
+
+
+async def command_if_ours(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+    """Send a command until it is answered; before each try, check whose vehicle it is.
+
+    A command is never repeated blindly. The vehicle may have obeyed the first one whose answer was
+    lost, and a pilot may have taken over since.
+
+    Args:
+        context: of the flight.
+        command: to send.
+        ours: called before each try; if it raises, nothing is sent.
+        done: see `Done`; called before a repetition.
+
+    Raises:
+        FlightEnded: somebody else has the vehicle.
+        CommandRefused: the autopilot refused.
+        CommandTimeout: no try was answered.
+    """
+    for given in range(_TRIES):
+        await context.fresh_heartbeat()
+        context.same_vehicle.require()
+        if given > 0 and done():
+            return
+        ours()
+        try:
+            await context.link.command(*command, retries=0)
+            return
+        except CommandTimeout:
+            continue
+        except CommandRefused:
+            # A vehicle that has obeyed the first try refuses the second one.
+            if given == 0 or not await _takes_effect(context, done):
+                raise
+            return
+    await context.fresh_heartbeat()
+    if not done():
+        name = command_name(command.command)
+        raise CommandTimeout(f"{name}: no answer to {_TRIES} tries; does the uplink work?")
+
+
+async def change_mode(context: FlightContext, command: Command, ours: Ours, done: Done) -> None:
+    """Send a mode command as `command_if_ours` does, and wait until the mode shows.
+
+    Raises:
+        FlightEnded: also if the mode was accepted and somebody left it again at once.
+    """
+    await command_if_ours(context, command, ours, done)
+    accepted = asyncio.get_running_loop().time()
+
+    def entered() -> bool:
+        state = context.link.state
+        if done():
+            return True
+        if state.mode_received > accepted + _ENTERED:
+            raise FlightEnded(
+                f"the mode was accepted and left again, not by us: {state.mode}", Exit.RELEASE
+            )
+        return False
+
+    await context.until(entered)
+
+
+async def leave_offboard(
+    context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD
+) -> None:
+    """Ask a vehicle that stands disarmed in offboard to hold, because it could not be armed again.
+
+    When PX4 disarms, it returns to the last mode that its user chose. After a landing that began
+    in OFFBOARD, that is OFFBOARD, where its pre-arm checks fail without setpoints (measured). They
+    also fail in AUTO.LAND. Other modes and armed vehicles are left alone.
+
+    Args:
+        context: of the flight.
+        cannot_arm_in: roles of the modes to leave.
+
+    Raises:
+        FlightEnded: somebody else armed it or changed its mode, or it refuses to hold.
+    """
+    if context.armed() or not roles_of(context.link) & cannot_arm_in:
+        return
+    mode = context.link.state.mode
+    context.note(
+        f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold"
+    )
+    context.detail = f"the autopilot to leave {mode}"
+
+    def ours() -> None:
+        if context.armed():
+            raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
+        require_role(context.link, cannot_arm_in)
+
+    try:
+        await change_mode(
+            context, context.link.autopilot.hold(), ours, lambda: in_role(context.link, Role.HOLD)
+        )
+    except (CommandRefused, CommandTimeout) as error:
+        raise FlightEnded(
+            f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
+            f"command another mode ({error})",
+            Exit.LEAVE,
+        ) from error
+
+
+async def _takes_effect(context: FlightContext, done: Done) -> bool:
+    try:
+        async with asyncio.timeout(_SHOWS):
+            await context.until(done)
+    except TimeoutError:
+        return False
+    return True

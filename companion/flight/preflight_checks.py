@@ -1,0 +1,115 @@
+"""The preflight checks of a flight, repeated before each step towards the air."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import inf
+
+from companion.config import Config
+from companion.flight.vehicle_identity import SameVehicle
+from companion.guidance import ManeuverSequence
+from companion.preflight.evidence import Evidence, Identity, Stage
+from companion.preflight.examination import blocking, examine, unsafe
+from companion.preflight.finding import Finding
+from companion.preflight.session import gather, wanted_rates
+from companion.safety.actions import FlightEnded
+from companion.vehicle.link import Link
+from companion.vehicle.parameter_rules import CheckResult
+from companion.vehicle.streams import StreamRate
+
+_COUNTED_FOR = 1.0
+"""Telemetry rates are counted over this time, s, while the parameters are read."""
+_LASTS = 1.0
+"""Counted rates and read parameters are valid for this time, s."""
+
+
+class PreflightChecks:
+    """Judges the vehicle as `companion doctor` does, for each stage of a flight.
+
+    A pilot may arm minutes after the checks passed. So the same checks run in the phase `checks`,
+    before we arm, after anybody armed, before take-off, and before the takeover. The status is
+    always the newest; rates and parameters are taken again unless they are less than a second old.
+
+    Attributes:
+        note: takes each finding that does not block the flight, once.
+        meet: called with the vehicle's identity once it is known.
+
+    Args:
+        config: of the flight.
+        link: to the vehicle.
+        same_vehicle: whether it still is the checked vehicle.
+        maneuvers: a copy of those to be flown, used by the checks alone.
+    """
+
+    def __init__(
+        self, config: Config, link: Link, same_vehicle: SameVehicle, maneuvers: ManeuverSequence
+    ) -> None:
+        self.note: Callable[[str], None] = lambda _: None
+        self.meet: Callable[[Identity], None] = lambda _: None
+        self._config, self._link, self._same_vehicle = config, link, same_vehicle
+        self._maneuvers = maneuvers
+        self._clock = asyncio.get_running_loop().time
+        self._granted: Mapping[str, StreamRate] = {}
+        self._evidence: Evidence | None = None
+        self._gathered_at = -inf
+        self._told: set[str] = set()
+
+    async def ask_for_telemetry(self) -> None:
+        """Request the telemetry that a flight needs, and report rates that are not granted.
+
+        Raises:
+            CommandTimeout: the autopilot did not answer.
+            LinkLost: the connection dropped meanwhile.
+        """
+        self._evidence = None  # the old evidence may belong to another vehicle
+        wanted = wanted_rates(self._config, self._link)
+        self._granted = await self._link.set_rates(wanted, window_s=0.1)
+        for message, rate in self._granted.items():
+            if rate.granted < rate.asked:
+                self._tell(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
+
+    async def require(self, stage: Stage) -> Evidence:
+        """Check the vehicle for `stage`; returns the evidence.
+
+        Raises:
+            ChecksVoid: it may be another vehicle than was checked.
+            FlightEnded: a finding blocks the flight.
+            LinkLost: the connection dropped meanwhile.
+        """
+        before = evidence = self._evidence
+        if evidence is None or self._clock() - self._gathered_at > _LASTS:
+            evidence = await gather(
+                self._link,
+                self._granted,
+                _COUNTED_FOR,
+                stage=stage,
+                known=None if before is None else before.survey,
+            )
+            self._evidence, self._gathered_at = evidence, self._clock()
+            self._same_vehicle.note_identity(evidence.identity)
+        self._same_vehicle.require()
+        self.meet(evidence.identity)
+        evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
+        self._heed(examine(self._config, evidence, again=before is not None))
+        return evidence
+
+    def _heed(self, findings: list[Finding]) -> None:
+        """End the flight for unsafe findings that are not accepted; report all others."""
+        refused = blocking(self._config, findings)
+        amiss = [
+            finding.key
+            for finding in findings
+            if finding.result is CheckResult.INEFFECTIVE and finding not in refused
+        ]
+        if amiss:
+            self._tell(f"preflight warnings: {', '.join(amiss)}; see `companion doctor`")
+        for finding in unsafe(findings):
+            if finding not in refused:
+                self._tell(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+        if refused:
+            raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
+
+    def _tell(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            self.note(text)

@@ -1,0 +1,159 @@
+"""The vehicle's identity: is it still the checked one, and what did its earlier flights learn?"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from companion.config.known_drag import prior_of
+from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
+from companion.preflight.evidence import Identity
+from companion.recording.learned_file import LearnedFile
+from companion.safety.actions import Exit, FlightEnded
+from companion.vehicle.link import Link
+
+LONGEST_SILENCE = 2.0
+"""A present vehicle sends a frame within this time, s, even on the worst link that is flown."""
+_LOOK = 0.1
+"""A longer interval between two looks is our own stall and does not count as silence, s."""
+
+
+class ChecksVoid(FlightEnded):
+    """The checked vehicle may have been replaced before arming, so the checks must be repeated."""
+
+
+class SameVehicle:
+    """Detects that another vehicle, or a restarted one, may have replaced the checked one.
+
+    Two vehicles may share system and component ids. So each of these voids the checks: a new peer
+    on the link, a restarted clock, another hardware id, and a long silence.
+
+    Args:
+        link: to the vehicle.
+        clock: ours, s.
+    """
+
+    def __init__(self, link: Link, clock: Callable[[], float]) -> None:
+        self._link, self._clock = link, clock
+        self._begun = self._committed = False
+        self._peers = self._restarts = 0
+        self._uid: str | None = None
+        self._other_uid: str | None = None
+        self._frames = 0
+        self._looked_at = clock()
+        self._silent_for = self._silence = 0.0
+
+    def begin(self) -> None:
+        """Start to watch: from now on every frame must come from one vehicle."""
+        self._begun, self._committed = True, False
+        self._uid = self._other_uid = None
+        self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
+        self._frames, self._looked_at = self._link.stats.frames, self._clock()
+        self._silent_for = self._silence = 0.0
+
+    def commit(self) -> None:
+        """Note that the vehicle is being armed: from now on a replacement ends the flight.
+
+        From then on the watch and the safety monitors judge silence.
+        """
+        self._committed, self._silence = True, 0.0
+
+    def look(self) -> None:
+        """Measure the silence; the watch calls this 50 times a second."""
+        now, frames = self._clock(), self._link.stats.frames
+        since, self._looked_at = now - self._looked_at, now
+        if frames == self._frames:
+            self._silent_for += min(since, _LOOK)
+            return
+        if self._silent_for > LONGEST_SILENCE and not self._committed:
+            self._silence = self._silent_for
+        self._frames, self._silent_for = frames, 0.0
+
+    def note_identity(self, identity: Identity) -> None:
+        """Take the identity from AUTOPILOT_VERSION; an unknown hardware id is ignored."""
+        if self._uid is None:
+            self._uid = identity.uid
+        elif identity.uid not in (None, self._uid):
+            self._other_uid = identity.uid
+
+    @property
+    def same(self) -> bool:
+        """Whether there is no sign of a replacement; the control loop asks at every sample."""
+        return (
+            self._peers == self._link.stats.peers
+            and self._restarts == self._link.clock.restarts
+            and self._other_uid is None
+            and not self._silence
+            and (self._silent_for <= LONGEST_SILENCE or self._committed)
+        ) or not self._begun
+
+    def require(self) -> None:
+        """Require the same vehicle.
+
+        Raises:
+            ChecksVoid: it may be another one, and nothing was armed yet.
+            FlightEnded: it may be another one; control is released.
+        """
+        if self.same or (reason := self._reason()) is None:
+            return
+        if self._committed:
+            raise FlightEnded(reason, Exit.RELEASE)
+        raise ChecksVoid(reason)
+
+    def _reason(self) -> str | None:
+        """The sign of a replacement; None during a silence, after which it may be the same."""
+        if self._peers != self._link.stats.peers:
+            return "the vehicle is heard from another address or connection than before"
+        if self._restarts != self._link.clock.restarts:
+            return f"the autopilot may have restarted: {self._link.clock.last_change}"
+        if self._other_uid is not None:
+            return f"another vehicle answers: hardware id {self._other_uid}, not {self._uid}"
+        if self._silence:
+            return f"the vehicle was not heard for {self._silence:.1f} s"
+        return None
+
+
+class VehicleMemory:
+    """Starts the drag estimate from the drag that an earlier flight of the vehicle learned.
+
+    A configured drag takes precedence. A vehicle without a hardware id is not remembered.
+
+    Args:
+        directory: of the flights.
+        estimate: of the drag.
+        told: whether the configuration sets the drag.
+        note: takes messages for the user.
+    """
+
+    def __init__(
+        self, directory: Path, estimate: DragEstimate, told: bool, note: Callable[[str], None]
+    ) -> None:
+        self._directory, self._estimate, self._told, self._note = directory, estimate, told, note
+        self._file: LearnedFile | None = None
+
+    def meet(self, identity: Identity) -> None:
+        """Load the learned drag of this vehicle, before it is flown."""
+        if identity.uid is None:
+            return
+        file = LearnedFile(self._directory, identity.uid)
+        if self._file is not None and self._file.path == file.path:
+            return
+        self._file = file
+        if self._told:
+            return
+        kept, trouble = file.load()
+        self._estimate.begin(ANY_VEHICLE if kept is None else prior_of(kept.drag))
+        if trouble is not None:
+            self._note(trouble)
+        if kept is not None:
+            self._note(
+                f"drag from an earlier flight of this vehicle: {kept.drag.linear:.2f} 1/s + "
+                f"{kept.drag.quadratic:.3f} 1/m ({file.path})"
+            )
+
+    def keep(self) -> None:
+        """After the flight, save the learned drag if the flight had enough motion to learn it."""
+        if self._file is None or not self._estimate.certain:
+            return
+        try:
+            self._file.save(self._estimate.drag, self._estimate.top_speed)
+        except OSError as error:
+            self._note(f"{self._file.path}: cannot keep the learned drag: {error.strerror}")

@@ -1,0 +1,101 @@
+"""Feedback gains of the chain position – velocity – acceleration, linear-quadratic."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Of the cost ∫ position·e_p² + velocity·e_v² + u² dt.
+
+    Attributes:
+        position: 1/s⁴, of the position error.
+        velocity: 1/s², of the velocity error.
+
+    Raises:
+        ValueError: a weight that is not finite, a negative one, or no weight on position.
+    """
+
+    position: float
+    velocity: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.position) and self.position > 0.0):
+            raise ValueError(f"the position's weight must be positive, not {self.position}")
+        if not (isfinite(self.velocity) and self.velocity >= 0.0):
+            raise ValueError(f"the velocity's weight must not be negative, not {self.velocity}")
+
+
+@dataclass(frozen=True, slots=True)
+class ChainGains:
+    """u = −(position·e_p + velocity·e_v + acceleration·e_a), u an acceleration in m/s².
+
+    Attributes:
+        position: 1/s².
+        velocity: 1/s.
+        acceleration: no unit.
+    """
+
+    position: float
+    velocity: float
+    acceleration: float
+
+
+def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
+    """The gains that are best for ė_p = e_v, ė_v = e_a − drag·e_v, ė_a = (u − e_a)/lag.
+
+    From the stable eigenvectors of the Hamiltonian matrix: with X and Y their upper and lower
+    halves, Y·X⁻¹ solves the algebraic Riccati equation.
+
+    Args:
+        weights: of the cost.
+        lag: of the acceleration behind what is asked for, s, positive.
+        drag: linear drag per mass, 1/s.
+
+    Raises:
+        ValueError: the lag is not positive and finite.
+    """
+    if not (isfinite(lag) and lag > 0.0):
+        raise ValueError(f"the lag of the acceleration must be positive and finite, not {lag}")
+    a = np.array([[0.0, 1.0, 0.0], [0.0, -drag, 1.0], [0.0, 0.0, -1.0 / lag]])
+    b = np.array([[0.0], [0.0], [1.0 / lag]])
+    q = np.diag([weights.position, weights.velocity, 0.0])
+    values, vectors = np.linalg.eig(np.block([[a, -b @ b.T], [-q, -a.T]]))
+    stable = vectors[:, np.argsort(values.real)[:3]]
+    riccati = np.real(stable[3:] @ np.linalg.inv(stable[:3]))
+    position, velocity, acceleration = (b.T @ riccati)[0].tolist()
+    return ChainGains(position, velocity, acceleration)
+
+
+_LARGEST_FALL = 0.5 * GRAVITY
+_LARGEST_RISE = 0.5 * GRAVITY
+
+
+@dataclass(frozen=True, slots=True)
+class HeightGains:
+    """Gains and limits of the cascade.
+
+    Attributes:
+        height: vertical speed per m, 1/s.
+        climb: vertical acceleration per m/s, 1/s.
+        max_climb: m/s upwards.
+        max_descent: m/s downwards.
+    """
+
+    height: float
+    climb: float
+    max_climb: float
+    max_descent: float
+
+
+def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleMotion) -> float:
+    """The wanted acceleration downwards, m/s²."""
+    error = reference.position_ned[2] - motion.position_ned[2]
+    speed = reference.velocity_ned[2] + gains.height * error
+    speed = min(max(speed, -gains.max_climb), gains.max_descent)
+    wanted = reference.acceleration_ned[2] + gains.climb * (speed - motion.velocity_ned[2])
+    return min(max(wanted, -_LARGEST_RISE), _LARGEST_FALL)

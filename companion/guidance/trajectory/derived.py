@@ -1,0 +1,123 @@
+"""The same way flown more slowly."""
+
+from dataclasses import dataclass
+from math import remainder, tau
+
+from companion.guidance.trajectory.sample import Sample, Trajectory, Vector
+from companion.guidance.trajectory.time_laws import Cruise
+
+
+@dataclass(frozen=True, slots=True)
+class Slowed:
+    """A trajectory stretched in time.
+
+    Attributes:
+        trajectory: as it was.
+        factor: it lasts so many times as long.
+    """
+
+    trajectory: Trajectory
+    factor: float
+
+    @property
+    def name(self) -> str:
+        """That of the trajectory."""
+        return self.trajectory.name
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, s."""
+        return self.factor * self.trajectory.duration
+
+    @property
+    def holds_heading(self) -> bool:
+        """As the trajectory does."""
+        return self.trajectory.holds_heading
+
+    def check_times(self) -> list[float]:
+        """Those of the trajectory, stretched."""
+        return [self.factor * time for time in self.trajectory.check_times()]
+
+    def at(self, time: float) -> Sample:
+        """The sample `time` seconds after the beginning."""
+        rate = 1.0 / self.factor
+        sample = self.trajectory.at(time * rate)
+        return Sample(
+            sample.position,
+            _scaled(sample.velocity, rate),
+            _scaled(sample.acceleration, rate**2),
+            _scaled(sample.jerk, rate**3),
+            sample.heading,
+            sample.heading_rate * rate,
+        )
+
+
+def _scaled(vector: Vector, by: float) -> Vector:
+    return vector[0] * by, vector[1] * by, vector[2] * by
+
+
+_REST = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class TurnedFirst:
+    """A trajectory that begins with a turn on the spot.
+
+    Attributes:
+        trajectory: flown after the turn.
+        begin: heading at the beginning, rad.
+        sign: +1 to turn clockwise, −1 anticlockwise.
+        turn: the time law of the angle turned.
+    """
+
+    trajectory: Trajectory
+    begin: float
+    sign: float
+    turn: Cruise
+
+    @property
+    def name(self) -> str:
+        """That of the trajectory."""
+        return self.trajectory.name
+
+    @property
+    def duration(self) -> float:
+        """With the turn, s."""
+        return self.turn.duration + self.trajectory.duration
+
+    @property
+    def holds_heading(self) -> bool:
+        """It does not."""
+        return False
+
+    def check_times(self) -> list[float]:
+        """Those of the trajectory; the turn keeps its own limit and stays where it is."""
+        return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
+
+    def at(self, time: float) -> Sample:
+        """The sample `time` seconds after the turn began."""
+        after = time - self.turn.duration
+        if after >= 0.0:
+            return self.trajectory.at(after)
+        angle, rate, _, _ = self.turn.at(time)
+        heading = self.begin + self.sign * angle
+        return Sample(_REST, _REST, _REST, _REST, heading, self.sign * rate)
+
+
+def turned_first(trajectory: Trajectory, heading: float, yaw_rate: float) -> Trajectory:
+    """The trajectory with a turn before it, the short way from `heading` to its own.
+
+    Args:
+        trajectory: returned as it is if it holds its heading or already has this one.
+        heading: of the vehicle at the start, rad.
+        yaw_rate: largest in the turn, rad/s.
+    """
+    if trajectory.holds_heading:
+        return trajectory
+    own = trajectory.at(0.0).heading
+    angle = remainder(own - heading, tau)
+    if angle == 0.0:
+        return trajectory
+    ramp = abs(angle) / yaw_rate
+    turn = Cruise(abs(angle), yaw_rate, ramp, ramp)
+    return TurnedFirst(trajectory, own - angle, 1.0 if angle > 0.0 else -1.0, turn)

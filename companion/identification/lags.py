@@ -1,0 +1,165 @@
+"""Exact response of a first-order lag to held commands, at any time, with or without a slew limit.
+
+Between two knots the lag's input is a straight line v + m·(t − t_i), and the output solves
+τ·ẋ = v + m·(t − t_i) − x:  x(t) = v + m·(t − t_i − τ) + (x_i − v + m·τ)·exp(−(t − t_i)/τ).
+"""
+
+from math import copysign, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Numbers = NDArray[Any]
+"""Real or complex."""
+
+_LONGEST_PART = 500.0
+"""e to this power still is a number."""
+
+
+class Knots(NamedTuple):
+    """A command in straight pieces, which may jump.
+
+    Attributes:
+        time: (n,), start of each piece, s, not decreasing.
+        value: (n,), at the start of each piece.
+        slope: (n,), per second.
+    """
+
+    time: Floats
+    value: Floats
+    slope: Floats
+
+
+def held(time: Floats, commanded: Floats, alike: float = 0.0) -> Knots:
+    """Commands (n,) held from their times (n,) on.
+
+    A command makes a piece of its own where it differs by more than `alike` from the latest that
+    does: what a noisy sensor makes a planner ask for would else be most of the work.
+    """
+    kept, latest = [], np.inf
+    for number, value in enumerate(commanded.tolist()):
+        if abs(value - latest) > alike:
+            kept.append(number)
+            latest = value
+    return Knots(time[kept], commanded[kept], np.zeros(len(kept)))
+
+
+def slewed(commands: Knots, slew: float) -> Knots:
+    """Held commands approached no faster than `slew` (per second), from rest at the first."""
+    start = _before_each(commands, slew)
+    way = commands.value - start
+    arrival = commands.time + np.abs(way) / slew
+    ramps = np.column_stack((commands.time, start, np.copysign(slew, way)))
+    rests = np.column_stack((arrival, commands.value, np.zeros(way.size)))
+    moves, arrives = arrival > commands.time, arrival < np.append(commands.time[1:], np.inf)
+    # A ramp and the rest behind it take turns, each only where there is one.
+    rows = np.stack((ramps, rests), axis=1).reshape(-1, 3)
+    return Knots(*rows[np.column_stack((moves, arrives)).ravel()].T)
+
+
+def _before_each(commands: Knots, slew: float) -> Floats:
+    """(n,), where the slewed value stands as each command comes.
+
+    The one loop that must go through the commands in turn, since each start is the end before it.
+    """
+    value = float(commands.value[0])
+    starts, reaches = [value], slew * np.diff(commands.time)
+    for target, reach in zip(commands.value[:-1].tolist(), reaches.tolist(), strict=True):
+        way = target - value
+        if way > reach:
+            value += reach
+        elif way < -reach:
+            value -= reach
+        else:
+            value = target
+        starts.append(value)
+    return np.array(starts)
+
+
+def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
+    """What a lag of `lag` > 0 seconds makes of the commands, at the times (m,), begun at rest.
+
+    No time in `at` may lie before the first knot.
+    """
+    return np.asarray(lagged_by(commands, lag, at), dtype=np.float64)
+
+
+def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
+    """`lagged` for a lag that may be complex: one of a pair that is an oscillation."""
+    steady = commands.value - commands.slope * lag
+    ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
+    jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
+    excess = _decaying(commands.time / lag, jumps)
+    piece = np.searchsorted(commands.time, at, side="right") - 1
+    since = at - commands.time[piece]
+    straight = steady[piece] + commands.slope[piece] * since
+    response: Numbers = straight + excess[piece] * np.exp(-since / lag)
+    return response
+
+
+def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
+    """(n,), at each age (n,) the sum of the jumps (n,) so far, each decayed since its own age.
+
+    As running sums, in as long parts as exponentials allow.
+    """
+    sums = np.empty_like(jumps)
+    real = np.real(ages)
+    start, before = 0, 0.0 * jumps[0]
+    while start < jumps.size:
+        end = int(np.searchsorted(real, real[start] + _LONGEST_PART, side="right"))
+        growth = np.exp(ages[start:end] - ages[start])
+        sums[start:end] = (before + np.cumsum(jumps[start:end] * growth)) / growth
+        if end < jumps.size:
+            step = ages[end] - ages[end - 1]
+            before = sums[end - 1] * np.exp(-step)
+        start = end
+    return sums
+
+
+def value_at(commands: Knots, at: Floats) -> Floats:
+    """The commands themselves at the times (m,), none before the first knot."""
+    piece = np.searchsorted(commands.time, at, side="right") - 1
+    values: Floats = commands.value[piece] + commands.slope[piece] * (at - commands.time[piece])
+    return values
+
+
+_NEARLY_CRITICAL = 1e-6
+"""Nearer to ζ² = 1 the two lags would be one, and their difference 0."""
+
+
+def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
+    """What the loop makes of the commands at the times (m,), begun at rest.
+
+    Args:
+        commands: none of `at` may lie before the first knot.
+        frequency: ω, rad/s.
+        damping: ζ.
+        at: (m,), s.
+    """
+    first, second = _lags(frequency, damping)
+    if first.imag:
+        oscillating: Floats = np.imag(first * lagged_by(commands, first, at)) / first.imag
+        return oscillating
+    slow, quick = first.real, second.real
+    by_slow, by_quick = lagged(commands, slow, at), lagged(commands, quick, at)
+    return (slow * by_slow - quick * by_quick) / (slow - quick)
+
+
+def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
+    """(m, 2), how the state at the start dies away, `since` (m,) seconds later."""
+    first, second = _lags(frequency, damping)
+    if first.imag:
+        turning = np.exp(-since / first)
+        return np.column_stack((np.real(turning), np.imag(turning)))
+    slow, quick = np.exp(-since / first.real), np.exp(-since / second.real)
+    # The second as a difference, so that the two stay apart near critical damping.
+    return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
+
+
+def _lags(frequency: float, damping: float) -> tuple[complex, complex]:
+    apart = damping * damping - 1.0
+    apart = copysign(max(abs(apart), _NEARLY_CRITICAL), apart)
+    root = complex(0.0, sqrt(-apart)) if apart < 0.0 else complex(sqrt(apart))
+    return 1.0 / (frequency * (damping - root)), 1.0 / (frequency * (damping + root))

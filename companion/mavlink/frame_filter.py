@@ -1,0 +1,80 @@
+"""Which frames are the vehicle's own: by their system and component, and by their signature."""
+
+from collections.abc import Callable
+
+from companion.mavlink.framing import Frame
+from companion.mavlink.settings import LinkSettings
+from companion.mavlink.signing import SignatureResult
+from companion.mavlink.stats import LinkStats
+
+Notice = Callable[[str], None]
+"""Takes a sentence about the link that its user should read."""
+
+_REFUSED = {
+    SignatureResult.UNSIGNED: "the vehicle does not sign its frames, so they are refused; give it "
+    "the same key as link.signing_key_file, or leave signing out on both sides",
+    SignatureResult.WRONG_KEY: "the vehicle signs its frames with another key, so they are "
+    "refused; give both sides the same key (link.signing_key_file)",
+}
+"""Notices of refused signatures. `Signing.remarks` has those about time stamps."""
+
+_WE_DO_NOT_SIGN = (
+    "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
+    "link.signing_key_file to a file with its passphrase"
+)
+
+
+class FrameFilter:
+    """Tells the vehicle's frames from all others, and counts those it refuses.
+
+    Args:
+        settings: The vehicle's ids, and the key.
+        stats: Counts foreign frames and bad signatures.
+        notice: Told once of each reason why the two sides do not understand each other.
+    """
+
+    def __init__(self, settings: LinkSettings, stats: LinkStats, notice: Notice) -> None:
+        self._source = (settings.target_system, settings.target_component)
+        self._signing = settings.signing
+        self._stats, self._notice = stats, notice
+        self._noticed: set[str] = set()
+
+    @property
+    def awaits_answer(self) -> bool:
+        """Whether only an answer to our TIMESYNC request is missing to believe the last frame."""
+        return self._signing is not None and self._signing.awaits_answer
+
+    def from_vehicle(self, frame: Frame) -> bool:
+        """Whether a frame carries the vehicle's system and component."""
+        source = (frame.system, frame.component)
+        if source == self._source:
+            return True
+        self._stats.ignored_foreign += 1
+        self._stats.foreign_sources.add(source)
+        return False
+
+    def signature_good(self, frame: Frame) -> bool:
+        """Whether a frame is signed as it must be; without a key every frame is good."""
+        if self._signing is None:
+            if frame.signed:
+                self.notice_once(_WE_DO_NOT_SIGN)
+            return True
+        result = self._signing.check(frame)
+        self.tell_remarks()
+        if result is SignatureResult.GOOD:
+            return True
+        self._stats.bad_signature += 1
+        if result in _REFUSED:
+            self.notice_once(_REFUSED[result])
+        return False
+
+    def tell_remarks(self) -> None:
+        """Pass on what signing has to say about time stamps."""
+        while self._signing is not None and self._signing.remarks:
+            self.notice_once(self._signing.remarks.pop(0))
+
+    def notice_once(self, text: str) -> None:
+        """Tell the user, unless this was told before."""
+        if text not in self._noticed:
+            self._noticed.add(text)
+            self._notice(text)

@@ -1,0 +1,224 @@
+"""Setting parameters: each asked for, written to an undo file before it is set, and read back."""
+
+import asyncio
+import os
+from collections.abc import Awaitable, Callable, Iterable
+from datetime import UTC, datetime
+from enum import Enum
+from math import isclose
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from companion.files import bounded_yaml
+from companion.files.yaml_file import ConfigError, Section
+from companion.mavlink.errors import LinkError, ParameterError
+from companion.preflight.evidence import Identity
+from companion.preflight.finding import Change, Finding
+from companion.vehicle.link import Link
+
+Word = Annotated[str, Field(max_length=100)]
+LARGEST = 3.5e38
+"""PARAM_SET carries a 32-bit float."""
+
+
+class Undo(Section):
+    """What to restore, and on which vehicle."""
+
+    autopilot: Word
+    """Name of the autopilot's family."""
+    system: Annotated[int, Field(ge=1, le=255)]
+    """The vehicle's system id."""
+    uid: Word | None
+    """AUTOPILOT_VERSION's id of the hardware; null: it was not told."""
+    time: Word
+    """When the first of them was set, UTC."""
+    parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
+    """Old value of each, in the order in which they were set."""
+
+    def meant_for(self, link: Link, identity: Identity) -> bool:
+        """Whether this is the vehicle whose parameters were changed."""
+        same_hardware = None in (self.uid, identity.uid) or self.uid == identity.uid
+        told = self.autopilot, self.system
+        return same_hardware and told == (link.autopilot.name, link.settings.target_system)
+
+
+class UndoFile:
+    """Grows by one parameter before each of them is set.
+
+    Args:
+        directory: Where it is to be made.
+        link: To the vehicle.
+        identity: What the vehicle said of itself.
+    """
+
+    def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
+        began = datetime.now(UTC)
+        self.path = _unused(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
+        self._undo = Undo(
+            autopilot=link.autopilot.name,
+            system=link.settings.target_system,
+            uid=identity.uid,
+            time=began.isoformat(timespec="seconds"),
+            parameters={},
+        )
+
+    def add(self, parameter: str, old: float) -> None:
+        """Note an old value; on the disk, whole, when this returns. The first one counts.
+
+        Raises:
+            ConfigError: it cannot be written, so nothing must be set.
+        """
+        grown = dict(self._undo.parameters)
+        grown.setdefault(parameter, old)
+        self._undo = self._undo.model_copy(update={"parameters": grown})
+        text = bounded_yaml.dump(self._undo.model_dump())
+        part = self.path.with_suffix(".part")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with part.open("w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(self.path)
+            _sync(self.path.parent)
+        except OSError as error:
+            raise ConfigError(
+                f"recording.directory: the undo file {self.path} cannot be written, so nothing "
+                f"more is set: {error.strerror}"
+            ) from error
+
+
+def _unused(directory: Path, name: str) -> Path:
+    """A file that is not there yet: another run may have begun within the same second."""
+    path, number = directory / f"{name}.yaml", 1
+    while path.exists():
+        number += 1
+        path = directory / f"{name}-{number}.yaml"
+    return path
+
+
+def _sync(directory: Path) -> None:
+    """Have the file's new name on the disk, too."""
+    handle = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+_SINGLE = 1e-6
+"""Parameters are single precision, which tells so much apart."""
+_KNOWN_FOR = 3.0
+"""A heartbeat older than this does not tell any more whether the vehicle is armed, s."""
+
+
+class Answer(Enum):
+    """What the user says to a change."""
+
+    YES = "yes"
+    NO = "no"
+    ALL = "all"
+    QUIT = "quit"
+
+
+Ask = Callable[[Finding], Awaitable[Answer]]
+
+
+class Outcome(NamedTuple):
+    """What became of a change.
+
+    Attributes:
+        change: It.
+        refusal: Why it was not made; empty if it was.
+    """
+
+    change: Change
+    refusal: str = ""
+
+
+class VehicleArmedError(LinkError):
+    """Parameters of a vehicle that may fly are left alone."""
+
+
+async def apply_fixes(
+    link: Link,
+    findings: Iterable[Finding],
+    ask: Ask,
+    undo: UndoFile,
+    told: Callable[[Outcome], None],
+) -> None:
+    """Propose each change, and make those that the user agrees to.
+
+    Args:
+        link: To the vehicle.
+        findings: Those without a change are left out.
+        ask: Is asked before each, until it says all.
+        undo: Notes the old value before it is overwritten.
+        told: Takes what became of each change that was agreed to, as soon as that is known.
+
+    Raises:
+        VehicleArmedError: The vehicle is armed, or nobody knows; no more was set.
+        ConfigError: The undo file cannot be written; no more was set.
+        LinkLost: The connection dropped meanwhile.
+    """
+    answer = Answer.NO
+    for finding in findings:
+        change = finding.change
+        if change is None:
+            continue
+        if answer is not Answer.ALL:
+            answer = await ask(finding)
+        if answer is Answer.QUIT:
+            return
+        if answer is Answer.NO:
+            continue
+        require_disarmed(link)
+        undo.add(change.parameter, change.old)
+        told(await _set(link, change))
+
+
+async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> None:
+    """Set what the undo file says, the last change first.
+
+    Raises:
+        VehicleArmedError, LinkLost: As `apply_fixes`.
+    """
+    for parameter, old in reversed(undo.parameters.items()):
+        require_disarmed(link)
+        try:
+            now = float(await link.read_parameter(parameter))
+        except ParameterError as error:
+            told(Outcome(Change(parameter, old, old, reboot=False), str(error)))
+            continue
+        told(await _set(link, Change(parameter, now, old, reboot=False)))
+
+
+def require_disarmed(link: Link) -> None:
+    """Go no further with a vehicle that may fly.
+
+    Raises:
+        VehicleArmedError: It is armed, or its last heartbeat is too old to tell.
+    """
+    heartbeat, now = link.state.heartbeat, asyncio.get_running_loop().time()
+    if heartbeat is None or now - heartbeat.received > _KNOWN_FOR:
+        raise VehicleArmedError(
+            "no heartbeat any more, so it is not known whether the vehicle is armed; "
+            "no more parameters are set"
+        )
+    if heartbeat.armed:
+        raise VehicleArmedError(
+            "the vehicle is armed, and its parameters are left alone; land and disarm it first"
+        )
+
+
+async def _set(link: Link, change: Change) -> Outcome:
+    try:
+        await link.write_parameter(change.parameter, change.new)
+        held = await link.read_parameter(change.parameter)
+    except ParameterError as error:
+        return Outcome(change, str(error))
+    if isclose(held, change.new, rel_tol=_SINGLE, abs_tol=_SINGLE):
+        return Outcome(change)
+    return Outcome(change, f"{change.parameter}: {held:g} was read back instead of {change.new:g}")

@@ -1,0 +1,120 @@
+"""What the autopilot's parameters say about this flight, as findings."""
+
+from collections.abc import Iterator
+
+from companion.config import Config
+from companion.mavlink.stats import SOME_LOST
+from companion.preflight.evidence import Evidence
+from companion.preflight.finding import Change, Finding, Key
+from companion.preflight.parameter_survey import Survey
+from companion.vehicle.parameter_rules import (
+    CheckResult,
+    CompanionSettings,
+    ParameterFinding,
+    ParameterRule,
+    judge,
+)
+
+
+def companion_settings(config: Config) -> CompanionSettings:
+    """The part of our configuration that the autopilot's parameters must agree with, in SI."""
+    limits = {name: axis.acceleration_limit for name, axis in config.vehicle.axes.items()}
+    return CompanionSettings(
+        source_system=config.link.source_system,
+        attitude_rate_hz=config.link.attitude_rate_hz,
+        silence_limit=config.deadman.silence_limit,
+        hover_thrust=config.thrust.hover_thrust,
+        curve_factor=config.thrust.curve_factor,
+        battery_exponent=config.thrust.battery_exponent,
+        tilt_compensated=config.thrust.autopilot_compensates_tilt,
+        acceleration_limits=limits,
+        max_tilt=config.limits.max_tilt,
+        signs=config.link.signing_key_file is not None,
+    )
+
+
+def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Judge the parameters that were read, and those that were not."""
+    rules, survey = evidence.autopilot.parameters, evidence.survey
+    if not survey.values:
+        yield Finding(
+            Key.PARAMETERS,
+            CheckResult.UNSAFE,
+            "the autopilot answers no parameter request",
+            "its failsafes are unknown, and so is how it takes a setpoint",
+            "check that a router or a signing key between does not block PARAM messages",
+            "PARAM_REQUEST_READ",
+        )
+        return
+    for rule in rules:
+        if rule.vital and rule.name not in survey.values:
+            yield _missing(rule, evidence.autopilot.name)
+    yield from _untold(evidence)
+    for found in judge(rules, survey.values, companion_settings(config)):
+        yield _finding(found, survey.names[found.rule.name])
+
+
+def _missing(rule: ParameterRule, autopilot: str) -> Finding:
+    return Finding(
+        rule.name,
+        CheckResult.UNSAFE,
+        f"the autopilot has no parameter {rule.name}, or did not send it",
+        f"it is unknown {rule.meaning}",
+        f"fix the link; where it has none, this needs a newer version of {autopilot}",
+        rule.source,
+    )
+
+
+def _untold(evidence: Evidence) -> Iterator[Finding]:
+    """Parameters not received: lost on a bad link; on a good one this version lacks them."""
+    survey = evidence.survey
+    lossy = survey.lossy or evidence.link.loss > SOME_LOST
+    rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
+    hidden = [rule for rule in rules if rule.universal and _hidden(rule, survey)]
+    unread = [rule.name for rule in hidden]
+    if lossy:
+        for rule in hidden:
+            yield Finding(
+                rule.name,
+                CheckResult.UNSAFE,
+                f"{rule.name} was not received, and the link loses frames",
+                f"it is unknown {rule.meaning}",
+                "fix the link",
+                rule.source,
+            )
+        others = (rule.name for rule in rules if rule.name in survey.untold)
+        unread = [name for name in others if name not in unread]
+    if unread:
+        yield Finding(
+            Key.PARAMETERS,
+            CheckResult.INEFFECTIVE,
+            f"not received: {', '.join(unread)}",
+            "the autopilot has no such parameter, or the link lost the answer; so their values "
+            "were not checked",
+            "fix the link, or check them with a ground station",
+            "PARAM_REQUEST_READ",
+        )
+
+
+def _hidden(rule: ParameterRule, survey: Survey) -> bool:
+    """Whether it, or its counterpart in other versions, may exist although it was not read."""
+    places = {rule.name, rule.instead}
+    return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
+
+
+def _finding(found: ParameterFinding, name: str) -> Finding:
+    change, fix = None, ""
+    if found.set_to is not None:
+        change = Change(name, found.value, found.set_to, found.rule.reboot)
+        fix = f"set {name} to {found.set_to:g}"
+        if found.rule.reboot:
+            fix += " and restart the autopilot"
+    return Finding(
+        found.rule.name,
+        found.result,
+        f"{name} is {found.value:g}",
+        found.because or found.rule.meaning,
+        fix,
+        found.rule.source,
+        change,
+    )

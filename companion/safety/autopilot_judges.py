@@ -1,0 +1,96 @@
+"""Judges of the autopilot's own status: arming, failsafe, battery, GPS and estimator."""
+
+from math import degrees
+
+from companion.safety.monitor import Judge
+from companion.safety.snapshot import Snapshot
+from companion.vehicle.records import gps_fault, outdated
+
+ATTITUDE, VELOCITY = 0x1, 0x2 | 0x4
+HORIZONTAL = 0x8 | 0x10
+"""Bits of ESTIMATOR_STATUS_FLAGS; either bit of HORIZONTAL gives a horizontal position."""
+
+
+def disarmed(snapshot: Snapshot, _: bool) -> str | None:
+    """The vehicle disarmed in flight, not by our command."""
+    return None if snapshot.autopilot.armed else "the vehicle disarmed in flight"
+
+
+def landed(snapshot: Snapshot, _: bool) -> str | None:
+    """The autopilot reports landed under our thrust: its land detector or our thrust is wrong."""
+    return "the autopilot says that it has landed" if snapshot.autopilot.landed else None
+
+
+def failsafe(snapshot: Snapshot, _: bool) -> str | None:
+    """HEARTBEAT's system_status is MAV_STATE_CRITICAL."""
+    return "the autopilot reports a failsafe" if snapshot.autopilot.failsafe else None
+
+
+def battery(least: float) -> Judge:
+    """The battery's remaining share is below `least` (0..1), or is not reported any more."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        told = snapshot.autopilot.battery
+        if told is None:
+            return None
+        if outdated(told.received, snapshot.now):  # the battery may have become empty meanwhile
+            return "the battery's state is not reported any more"
+        if told.remaining is None or told.remaining >= least:
+            return None
+        return (
+            f"battery at {100 * told.remaining:.0f} %, below "
+            f"limits.min_battery_percent {100 * least:.0f}"
+        )
+
+    return judge
+
+
+def gps(snapshot: Snapshot, _: bool) -> str | None:
+    """A vehicle that flew by GPS has lost its 3D fix, or does not report it any more."""
+    return gps_fault(snapshot.autopilot.gps, snapshot.now) if snapshot.had_gps else None
+
+
+def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
+    """ESTIMATOR_STATUS lost flags that were set when control began, or does not come any more."""
+    estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
+    if estimator is None:
+        return None
+    if outdated(estimator.received, snapshot.now):
+        return "the estimator's state is not reported any more"
+    missing = good & (ATTITUDE | VELOCITY) & ~estimator.flags
+    if good & HORIZONTAL and not estimator.flags & HORIZONTAL:
+        missing |= good & HORIZONTAL
+    if not missing:
+        return None
+    return f"the estimator is not sure any more (ESTIMATOR_STATUS lost flags 0x{missing:x})"
+
+
+def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
+    """The estimator was reset; references moved along, so a warning is enough."""
+    found = snapshot.resets
+    if found.recent == 0:
+        return None
+    return (
+        f"the estimator was reset: {found.shift:.1f} m and {degrees(found.turn):.0f}° of heading "
+        "in sum; the references moved along"
+    )
+
+
+def estimator_resets(most: int, shift: float, turn: float) -> Judge:
+    """The estimator was reset more than `most` times, or by more than `shift` (m), `turn` (rad)."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        found = snapshot.resets
+        if found.shift > shift:
+            return f"the autopilot's estimator was reset by {found.shift:.1f} m"
+        if abs(found.turn) > turn:
+            return (
+                f"the autopilot's estimator was reset by {degrees(abs(found.turn)):.0f}° of heading"
+            )
+        if found.tilt > 0.5 * turn:
+            return f"the autopilot's estimator was reset by {degrees(found.tilt):.0f}° of tilt"
+        if found.recent > most:
+            return f"the autopilot's estimator was reset {found.recent} times in a short while"
+        return None
+
+    return judge

@@ -1,0 +1,135 @@
+"""Judges of the data flow: silence, the vehicle's clock, the link, and this computer."""
+
+from companion.control.loop_record import Unanswered
+from companion.safety.monitor import Judge, released, released_minimum
+from companion.safety.snapshot import Control, Snapshot
+
+_HEARD = 0.3
+"""Without any frame for this long we would not hear a takeover either, s."""
+
+_OUR_STALL = 0.5
+"""If our timer did not run for a larger share of the silence, this computer caused it."""
+
+
+def silence(limit: float, *, heard: bool) -> Judge:
+    """No setpoint left for longer than `limit` s, while frames come (`heard`) or do not come."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        now, control = snapshot.now, snapshot.control
+        if now - control.answered <= limit or (now - control.heard < _HEARD) is not heard:
+            return None
+        return _silence_cause(now, control, limit)
+
+    return judge
+
+
+def _silence_cause(now: float, control: Control, limit: float) -> str:
+    if control.stood_still > _OUR_STALL * (now - control.answered):
+        # Data that came during the stall were read late, so their age proves nothing.
+        return f"this computer stood still for {control.stood_still:.1f} s"
+    if now - control.sampled > limit:
+        return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
+    reason = control.reason
+    if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
+        return _missing_command_cause(now, control, limit)
+    return "no setpoint was sent" if reason is None else reason.words
+
+
+def _missing_command_cause(now: float, control: Control, limit: float) -> str:
+    if now - control.placed > limit:
+        return "no position from the vehicle"
+    if not control.position_fresh:
+        return "position arrives later than deadman.position_stale_ms"
+    return Unanswered.OLD_TARGET.words
+
+
+def clock_changed(snapshot: Snapshot, _: bool) -> str | None:
+    """The vehicle's clock jumped, stood still, wrapped or restarted since control began."""
+    return snapshot.control.clock_change
+
+
+def loss(most: float) -> Judge:
+    """More than the share `most` of the vehicle's frames is lost."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        lost = snapshot.health.lost
+        if lost is None or lost <= released(most, raised):
+            return None
+        return f"{100 * lost:.0f} % of the vehicle's frames are lost"
+
+    return judge
+
+
+def round_trip(most: float) -> Judge:
+    """The round trip of TIMESYNC takes longer than `most`, s."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        seconds = snapshot.health.round_trip
+        if seconds is None or seconds <= released(most, raised):
+            return None
+        return f"the link's round trip takes {1e3 * seconds:.0f} ms"
+
+    return judge
+
+
+def deadlines(most: float) -> Judge:
+    """More than the share `most` of our answers misses deadman.deadline_ms."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        missed = snapshot.health.missed
+        if missed is None or missed <= released(most, raised):
+            return None
+        return f"{100 * missed:.0f} % of the answers miss deadman.deadline_ms"
+
+    return judge
+
+
+def starvation(most: float) -> Judge:
+    """CPU starvation: our timer is late by more than the share `most` of the time."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        starved = snapshot.health.starved
+        if starved is None or starved <= released(most, raised):
+            return None
+        return f"CPU starvation: our timer is late by {100 * starved:.0f} % of the time"
+
+    return judge
+
+
+def gaps(most: int) -> Judge:
+    """The answers had more than `most` gaps within a few seconds."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        found = snapshot.health.gaps
+        if found <= most:
+            return None
+        return (
+            f"samples could not be answered {found} times within 5 s for longer than "
+            "deadman.telemetry_stale_ms"
+        )
+
+    return judge
+
+
+def answer_rate(least: float) -> Judge:
+    """Samples are answered at less than `least` Hz; bursts count as the pauses between them."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        rate = snapshot.health.answer_rate
+        if rate is None or rate >= released_minimum(least, raised):
+            return None
+        return f"attitude is answered at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
+
+    return judge
+
+
+def position_rate(least: float) -> Judge:
+    """Positions come at less than `least` Hz."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        rate = snapshot.health.position_rate
+        if rate is None or rate >= released_minimum(least, raised):
+            return None
+        return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {least:g}"
+
+    return judge

@@ -1,0 +1,101 @@
+"""Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
+
+The braking judge stops the vehicle before it leaves the fence. It judges where the vehicle would
+come to a stop after the reaction time, with the deceleration that is certain (`Fence.stop`).
+"""
+
+from math import degrees, hypot
+
+from companion.attitude.kinematics import tilt_angle
+from companion.guidance.fence import Fence
+from companion.safety.monitor import Judge, released
+from companion.safety.snapshot import Snapshot
+
+
+def tilt(limit: float) -> Judge:
+    """The thrust axis tilts more than `limit`, rad."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        q = snapshot.motion.q
+        if q is None:
+            return None
+        angle = tilt_angle(q[1], q[2])
+        return f"{degrees(angle):.0f}° of tilt" if angle > released(limit, raised) else None
+
+    return judge
+
+
+def body_rate(limit: float) -> Judge:
+    """The body turns faster than `limit` about any axis, rad/s."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        rate = hypot(*snapshot.motion.body_rates)
+        if rate <= released(limit, raised):
+            return None
+        return f"the vehicle turns at {degrees(rate):.0f}°/s"
+
+    return judge
+
+
+def speed(limit: float) -> Judge:
+    """The vehicle moves faster than `limit`, m/s."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        velocity = hypot(*snapshot.motion.velocity)
+        if velocity <= released(limit, raised):
+            return None
+        return f"{velocity:.1f} m/s, faster than safety.max_speed_m_s"
+
+    return judge
+
+
+def tracking(limit: float) -> Judge:
+    """The vehicle is farther than `limit` from its reference, m."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        error = snapshot.motion.off_course
+        if error is None or error <= released(limit, raised):
+            return None
+        return f"{error:.1f} m off its course, more than safety.max_tracking_error_m"
+
+    return judge
+
+
+def thrust(lowest: float, highest: float) -> Judge:
+    """The thrust is at one of its limits (0..1), so that the height is not held any more."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        sent = snapshot.motion.thrust
+        if sent is None or lowest < sent < highest:
+            return None
+        key = "min_thrust" if sent <= lowest else "max_thrust"
+        return f"thrust is at limits.{key}"
+
+    return judge
+
+
+def outside(fence: Fence) -> Judge:
+    """The vehicle has left the fence."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        motion = snapshot.motion
+        if motion.offset is None:
+            return None
+        found = fence.breach(motion.offset, motion.height, motion.origin)
+        return None if found is None else str(found)
+
+    return judge
+
+
+def braking(fence: Fence) -> Judge:
+    """The vehicle is inside the fence, but would stop outside if it began to brake now."""
+
+    def judge(snapshot: Snapshot, _: bool) -> str | None:
+        motion = snapshot.motion
+        offset, velocity, height = motion.offset, motion.velocity, motion.height
+        if offset is None or fence.breach(offset, height, motion.origin) is not None:
+            return None
+        found = fence.stop_breach(offset, velocity, height, motion.origin)
+        return None if found is None else f"about to stop {found}"
+
+    return judge

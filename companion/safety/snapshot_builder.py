@@ -1,0 +1,197 @@
+"""Builds the snapshots from the newest telemetry, our counters, and shares over one second."""
+
+from collections import deque
+from math import dist, inf
+from typing import NamedTuple
+
+from companion.attitude.representation import wrap_angle
+from companion.control.control_loop import ControlLoop
+from companion.control.guidance_loop import GuidanceLoop
+from companion.guidance.fence import Place
+from companion.guidance.reference import Vector
+from companion.mavlink.stats import share_lost
+from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.vehicle.held_rates import HeldRates
+from companion.vehicle.link import Link
+
+_WINDOW = 1.0
+"""Averaging time of shares and rates, s."""
+_EARLY = 0.9
+"""Shares are known once this part of the window is filled."""
+_LATE = 0.03
+"""A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
+_PLACE_LASTS = 1.0
+"""An older GLOBAL_POSITION_INT does not tell where control begins, s."""
+_GAPS_WITHIN = 5.0
+"""Gaps in the answers are counted over this time, s."""
+_RESETS_WITHIN = 30.0
+"""Estimator resets are counted over this time, s."""
+
+
+class _Counters(NamedTuple):
+    """Counters at one call of `listen`; `late` is how late that call came, s."""
+
+    now: float
+    frames: int
+    lost: int
+    setpoints: int
+    missed: int
+    late: float
+    held: HeldRates
+    positions: int
+
+
+class SnapshotBuilder:
+    """Collects the data that the monitors judge.
+
+    Args:
+        link: to the vehicle.
+        loop: answers the samples.
+        guidance_loop: makes the commands.
+        real_time: whether deadlines count; in lockstep the vehicle waits for us.
+    """
+
+    def __init__(
+        self, link: Link, loop: ControlLoop, guidance_loop: GuidanceLoop, *, real_time: bool
+    ) -> None:
+        self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
+        self._real_time = real_time
+        self._counted: deque[_Counters] = deque()
+        self._frames = 0
+        self._heard_at = 0.0
+        self._start: Vector | None = None
+        self._origin: Place | None = None
+        self._began_at = 0.0
+        self._turn = 0.0
+        self._shift: Vector = (0.0, 0.0, 0.0)
+        self._good_flags = 0
+        self._timeline = 0
+
+    def begin(self, now: float) -> None:
+        """Note that control begins: the fence is centred here, and earlier resets do not count."""
+        state, resets = self._link.state, self._loop.resets
+        motion = self._guidance_loop.motion
+        self._start = None if motion is None else motion.position_ned
+        self._origin = self._place(now)
+        self._began_at, self._turn, self._shift = now, resets.turn, resets.shift
+        resets.largest_tilt = 0.0
+        self._good_flags = 0 if state.estimator is None else state.estimator.flags
+        self._timeline = self._link.clock.timeline
+        self._counted.clear()
+
+    def listen(self, now: float) -> None:
+        """Take the counters at `now`; the watch calls this 50 times a second in every phase."""
+        stats, loop, record = self._link.stats, self._loop, self._loop.record
+        if stats.frames != self._frames:
+            self._frames, self._heard_at = stats.frames, now
+        loop.resets.on_counter(self._link.state.reset_counter, now)
+        counted = self._counted
+        late = max(0.0, now - counted[-1].now - _LATE) if counted else 0.0
+        counted.append(
+            _Counters(
+                now,
+                stats.frames,
+                stats.lost,
+                record.setpoints,
+                record.missed_deadlines,
+                late,
+                record.held.copy(),
+                self._link.state.positions,
+            )
+        )
+        while len(counted) > 2 and now - counted[1].now >= _WINDOW:
+            counted.popleft()
+
+    def snapshot(self, now: float) -> Snapshot:
+        """The snapshot at `now`, s on our clock; call `listen` before."""
+        state, loop, clock = self._link.state, self._loop, self._link.clock
+        record = loop.record
+        command = loop.command
+        return Snapshot(
+            now,
+            Autopilot(
+                state.armed,
+                state.landed,
+                state.failsafe,
+                state.battery,
+                state.gps,
+                state.estimator,
+            ),
+            self._motion(),
+            Control(
+                record.last_answer,
+                record.last_sample,
+                record.reason,
+                -inf if command is None else command.made_at,
+                -inf if state.position is None else state.position.received,
+                self._heard_at,
+                self._guidance_loop.fresh_position() is not None,
+                None if clock.timeline == self._timeline else clock.last_change,
+                self.stood_still(since=record.last_answer),
+            ),
+            self._health(now),
+            self._resets(now),
+            state.gps_was_good,
+            self._good_flags,
+        )
+
+    def stood_still(self, since: float) -> float:
+        """How long our timer did not run since `since` (s on our clock), s."""
+        return sum(counted.late for counted in self._counted if counted.now > since)
+
+    def _motion(self) -> Motion:
+        guidance_loop, loop, start = self._guidance_loop, self._loop, self._start
+        offset, velocity = None, (0.0, 0.0, 0.0)
+        if guidance_loop.motion is not None:
+            (north, east, down), velocity = guidance_loop.motion
+            if start is not None:
+                offset = north - start[0], east - start[1], down - start[2]
+        sample, idle = loop.resets.newest, loop.command is None or loop.command.idle
+        return Motion(
+            None if sample is None else sample.q,
+            (0.0, 0.0, 0.0) if sample is None else sample.body_rates,
+            offset,
+            velocity,
+            self._link.state.height,
+            guidance_loop.off_course,
+            None if idle else loop.record.thrust,
+            self._origin,
+        )
+
+    def _health(self, now: float) -> Health:
+        since = max(self._began_at, now - _GAPS_WITHIN)
+        gaps = sum(at > since for at in self._loop.record.gaps)
+        first, last = self._counted[0], self._counted[-1]
+        span = last.now - first.now
+        if span < _EARLY * _WINDOW:
+            return Health(round_trip=self._link.timesync.round_trip_s, gaps=gaps)
+        late = sum(counted.late for counted in self._counted) - first.late
+        lost = last.lost - first.lost
+        return Health(
+            share_lost(last.frames - first.frames, lost),
+            self._link.timesync.round_trip_s,
+            (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
+            if self._real_time
+            else None,
+            late / span,
+            last.held.rate_since(first.held),
+            gaps,
+            (last.positions - first.positions) / span,
+        )
+
+    def _resets(self, now: float) -> Resets:
+        resets = self._loop.resets
+        since = max(self._began_at, now - _RESETS_WITHIN)
+        return Resets(
+            sum(at > since for at in resets.times),
+            dist(resets.shift, self._shift),
+            wrap_angle(resets.turn - self._turn),
+            resets.largest_tilt,
+        )
+
+    def _place(self, now: float) -> Place | None:
+        """Latitude and longitude of the vehicle, or None if they are old."""
+        told = self._link.state.global_position
+        if told is None or now - told.received > _PLACE_LASTS:
+            return None
+        return Place(told.latitude_deg, told.longitude_deg)

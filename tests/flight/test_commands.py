@@ -1,0 +1,116 @@
+"""Orders: repeated only after asking whose the vehicle is, and never without need."""
+
+import ast
+import asyncio
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from companion.flight.commands import change_mode, command_if_ours, in_roles
+from companion.mavlink.commands import Command
+from companion.mavlink.errors import CommandRefused, CommandTimeout
+from companion.safety.actions import Exit, FlightEnded
+from companion.vehicle.autopilot import Role
+
+LAND = Command(21)
+LOST, REFUSED = CommandTimeout("lost"), CommandRefused("LAND", 4, "FAILED", ())
+
+
+COMPANION = Path(__file__).parents[2] / "companion"
+
+
+def test_every_command_of_a_flight_goes_through_one_function():
+    """`context.py` asks for a heartbeat by REQUEST_MESSAGE, which changes nothing."""
+    senders = {
+        path.name
+        for room in ("control", "safety", "flight")
+        for path in (COMPANION / room).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and ast.unparse(node.func).endswith("link.command")
+    }
+    assert senders == {"commands.py", "context.py"}
+
+
+class Vehicle:
+    """Answers as it is told to, one answer a command, and is in one mode after each of them."""
+
+    def __init__(self, *answers):
+        self.answers = list(answers)
+        self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
+        self.link = self.autopilot = self.state = self
+        self.now = 0.0
+        self.same_vehicle = SimpleNamespace(require=lambda: None)
+
+    @property
+    def mode_received(self):
+        return asyncio.get_running_loop().time()
+
+    def roles(self, mode):
+        return frozenset({mode})
+
+    async def fresh_heartbeat(self):
+        await asyncio.sleep(0)
+
+    async def until(self, condition):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+
+    async def command(self, number, *_, retries):
+        assert retries == 0
+        self.sent += 1
+        answer, self.mode = self.answers.pop(0)
+        if answer is not None:
+            raise answer
+
+
+def run(vehicle, work=command_if_ours):
+    landing = asyncio.run(
+        work(
+            vehicle,
+            LAND,
+            in_roles(vehicle, {Role.OFFBOARD, Role.LAND}),
+            lambda: vehicle.mode is Role.LAND,
+        )
+    )
+    return landing, vehicle.sent
+
+
+@pytest.mark.parametrize(
+    ("answers", "sent"),
+    [
+        ([(None, Role.LAND)], 1),
+        ([(LOST, Role.OFFBOARD), (None, Role.LAND)], 2),
+        ([(LOST, Role.LAND)], 1),  # only the answer was lost
+        ([(LOST, Role.OFFBOARD), (REFUSED, Role.LAND)], 2),  # it does so already
+    ],
+)
+def test_it_is_given_until_it_is_answered_or_shows(answers, sent):
+    assert run(Vehicle(*answers)) == (None, sent)
+
+
+def test_it_is_not_repeated_over_a_mode_that_is_not_ours():
+    vehicle = Vehicle((LOST, Role.HOLD))
+    with pytest.raises(FlightEnded, match="took over") as ended:
+        run(vehicle)
+    assert (ended.value.exit, vehicle.sent) == (Exit.RELEASE, 1)
+
+
+def test_a_refusal_is_one():
+    with pytest.raises(CommandRefused):
+        run(Vehicle((REFUSED, Role.OFFBOARD)))
+
+
+def test_it_is_given_four_times_at_most():
+    vehicle = Vehicle(*[(LOST, Role.OFFBOARD)] * 9)
+    with pytest.raises(CommandTimeout, match="no answer to 4 tries"):
+        run(vehicle)
+    assert vehicle.sent == 4
+
+
+def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
+    monkeypatch.setattr("companion.flight.commands._ENTERED", 0.01)
+    with pytest.raises(FlightEnded, match=r"left again, not by us: Role\.HOLD"):
+        run(Vehicle((None, Role.HOLD)), change_mode)

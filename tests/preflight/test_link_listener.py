@@ -1,0 +1,119 @@
+"""What the listener hears of others, of clocks and of jumps, over a real socket."""
+
+import asyncio
+from math import inf, nan
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.preflight.link_listener import LinkListener
+from companion.vehicle.clock import VehicleClock
+from tests.mavlink.fakes import attitude, frames_of, heartbeat, linked, until
+
+COMPANION, GROUND_STATION = 18, 6
+
+
+def of_type(kind):
+    return dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3)
+
+
+def setpoint():
+    return dialect.MAVLink_set_attitude_target_message(
+        0, 1, 1, 128, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.5
+    )
+
+
+def target(thrust):
+    return dialect.MAVLink_attitude_target_message(
+        0, 0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.01, 0.0, thrust
+    )
+
+
+def odometry(resets):
+    zeros = (0.0,) * 21
+    return dialect.MAVLink_odometry_message(
+        0, 1, 1, *(0.0,) * 3, (1.0, 0.0, 0.0, 0.0), *(0.0,) * 6, zeros, zeros, resets
+    )
+
+
+def test_who_else_is_there_and_who_steers():
+    async def scene():
+        async with linked() as (link, vehicle):
+            with LinkListener(link, asyncio.get_running_loop().time) as listener:
+                for source, message in (
+                    ((255, 190), of_type(GROUND_STATION)),
+                    ((1, 192), of_type(COMPANION)),
+                    ((1, 193), setpoint()),
+                ):
+                    system, component = source
+                    vehicle.send_raw(frames_of(message, system=system, component=component)[0])
+                await until(lambda: len(listener.other_nodes.sources) == 3)
+            assert listener.other_nodes.companions == {(1, 192)}
+            assert listener.other_nodes.steering == {(1, 193)}
+            vehicle.send_raw(frames_of(setpoint(), system=9)[0])
+            await until(lambda: link.stats.ignored_foreign == 4)
+            assert len(listener.other_nodes.sources) == 3  # the listener is off
+
+    asyncio.run(scene())
+
+
+def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
+    async def scene():
+        async with linked() as (link, vehicle):
+            with LinkListener(link, asyncio.get_running_loop().time) as listener:
+                vehicle.send(target(0.0), odometry(7))
+                await until(lambda: link.state.reset_counter == 7)
+                assert not listener.other_nodes.echo
+                vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
+                await until(lambda: link.state.reset_counter == 9)
+                assert not listener.other_nodes.echo
+                assert listener.resets == 2
+                vehicle.send(heartbeat(), target(0.4), odometry(9))
+                await until(lambda: listener.other_nodes.echo)
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        (nan, 0, 0, 0, 0, 0, 0),
+        (0, 0, 0, 0, 0, 0, 0),
+        (1, 0, 0, 0, inf, 0, 0),
+        (2, 0, 0, 0, 0, 0, 0),
+    ],
+)
+def test_samples_that_cannot_be_answered(values):
+    callbacks = {}
+
+    def subscribe(name, callback):
+        callbacks[name] = callback
+        return lambda: None
+
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with LinkListener(link, lambda: 0.0) as listener:
+        callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
+        callbacks["ATTITUDE_QUATERNION"](attitude(4))
+    assert (listener.samples.heard, listener.samples.unusable) == (2, 1)
+
+
+def test_pauses_and_stamps_of_the_samples():
+    times = iter([0.0, 0.1, 0.2, 0.5, *(0.5 + 0.1 * n for n in range(1, 8))])
+    callbacks = {}
+
+    def subscribe(name, callback):
+        callbacks[name] = callback
+        return lambda: None
+
+    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    with LinkListener(link, lambda: next(times)) as listener:
+        assert listener.samples.clock_rate is None
+        for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):
+            callbacks["ATTITUDE_QUATERNION"](attitude(stamp))
+    heard, pause, not_newer, rate, age, change, unusable, even = listener.samples
+    assert abs(even - 10 / 1.2) < 1e-9
+    assert (age, change) == (None, "")
+    assert (heard, not_newer, unusable) == (11, 2, 0)
+    assert abs(pause - 0.3) < 1e-9
+    assert abs(rate - 1.8 / 1.2) < 1e-9

@@ -1,0 +1,58 @@
+"""Mock vehicles at the doctor's, set up as the shipped configurations of the two say."""
+
+from contextlib import asynccontextmanager, contextmanager
+
+import yaml
+
+from companion.config.files import load
+from companion.files import bounded_yaml
+from companion.flight.assembly import open_link
+from companion.preflight.session import open_session
+from companion.vehicle.parameter_rules import CheckResult
+from tests.flight.fly import CONFIGS, merged, mock_vehicle
+
+FAMILIES = ("px4", "ardupilot")
+
+
+@contextmanager
+def shipped_vehicle(folder, family, **settings):
+    """The vehicle of configs/mock-FAMILY.yaml, in lockstep and soon ready to be armed."""
+    mock = yaml.safe_load((CONFIGS / f"mock-{family}.yaml").read_text())["mock"]
+    settings = merged({"parameters": mock["parameters"]}, settings)
+    with mock_vehicle(folder, autopilot=family, **settings) as vehicle:
+        yield vehicle
+
+
+def config_file(folder, mock, **changes):
+    """configs/mock-FAMILY.yaml with the vehicle's place and other changes."""
+    data = yaml.safe_load((CONFIGS / f"mock-{mock.autopilot}.yaml").read_text())
+    del data["mock"]
+    data["include"] = str(CONFIGS / data["include"])
+    places = {
+        "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep},
+        "recording": {"directory": str(folder / "flights")},
+    }
+    path = folder / "my.yaml"
+    path.write_text(bounded_yaml.dump(merged(merged(data, places), changes)))
+    return path
+
+
+@asynccontextmanager
+async def met(config):
+    """A vehicle that was heard."""
+    async with open_session(config, lambda notice: open_link(config, None, notice)) as vehicle:
+        assert await vehicle.wait_for_vehicle() == []
+        yield vehicle
+
+
+def configured(folder, mock, **changes):
+    return load(config_file(folder, mock, **changes))
+
+
+def amiss(findings):
+    """CheckResult by key of all that is not safe."""
+    return {
+        str(finding.key): finding.result
+        for finding in findings
+        if finding.result is not CheckResult.SAFE
+    }
