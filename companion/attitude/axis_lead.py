@@ -1,30 +1,12 @@
 """What one of roll and pitch is sent, so that it turns as planned when it answers."""
 
-from collections.abc import Callable
 from math import cos, sin
-from typing import NamedTuple
 
-from companion.attitude.history import History, PlannedTilt
+from companion.attitude.history import PlanHistory
 from companion.attitude.kinematics import into_body
 from companion.attitude.rate_response import AxisResponse
 
 ROLL, PITCH = 0, 1
-
-
-class Turn(NamedTuple):
-    """How the body is expected to have turned when what is planned for a time acts.
-
-    Attributes:
-        angle: of its heading, from a base that each sample measures anew, rad.
-        rate: rad/s.
-    """
-
-    angle: float
-    rate: float
-
-
-TurnWhen = Callable[[float, PlannedTilt], Turn]
-"""The turn when that plan, for this time (s), acts."""
 
 
 class AxisLead:
@@ -36,39 +18,36 @@ class AxisLead:
         index: `ROLL` or `PITCH`.
         axis: its response.
         wait: by how long it answers sooner than the other one, s.
-        past: the plan, up to the newest row.
+        plans: of tilt and heading.
     """
 
-    __slots__ = ("_index", "_lag", "_past", "_plan", "_square", "_turn", "_wait")
+    __slots__ = ("_index", "_lag", "_plan", "_plans", "_square", "_turn", "_wait")
 
-    def __init__(
-        self, index: int, axis: AxisResponse, wait: float, past: History[PlannedTilt]
-    ) -> None:
+    def __init__(self, index: int, axis: AxisResponse, wait: float, plans: PlanHistory) -> None:
         self._index = index
         self._lag, self._square = axis.lag, axis.square
         self._wait = wait
-        self._past = past
+        self._plans = plans
 
-    def advance(self, time: float, turn_when: TurnWhen) -> None:
-        """Go on to what acts when the newest row, of `time` (s), acts on the slower axis."""
-        planned_for = time - self._wait
-        self._plan = self._past.at(planned_for) if self._wait else self._past.newest
-        self._turn = turn_when(planned_for, self._plan)
+    def advance(self) -> None:
+        """Go on to the plan that acts when the newest plan acts on the slower axis."""
+        plans = self._plans
+        planned_for = plans.time - self._wait
+        self._plan = plans.tilt.at(planned_for) if self._wait else plans.tilt.newest
+        self._turn = plans.turn_when(planned_for, self._plan)
 
-    def command(self, time: float, dt: float, heading: float, turn_when: TurnWhen) -> float:
-        """The rate to send for the sample of `dt` seconds that ends at `time` of the plan, rad/s.
+    def command(self, dt: float, heading: float) -> float:
+        """The rate to send for the sample of `dt` seconds that ends with the newest plan, rad/s.
 
         At each end of the sample it is seen from the heading that the body is expected to have
         there, so that what turns with the body is led with it.
 
         Args:
-            time: of the newest row, s.
             dt: s.
             heading: the base of the turns, rad.
-            turn_when: how the body will have turned.
         """
         rate, slope = self._seen(heading)
-        self.advance(time, turn_when)
+        self.advance()
         rate_then, slope_then = self._seen(heading)
         return (
             0.5 * (rate + rate_then)

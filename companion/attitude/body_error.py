@@ -7,7 +7,7 @@ the response is the same at every heading. One gain serves all three axes, as th
 from math import sqrt
 
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import angle_per_sine, attitude_of, body_error, within_limits
+from companion.attitude.rotation import angle_per_sine, attitude_of, body_error, limit_rates
 from companion.attitude.types import Quaternion, Target
 
 
@@ -36,7 +36,7 @@ def _along(
 ) -> tuple[float, float, float]:
     """Body rates of `scale` times the vector part of the error, within the limits."""
     _, x, y, z = error
-    return within_limits(
+    return limit_rates(
         scale * x,
         scale * y,
         scale * z + heading_rate,

@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import attitude_of, euler_angles, short_way, within_limits
+from companion.attitude.rotation import attitude_of, euler_angles, limit_rates, short_way
 from companion.attitude.types import Quaternion, Target
 
 
@@ -19,7 +19,7 @@ def euler(
     e_pitch = gain * short_way(pitch_d - pitch)
     e_yaw = gain * short_way(yaw_d - yaw)
     turning = e_yaw * cos(pitch)
-    return within_limits(
+    return limit_rates(
         e_roll - e_yaw * sin(pitch),
         e_pitch * cos(roll) + turning * sin(roll),
         turning * cos(roll) - e_pitch * sin(roll) + heading_rate,

@@ -12,7 +12,7 @@ from companion.attitude.kinematics import (
 )
 from companion.attitude.limits import Constants
 from companion.attitude.reference import distance_left
-from companion.attitude.rotation import angle_per_sine, short_way, within, within_limits
+from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, short_way
 from companion.attitude.types import Quaternion, Target
 
 SHORTEST_SAMPLE = 1e-4
@@ -60,10 +60,10 @@ def exact(
     if share < 1.0:
         a = a if a > SMALLEST_A else SMALLEST_A
         up_roll, up_pitch = levelling_rates(gain, a, 1.0 / (a * a), w, x, y, z)
-        up_roll, up_pitch, _ = within_limits(up_roll, up_pitch, 0.0, max_rate, 0.0)
+        up_roll, up_pitch, _ = limit_rates(up_roll, up_pitch, 0.0, max_rate, 0.0)
         roll += (1.0 - share) * up_roll
         pitch += (1.0 - share) * up_pitch
-    return within_limits(roll, pitch, yaw, max_rate, max_yaw_rate)
+    return limit_rates(roll, pitch, yaw, max_rate, max_yaw_rate)
 
 
 def _rotation(
@@ -93,7 +93,7 @@ def _rotation(
         own_half = atan2(d_z, d_w)
         half = own_half + 0.5 * turn
         if max_yaw_angle < inf and f * length * abs(sin(half)) > max_yaw_angle:
-            half = asin(within(sin(half), max_yaw_angle / (f * length)))
+            half = asin(clamp(sin(half), max_yaw_angle / (f * length)))
         r_w, r_z = length * cos(half), length * sin(half)
         cosine, sine = cos(half - own_half), sin(half - own_half)
         r_x, r_y = d_x * cosine + d_y * sine, d_y * cosine - d_x * sine

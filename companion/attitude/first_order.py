@@ -11,7 +11,7 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.rotation import short_way, within
+from companion.attitude.rotation import clamp, short_way
 from companion.attitude.types import Quaternion, Target
 
 
@@ -57,4 +57,4 @@ def first_order(
         still *= scale
     error = short_way(heading - heading_of(a, w, z))
     yaw = share * (yaw_gain * error + heading_rate) + still
-    return roll, pitch, within(yaw, max_yaw_rate)
+    return roll, pitch, clamp(yaw, max_yaw_rate)

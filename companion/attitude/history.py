@@ -1,10 +1,23 @@
 """Where a plan stood a while ago, and where it goes on to."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _TRIMMED = 64
 """Rows that no delay reaches any more are dropped by so many at once."""
+
+
+def between(times: Sequence[float], time: float) -> tuple[int, float]:
+    """Where `time` lies among at least two ascending times, for a linear look-up.
+
+    Returns:
+        The index of the later of the two times around it, and the share of the way from the
+        earlier one to it; below 0 before the first time, above 1 past the last.
+    """
+    later = min(max(bisect_right(times, time), 1), len(times) - 1)
+    start = times[later - 1]
+    return later, (time - start) / (times[later] - start)
 
 
 class PlannedTilt(NamedTuple):
@@ -80,12 +93,72 @@ class History(Generic[Row]):
 
     def at(self, time: float) -> Row:
         """The plan at `time`: linear between rows and beyond them."""
-        times = self._times
-        later = min(max(bisect_right(times, time), 1), len(times) - 1)
-        start = times[later - 1]
-        share = (time - start) / (times[later] - start)
+        later, share = between(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
+
+
+class Turn(NamedTuple):
+    """How the body is expected to have turned when what is planned for a time acts.
+
+    Attributes:
+        angle: of its heading, from a base that each sample measures anew, rad.
+        rate: rad/s.
+    """
+
+    angle: float
+    rate: float
+
+
+class PlanHistory:
+    """The plan of tilt and heading since the start, and when it acts.
+
+    What is planned for a time acts one dead time later. Tilt and heading have their own.
+
+    Args:
+        dead_time: of the slower of roll and pitch, s.
+        yaw_dead_time: s.
+        longest_sample: s.
+
+    Attributes:
+        time: up to which there is a plan, s since the start.
+        tilt: the plan of the tilt.
+        yaw: the plan of the heading.
+    """
+
+    __slots__ = ("_dead_time", "_yaw_dead_time", "tilt", "time", "yaw")
+
+    def __init__(self, dead_time: float, yaw_dead_time: float, longest_sample: float) -> None:
+        self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
+        span = max(dead_time, yaw_dead_time) + longest_sample
+        self.time = 0.0
+        self.tilt: History[PlannedTilt] = History(span)
+        self.yaw: History[PlannedYaw] = History(span)
+
+    def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
+        """Add the plan for `dt` seconds after the newest row."""
+        self.time += dt
+        self.tilt.add(self.time, tilt)
+        self.yaw.add(self.time, yaw)
+
+    def acting(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
+        """The plan that acts on a sample that came `late` seconds after it was expected."""
+        now = self.time + late
+        return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
+
+    def turn_when(self, planned_for: float, plan: PlannedTilt) -> Turn:
+        """How the body will have turned when `plan`, made for `planned_for` (s), acts.
+
+        By its yaw rate, less the part of it that keeps the heading still.
+        """
+        acts = planned_for + self._dead_time
+        body = self.yaw.at(acts - self._yaw_dead_time)
+        return Turn(body.turned - plan.still, body.turning - plan.z)
+
+    def turn_within(self, lead: float) -> float:
+        """How far the body turns within `lead` seconds after the newest plan of the tilt acts."""
+        acts = self.time + self._dead_time - self._yaw_dead_time
+        return self.yaw.at(acts + lead).turned - self.yaw.at(acts).turned
 
 
 _SHARE = 0.05

@@ -1,11 +1,10 @@
-"""`model-following`: past the paper, a response that stays linear behind a real rate loop."""
+"""`model-following`: a response that stays linear behind a real rate loop, beyond the paper."""
 
-from dataclasses import replace
-from math import cos, radians, sin, sqrt
+from math import cos, sin, sqrt
 
-from companion.attitude.axis_lead import PITCH, ROLL, AxisLead, Turn
+from companion.attitude.axis_lead import PITCH, ROLL, AxisLead
 from companion.attitude.first_order import first_order
-from companion.attitude.history import History, PlannedTilt, PlannedYaw, SampleHold
+from companion.attitude.history import PlanHistory, PlannedTilt, PlannedYaw, SampleHold
 from companion.attitude.kinematics import (
     heading_of,
     into_body,
@@ -14,51 +13,44 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.rate_response import AxisResponse, RateResponse, largest_gain
+from companion.attitude.rate_response import RateResponse, feedback_gain
 from companion.attitude.reference_model import ReferenceModel, model_lag
-from companion.attitude.representation import admissible, is_unit, normalised, wrap_angle
-from companion.attitude.rotation import within, within_limits
+from companion.attitude.representation import (
+    admissible,
+    is_unit,
+    normalised,
+    plausible_rates,
+    wrap_angle,
+)
+from companion.attitude.rotation import clamp, limit_rates
 from companion.attitude.types import (
     BodyRates,
     Coefficients,
-    InvalidBodyRatesError,
     Quaternion,
     Target,
 )
 from companion.attitude.yaw import HeadingModel, TargetFrame, YawModel
 
-SHARE_OF_LARGEST_GAIN = 0.25
-"""Of the largest stable gain, at most this is fed back: a gain margin of 4, and no overshoot."""
-
-FURTHEST_AHEAD = radians(45.0)
-"""ArduPilot does not let its attitude target lead the body in yaw by more."""
-
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
-_FASTEST = 100.0  # rad/s
-_QUICKEST = 1e-3  # s, of a lag: quicker ones make no difference at any sample rate
 
 
 class ModelFollowingPlanner:
-    """Two degrees of freedom: a planned motion is fed forward, what differs from it is fed back.
+    """Two degrees of freedom: a planned motion is fed forward, the deviation from it is fed back.
 
-    The plan is a `ReferenceModel`: smooth, straight, within the limits. Fed forward are the body
-    rates that move the attitude along it in the middle of the coming sample, each led by the lag of
-    its own axis (`AxisLead`). They take effect one dead time later, on both axes at once, for the
-    quicker one waits. So fed back is the difference of the measured coefficients from the plan as
-    it stood one dead time ago, by the paper's law; that way the loop does not fight its own delay.
-    The gain of the feedback is p, but at most a quarter of what is stable for dead time and lag of
-    the slower axis (`margin.largest_gain`): it stays stable as long as the real largest gain is
-    more than a quarter of the one believed. Heading is treated likewise. A larger gain would be
-    stable too, and worse where the dead time is known wrongly.
+    Feedforward: the `ReferenceModel` plans a smooth, straight motion within the limits. The body
+    rates that follow it are led by the lag of their own axis (`AxisLead`). They act one dead time
+    later; the quicker axis waits, so that roll and pitch act at once.
 
-    Yaw answers slowly, so while the vehicle tilts its heading moves although it is asked to stand
-    still. It is foreseen from the yaw rates that were sent (`YawModel`), and the tilt rates are
-    turned into the body as it will stand when they act.
+    Feedback: the measured coefficients are compared with the plan as it stood one dead time ago,
+    so that the loop does not fight its own delay. The gain is p, but at most a quarter of the
+    largest stable gain of the slower axis (`rate_response.feedback_gain`). Heading likewise.
 
-    The rates are those of the body's axes. Where the autopilot takes them along other axes, those
-    of its attitude target (`TargetFrame`), they are turned into these last.
+    Yaw: it answers slowly, so the heading moves while the vehicle tilts. `YawModel` predicts this
+    from the yaw rates that were sent, and the tilt rates are turned into the body as it will
+    stand when they act. Where the autopilot takes the rates along the axes of its attitude
+    target, they are turned into these last (`TargetFrame`).
 
-    Past the recovery angle it answers as `first-order` does, and starts anew below it.
+    Beyond the recovery angle it answers as `first-order` does, and plans anew below it.
 
     Args:
         constants: gains and limits.
@@ -66,17 +58,16 @@ class ModelFollowingPlanner:
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
-        roll, pitch, yaw = (_no_quicker(axis) for axis in response.axes)
+        roll, pitch, yaw = (axis.with_least_lag() for axis in response.axes)
         tilt = roll, pitch
         self._constants = constants
         self._yaw = yaw
         self._lag = max(axis.lag for axis in tilt)
         self._dead_time = dead_time = max(axis.dead_time for axis in tilt)
-        self._frame_lead = response.lead
         self._frame = TargetFrame(response)
         self._hold = SampleHold()
-        self._gain = min(_fed_back(constants.gain, axis) for axis in tilt)
-        self._yaw_gain = _fed_back(constants.yaw_gain, yaw)
+        self._gain = min(feedback_gain(constants.gain, axis) for axis in tilt)
+        self._yaw_gain = feedback_gain(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
             constants,
             model_lag(constants.gain, self._lag),
@@ -85,23 +76,18 @@ class ModelFollowingPlanner:
         )
         self._heading = HeadingModel(constants, yaw)
         self._body = YawModel(yaw)
-        span = max(dead_time, yaw.dead_time) + LONGEST_SAMPLE
-        self._past: History[PlannedTilt] = History(span)
-        self._past_yaw: History[PlannedYaw] = History(span)
-        self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self._past)
-        self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self._past)
+        self._plans = PlanHistory(dead_time, yaw.dead_time, LONGEST_SAMPLE)
+        self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self._plans)
+        self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self._plans)
         self._still = 0.0
-        self._time = 0.0
         self._started = False
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Plan anew from here: after a gap, a change of mode, or a jump of the estimate.
 
-        Past the recovery angle there is nothing to plan: the plan begins when the tilt is below it.
-
         Args:
-            q: attitude.
-            body_rates: rad/s; the plan goes on with them. None, or what no vehicle does: at rest.
+            q: attitude; beyond the recovery angle the plan begins when the tilt is below it.
+            body_rates: with which the plan begins, rad/s; None or implausible: at rest.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -109,10 +95,10 @@ class ModelFollowingPlanner:
         """
         w, x, y, z = q = normalised(q)
         square, _, _ = tilt_products(w, x, y, z)
-        believed = _believable(body_rates)
+        plausible = plausible_rates(body_rates)
         self._started = 2.0 * square - 1.0 >= self._constants.cos_recovery
         if self._started:
-            self._start(q, believed)
+            self._start(q, plausible)
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         """Begin the plan at `q`, a unit quaternion below the recovery angle."""
@@ -123,7 +109,7 @@ class ModelFollowingPlanner:
         if body_rates is not None:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
-        # What is answered now takes effect one dead time later: the plan begins there.
+        # The answer to this sample acts one dead time later: the plan begins there.
         ahead, yaw_ahead = self._dead_time, self._yaw.dead_time
         c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
         heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
@@ -133,22 +119,25 @@ class ModelFollowingPlanner:
         self._body.start(yaw_rate)
         self._frame.forget()
         x, y, self._still = model.rates()
-        self._time = 0.0
-        self._past.start(
+        plans = self._plans
+        plans.time = 0.0
+        plans.tilt.start(
             0.0,
             PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still),
             PlannedTilt(north, east, self._still, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
-        self._past_yaw.start(
+        plans.yaw.start(
             0.0, PlannedYaw(heading, 0.0, yaw_rate), PlannedYaw(turn_rate, yaw_rate, 0.0)
         )
-        self._roll.advance(0.0, self._turn_when)
-        self._pitch.advance(0.0, self._turn_when)
+        self._roll.advance()
+        self._pitch.advance()
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """The autopilot takes the rates along the axes of `q`, which stood so `age` s ago.
+        """Take the attitude target of an autopilot that takes the rates along its axes.
 
-        By the time of the newest sample. One that is not usable is passed over.
+        Args:
+            q: attitude target; one that is no unit quaternion is ignored.
+            age: s before the newest sample.
         """
         if not (self._started and is_unit(q)):
             return
@@ -172,34 +161,33 @@ class ModelFollowingPlanner:
         target = admissible(target, constants.longest_target)
         square, ax, ay = tilt_products(w, x, y, z)
         cosine = 2.0 * square - 1.0
-        believed = _believable(body_rates)
+        plausible = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:
             self._started = False
             return BodyRates(*first_order(q, target, dt, constants))
         if not self._started:
-            self._start(q, believed)
+            self._start(q, plausible)
             self._started = True
         dt = min(max(SHORTEST_SAMPLE, dt), LONGEST_SAMPLE)  # in this order NaN is short, too
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
-        now, dt = self._time + self._hold.late, self._hold.step
-        by_tilt = self._past.at(now - self._dead_time)
-        by_yaw = self._past_yaw.at(now - self._yaw.dead_time)
+        dt = self._hold.step
+        by_tilt, by_yaw = self._plans.acting(self._hold.late)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
-        if believed is not None:  # what turns beyond what was foreseen does so until this acts
-            unforeseen = believed.yaw - by_yaw.turning
-            heading += (self._dead_time + self._lag) * unforeseen
+        if plausible is not None:  # a yaw rate that was not predicted lasts until this acts
+            unpredicted = plausible.yaw - by_yaw.turning
+            heading += (self._dead_time + self._lag) * unpredicted
         heading += by_tilt.still - by_yaw.turned
-        ahead = self._frame_ahead(heading)
+        ahead = self._frame.lead(heading, self._plans)
         roll, pitch, yaw = self._feed_forward(target, heading, more_yaw + turn, dt)
         roll, pitch = self._hold.rates(roll, pitch)
-        ahead = 0.5 * (ahead + self._frame_ahead(heading))
+        ahead = 0.5 * (ahead + self._frame.lead(heading, self._plans))
         roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
         return BodyRates(
-            *within_limits(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
+            *limit_rates(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
         )
 
     def _feedback(
@@ -207,26 +195,25 @@ class ModelFollowingPlanner:
     ) -> tuple[float, float, float]:
         """Speed of the coefficients (1/s) and of the heading (rad/s), back towards the plan.
 
-        The plan as it stood one dead time ago; during the first dead time after a start nothing
-        planned has had an effect yet.
+        0 during the first dead time after a start, when nothing planned has acted yet.
         """
         speed_north = speed_east = turn = 0.0
-        if self._time >= self._dead_time:
+        if self._plans.time >= self._dead_time:
             speed_north = self._gain * (by_tilt.north - north)
             speed_east = self._gain * (by_tilt.east - east)
-        if self._time >= self._yaw.dead_time:
+        if self._plans.time >= self._yaw.dead_time:
             turn = self._yaw_gain * wrap_angle(by_yaw.heading - heading)
         return speed_north, speed_east, turn
 
     def _feed_forward(
         self, target: Target, heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
-        """Move the plan on by a sample; the rates that follow it there, led by the lags.
+        """Move the plan on by a sample; the rates that follow it, led by the lags.
 
         Args:
             target: admissible.
-            heading: when the answer acts, but for what is planned to turn until then, rad.
-            yaw_feedback: what is added to the yaw rate, rad/s.
+            heading: when the answer acts, without the turn that is planned until then, rad.
+            yaw_feedback: added to the yaw rate, rad/s.
             dt: s.
         """
         still_before, turn_before = self._still, self._heading.turn_rate
@@ -239,81 +226,25 @@ class ModelFollowingPlanner:
             + self._yaw.lag / dt * (still_after - still_before + turn_after - turn_before)
             + yaw_feedback
         )
-        yaw = within(yaw, self._constants.max_yaw_rate)
+        yaw = clamp(yaw, self._constants.max_yaw_rate)
         self._body.advance(yaw, dt)
         self._still = still_after
         still = 0.5 * (still_before + still_after)
         self._frame.advance(yaw, still, dt)
         self._remember(x, y, still * dt, dt)
         return (
-            self._roll.command(self._time, dt, heading, self._turn_when),
-            self._pitch.command(self._time, dt, heading, self._turn_when),
+            self._roll.command(dt, heading),
+            self._pitch.command(dt, heading),
             yaw,
         )
 
-    def _turn_when(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """How the body will have turned by its yaw rate, less what keeps the heading, when it acts.
-
-        What is planned for a time acts one dead time of the tilt later.
-        """
-        acts = planned_for + self._dead_time
-        body = self._past_yaw.at(acts - self._yaw.dead_time)
-        return Turn(body.turned - plan.still, body.turning - plan.z)
-
-    def _frame_ahead(self, heading: float) -> float:
-        """By how much the axes along which the rates are taken lead the body in yaw then, rad.
-
-        As they were told, else by their lead in time.
-
-        Args:
-            heading: of the body, but for what `_turn_when` says, rad.
-        """
-        told = self._frame.heading()
-        if told is not None:
-            ahead = wrap_angle(
-                told - heading - self._turn_when(self._time, self._past.newest).angle
-            )
-            if abs(ahead) <= FURTHEST_AHEAD:
-                return ahead
-        if self._frame_lead == 0.0:
-            return 0.0
-        acts = self._time + self._dead_time - self._yaw.dead_time
-        past = self._past_yaw
-        return past.at(acts + self._frame_lead).turned - past.at(acts).turned
-
     def _remember(self, x: float, y: float, stilled: float, dt: float) -> None:
-        """Note the plan as it stands `dt` later; `stilled` rad of yaw keep its heading still."""
+        """Add the plan `dt` seconds later; `stilled` rad of yaw keep the heading still."""
         model, body = self._model, self._body
-        still = self._past.newest.still + stilled
+        still = self._plans.tilt.newest.still + stilled
         slopes = model.rate_slopes()
-        self._time += dt
-        self._past.add(
-            self._time, PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still)
+        self._plans.add(
+            dt,
+            PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still),
+            PlannedYaw(self._heading.heading, body.turned, body.rate),
         )
-        self._past_yaw.add(self._time, PlannedYaw(self._heading.heading, body.turned, body.rate))
-
-
-def _believable(body_rates: BodyRates | None) -> BodyRates | None:
-    """None for rates that no vehicle has or that are NaN: the plan must not take them in.
-
-    Raises:
-        InvalidBodyRatesError: these are not three numbers.
-    """
-    if body_rates is None:
-        return None
-    try:
-        roll, pitch, yaw = body_rates
-        if abs(roll) < _FASTEST and abs(pitch) < _FASTEST and abs(yaw) < _FASTEST:
-            return BodyRates(roll, pitch, yaw)
-    except (TypeError, ValueError) as error:
-        raise InvalidBodyRatesError(f"body rates are three numbers: {error}") from error
-    return None
-
-
-def _no_quicker(axis: AxisResponse) -> AxisResponse:
-    return replace(axis, lag=max(axis.lag, _QUICKEST))
-
-
-def _fed_back(gain: float, axis: AxisResponse) -> float:
-    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.square)
-    return min(gain, stable)

@@ -1,9 +1,13 @@
 """How a vehicle's own rate loop answers body rates: what `model-following` plans with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
 
 _LONGEST = 1.0  # s, of a lag, a dead time or a lead
+_LEAST_LAG = 1e-3  # s
+
+SHARE_OF_LARGEST_GAIN = 0.25
+"""The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +25,10 @@ class AxisResponse:
     dead_time: float = 0.0
     acceleration: float = inf
     damping: float = inf
+
+    def with_least_lag(self) -> "AxisResponse":
+        """The same with a lag of at least 1 ms: a shorter one makes no difference."""
+        return replace(self, lag=max(self.lag, _LEAST_LAG))
 
     @property
     def square(self) -> float:
@@ -116,3 +124,9 @@ def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
         else:
             high = middle
     return low * hypot(1.0 - square * low * low, low * lag)
+
+
+def feedback_gain(gain: float, axis: AxisResponse) -> float:
+    """The gain (1/s) that `axis` bears of the wanted `gain` (1/s), with a gain margin of 4."""
+    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.square)
+    return min(gain, stable)

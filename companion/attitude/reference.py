@@ -104,7 +104,7 @@ class SecondOrderReference:
         )
 
 
-def behind(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
+def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
     """How far a rate moves on within `dt` on its way to `aim`, and the rate then.
 
     lag·ṙ = aim − r; `lag` and `dt` in s, the way in the rate's unit times s.
@@ -139,7 +139,7 @@ class Lag:
             dt: s.
         """
         if self._model is None:
-            moved, later = behind(rate, aim, self._lag, dt)
+            moved, later = first_order_step(rate, aim, self._lag, dt)
             return moved, later, (aim - later) / self._lag
         left, from_slope, falls, kept = self._model.transition(dt)
         later = aim + left * (rate - aim) + from_slope * slope

@@ -5,7 +5,9 @@ from math import atan2, inf, pi, sqrt
 from companion.attitude.kinematics import split, tilt_products
 from companion.attitude.rotation import attitude_of
 from companion.attitude.types import (
+    BodyRates,
     Coefficients,
+    InvalidBodyRatesError,
     InvalidQuaternionError,
     InvalidTargetError,
     Quaternion,
@@ -14,6 +16,8 @@ from companion.attitude.types import (
 )
 
 NORM_TOLERANCE = 1e-3
+_LARGEST_BODY_RATE = 100.0
+"""No vehicle turns faster about an axis, rad/s."""
 
 
 def _norm(q: Quaternion) -> float:
@@ -118,3 +122,21 @@ def admissible(target: Target, longest: float) -> Target:
         return target
     scale = min(1.0, longest / sqrt(square)) if square > 0.0 else 1.0
     return Target(scale * north, scale * east, wrap_angle(heading), heading_rate)
+
+
+def plausible_rates(body_rates: BodyRates | None) -> BodyRates | None:
+    """The rates; None for rates that no vehicle has or that are NaN: a plan must not use them.
+
+    Raises:
+        InvalidBodyRatesError: these are not three numbers.
+    """
+    if body_rates is None:
+        return None
+    try:
+        roll, pitch, yaw = body_rates
+        most = _LARGEST_BODY_RATE
+        if abs(roll) < most and abs(pitch) < most and abs(yaw) < most:
+            return BodyRates(roll, pitch, yaw)
+    except (TypeError, ValueError) as error:
+        raise InvalidBodyRatesError(f"body rates are three numbers: {error}") from error
+    return None

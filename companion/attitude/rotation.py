@@ -95,7 +95,7 @@ def euler_angles(q: Quaternion) -> tuple[float, float, float]:
     )
 
 
-def within(value: float, bound: float) -> float:
+def clamp(value: float, bound: float) -> float:
     """`value`, or the nearer of ±`bound` (not negative) where it lies beyond."""
     if value > bound:
         return bound
@@ -104,7 +104,7 @@ def within(value: float, bound: float) -> float:
     return value
 
 
-def within_limits(
+def limit_rates(
     roll: float, pitch: float, yaw: float, max_tilt_rate: float, max_yaw_rate: float
 ) -> tuple[float, float, float]:
     """Body rates with roll and pitch scaled together to the one limit, yaw clipped to the other."""
@@ -113,7 +113,7 @@ def within_limits(
         scale = max_tilt_rate / rate
         roll *= scale
         pitch *= scale
-    return roll, pitch, within(yaw, max_yaw_rate)
+    return roll, pitch, clamp(yaw, max_yaw_rate)
 
 
 def short_way(angle: float) -> float:

@@ -1,13 +1,13 @@
 """How `model-following` plans the heading: second order, the short way, within the limits."""
 
-from bisect import bisect_right
-from math import inf
+from math import inf, radians
 
+from companion.attitude.history import PlanHistory, between
 from companion.attitude.limits import Constants
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.reference import behind
+from companion.attitude.reference import first_order_step
 from companion.attitude.representation import wrap_angle
-from companion.attitude.rotation import within
+from companion.attitude.rotation import clamp
 from companion.attitude.types import Target
 
 
@@ -43,9 +43,9 @@ class HeadingModel:
     def advance(self, target: Target, dt: float) -> None:
         """Move on by `dt` seconds towards an admissible target."""
         wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
-        change = within(wanted, self._fastest) - self._v
-        v = self._v = self._v + within(change, self._acceleration * dt)
-        moved, self.turn_rate = behind(self.turn_rate, v, self._lag, dt)
+        change = clamp(wanted, self._fastest) - self._v
+        v = self._v = self._v + clamp(change, self._acceleration * dt)
+        moved, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
         self.heading += moved
 
 
@@ -75,11 +75,14 @@ class YawModel:
     def advance(self, command: float, dt: float) -> None:
         """Hold the yaw rate `command` (rad/s) for `dt` seconds."""
         before, most = self._aimed, self._acceleration * dt
-        aimed = self._aimed = before + within(command - before, most) if most < inf else command
+        aimed = self._aimed = before + clamp(command - before, most) if most < inf else command
         # The aim as it stands at the end of a short sample: within half a sample of the truth.
-        moved, self.rate = behind(self.rate, aimed, self._lag, dt)
+        moved, self.rate = first_order_step(self.rate, aimed, self._lag, dt)
         self.turned += moved
 
+
+LARGEST_LEAD = radians(45.0)
+"""ArduPilot does not let its attitude target lead the body in yaw by more."""
 
 OLDEST = 0.25
 """Told longer ago than this, s, the target's attitude is not used any more."""
@@ -102,6 +105,7 @@ class TargetFrame:
         "_acceleration",
         "_aim",
         "_delay",
+        "_lead",
         "_offset",
         "_time",
         "_times",
@@ -111,6 +115,7 @@ class TargetFrame:
 
     def __init__(self, response: RateResponse) -> None:
         self._acceleration = response.yaw.acceleration
+        self._lead = response.lead
         self._delay = max(0.0, response.tilt.dead_time - _BEHIND_TARGET)
         self._times: list[float] = []
         self._ways: list[float] = []
@@ -133,7 +138,7 @@ class TargetFrame:
         """The yaw rate is sent for `dt` seconds; `still` of it keeps the heading (rad/s)."""
         if self._told_at == -inf:
             return  # the body's own axes, as far as is known
-        self._aim += within(yaw - self._aim, self._acceleration * dt)
+        self._aim += clamp(yaw - self._aim, self._acceleration * dt)
         self._time += dt
         times = self._times
         times.append(self._time)
@@ -141,8 +146,25 @@ class TargetFrame:
         if len(times) > _TRIMMED and times[_TRIMMED] < self._time - OLDEST - self._delay:
             del times[:_TRIMMED], self._ways[:_TRIMMED]
 
+    def lead(self, heading: float, plans: PlanHistory) -> float:
+        """How far these axes lead the body in yaw when the answer to this sample acts, rad.
+
+        By what the autopilot told of them; else by their lead in time (`RateResponse.lead`).
+
+        Args:
+            heading: of the body then, without the turn that is planned until then, rad.
+            plans: of tilt and heading.
+        """
+        told = self.heading()
+        if told is not None:
+            turn = plans.turn_when(plans.time, plans.tilt.newest)
+            lead = wrap_angle(told - heading - turn.angle)
+            if abs(lead) <= LARGEST_LEAD:
+                return lead
+        return 0.0 if self._lead == 0.0 else plans.turn_within(self._lead)
+
     def heading(self) -> float | None:
-        """Their heading when what is answered now turns them, rad; None: it is not known."""
+        """Their heading when the answer to this sample acts, rad; None: it is not known."""
         if self._time - self._told_at > OLDEST:
             return None
         return self._offset + self._ways[-1]
@@ -150,11 +172,9 @@ class TargetFrame:
     def _way(self, time: float) -> float:
         """How far what was sent until `time` turns them, rad: linear between samples."""
         times, ways = self._times, self._ways
-        later = bisect_right(times, time)
-        if later == 0:
+        if time < times[0]:
             return ways[0]
-        if later == len(times):
+        if time >= times[-1]:
             return ways[-1]
-        start = times[later - 1]
-        share = (time - start) / (times[later] - start)
+        later, share = between(times, time)
         return ways[later - 1] + share * (ways[later] - ways[later - 1])

@@ -13,6 +13,7 @@ from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.config.vehicle import AxisKeys
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.guidance.reference import GRAVITY
 from companion.identification import (
@@ -136,18 +137,10 @@ def _replace(out: Path, text: str) -> None:
     Raises:
         OSError: it cannot be written; its text is a whole sentence.
     """
-    part = out.with_name(f".{out.name}.{os.getpid()}")
     try:
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(out)
+        write_whole(out, text)
     except OSError as error:
         raise OSError(f"{out}: cannot write what was identified: {error.strerror}") from error
-    finally:
-        with suppress(OSError):
-            part.unlink()
 
 
 def _how_to_include(out: Path, config: Path | None) -> str:

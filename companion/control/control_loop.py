@@ -16,7 +16,7 @@ from companion.attitude import (
     Planner,
     is_unit,
 )
-from companion.attitude.rotation import within_limits
+from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import LoopRecord, Unanswered
@@ -170,7 +170,7 @@ class ControlLoop:
             target = command.target_at(sample.received - sample.age)
             return self.planner.rates(sample, self.resets.target(target, command.turn), period)
         limits = self._limits
-        return BodyRates(*within_limits(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
+        return BodyRates(*limit_rates(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
     def _note_answer(
         self,

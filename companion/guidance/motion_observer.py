@@ -1,11 +1,11 @@
 """Where the vehicle is now, how fast, and which acceleration nobody asked for: wind and bias."""
 
-from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass
 from itertools import islice
 from math import exp
 
+from companion.attitude.history import between
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
 
 
@@ -178,8 +178,6 @@ class SlopeHistory:
             return north + after * self.newest[0], east + after * self.newest[1]
         if len(times) == 1:
             return sums[0]
-        index = min(max(1, bisect_right(times, time)), len(times) - 1)
-        t0, t1 = islice(times, index - 1, index + 1)
-        (n0, e0), (n1, e1) = islice(sums, index - 1, index + 1)
-        share = (time - t0) / (t1 - t0)
+        later, share = between(times, time)
+        (n0, e0), (n1, e1) = islice(sums, later - 1, later + 1)
         return n0 + share * (n1 - n0), e0 + share * (e1 - e0)

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+from companion.files.write_whole import write_whole
 from companion.mavlink.errors import SigningError
 from companion.mavlink.stamp_judge import MOST_TICKS, Stamps, Stream
 
@@ -63,17 +64,7 @@ class StampFile:
                 "streams": {"/".join(map(str, key)): kept for key, kept in stamps.streams.items()},
             }
         )
-        beside = self.path.with_suffix(f".{os.getpid()}")
-        try:
-            opened = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-            with os.fdopen(opened, "w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            beside.replace(self.path)
-        except OSError:
-            beside.unlink(missing_ok=True)
-            raise
+        write_whole(self.path, text, mode=0o600)
 
 
 def _state_directory() -> Path:

@@ -1,7 +1,6 @@
 """Setting parameters: each asked for, written to an undo file before it is set, and read back."""
 
 import asyncio
-import os
 from collections.abc import Awaitable, Callable, Iterable
 from datetime import UTC, datetime
 from enum import Enum
@@ -12,6 +11,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from companion.files import bounded_yaml
+from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError, Section
 from companion.mavlink.errors import LinkError, ParameterError
 from companion.preflight.evidence import Identity
@@ -74,15 +74,9 @@ class UndoFile:
         grown.setdefault(parameter, old)
         self._undo = self._undo.model_copy(update={"parameters": grown})
         text = bounded_yaml.dump(self._undo.model_dump())
-        part = self.path.with_suffix(".part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with part.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(self.path)
-            _sync(self.path.parent)
+            write_whole(self.path, text)
         except OSError as error:
             raise ConfigError(
                 f"recording.directory: the undo file {self.path} cannot be written, so nothing "
@@ -97,15 +91,6 @@ def _unused(directory: Path, name: str) -> Path:
         number += 1
         path = directory / f"{name}-{number}.yaml"
     return path
-
-
-def _sync(directory: Path) -> None:
-    """Have the file's new name on the disk, too."""
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 _SINGLE = 1e-6

@@ -1,13 +1,13 @@
 """What flights learned of a vehicle, kept for its next flight: one small file for each vehicle."""
 
 import json
-import os
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from companion.drag import Drag
 from companion.files.bounded_file import FileRefusedError, read_text
+from companion.files.write_whole import write_whole
 
 _MOST_BYTES = 10_000
 _MOST_FILES = 1000
@@ -67,13 +67,7 @@ class LearnedFile:
                 "top_speed_m_s": round(top_speed, 2),
             }
         )
-        beside = self.path.with_suffix(f".{os.getpid()}")
-        try:
-            beside.write_text(text + "\n", encoding="utf-8")
-            beside.replace(self.path)
-        except OSError:
-            beside.unlink(missing_ok=True)
-            raise
+        write_whole(self.path, text + "\n")
 
 
 def newest(directory: Path) -> Learned | None:

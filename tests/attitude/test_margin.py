@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from companion.attitude.rate_response import largest_gain
+from companion.attitude import Target, make_planner
+from companion.attitude.rate_response import AxisResponse, feedback_gain, largest_gain
 
 NODES = 24
 
@@ -57,3 +58,24 @@ def test_without_a_dead_time_every_gain_is_stable():
 def test_a_short_dead_time_of_a_long_lag_bears_its_inverse():
     """ω → 1/√(τθ), k → ω²·τ = 1/θ."""
     assert largest_gain(1.0, 1e-6) == pytest.approx(1e6, rel=1e-3)
+
+
+@pytest.mark.parametrize(("lag", "dead_time"), [(0.05, 0.04), (0.02, 0.1)])
+def test_the_planner_feeds_back_a_quarter_of_what_is_stable(lag, dead_time):
+    """At rest on its plan; then a tilt that nobody planned is answered with gain times tilt."""
+    planner = make_planner("model-following", gain=50.0, lag=lag, dead_time=dead_time)
+    level, aside, target = (1.0, 0.0, 0.0, 0.0), 1e-4, Target(0.0, 0.0, 0.0)
+    for _ in range(100):
+        planner.rates(level, target, 0.004)
+    tilted = (math.cos(0.5 * aside), math.sin(0.5 * aside), 0.0, 0.0)
+    roll = planner.rates(tilted, target, 0.004).roll
+    stable = -roll / aside / 0.25
+    assert (
+        rightmost(0.999 * stable, lag, dead_time) < 0.0 < rightmost(1.001 * stable, lag, dead_time)
+    )
+
+
+def test_a_gain_that_is_a_quarter_of_the_stable_one_or_less_is_fed_back_as_it_is():
+    axis = AxisResponse(0.0, 0.04)
+    assert feedback_gain(9.8, axis) == 9.8
+    assert feedback_gain(50.0, axis) == pytest.approx(math.pi / 8.0 / 0.04)

@@ -99,6 +99,44 @@ def test_the_counter_tells_of_resets_too_small_to_see_and_counts_none_twice():
     assert list(resets.times) == [3.0, 5.0]
 
 
+@pytest.mark.parametrize(
+    ("dt", "change", "turned", "found"),
+    [
+        (0.1, 0.0, radians(3.9), False),
+        (0.1, 0.0, radians(4.1), True),
+        (0.1, 2.0, radians(4.0) + 0.09, False),
+        (0.1, 2.0, radians(4.0) + 0.11, True),
+        (0.05, 2.0, radians(4.0) + 0.06, True),
+    ],
+)
+def test_a_jump_in_heading_is_4_degrees_and_half_of_what_the_rates_changed(
+    dt, change, turned, found
+):
+    """The rates changed by `change` rad/s in between: they explain change·dt/2, either way."""
+    resets = EstimatorResets()
+    for time, angle, roll in ((5.0, 0.0, -0.5 * change), (5.0 + dt, turned, 0.5 * change)):
+        q = quaternion(turn(angle))
+        resets.on_attitude(AttitudeSample(0, time, time, 0, q, BodyRates(roll, 0.0, 0.0)))
+    assert resets.turn == pytest.approx(turned if found else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("dt", "jump", "found"),
+    [
+        (0.02, 0.19, False),
+        (0.02, 0.21, True),
+        (0.4, 0.39, False),
+        (0.4, 0.41, True),
+    ],
+)
+def test_a_jump_in_position_is_20_cm_and_what_a_change_of_acceleration_explains(dt, jump, found):
+    """10 m/s² of change between two positions explain 10·dt²/8 m."""
+    resets, speed = EstimatorResets(), (3.0, 0.0, 0.0)
+    resets.without_jumps(LocalPosition(5.0, 5.0, (0.0, 0.0, 0.0), speed))
+    resets.without_jumps(LocalPosition(5.0 + dt, 5.0 + dt, (3.0 * dt + jump, 0.0, 0.0), speed))
+    assert resets.shift == pytest.approx((jump if found else 0.0, 0.0, 0.0))
+
+
 def flown(summary):
     """Positions (s, m NED) and headings (s, rad), as the autopilot estimated them."""
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))

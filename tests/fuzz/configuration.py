@@ -72,9 +72,9 @@ def _fly_nothing(config: Config, folder: Path) -> None:
     )
     asyncio.run(_assembled(without, folder))
     limits, law = rate_limits(config), planner(config)
-    within_limits(law.rates((1.0, 0.0, 0.0, 0.0), attitude.Target(0.3, -0.1, 1.0), 0.02), limits)
+    limit_rates(law.rates((1.0, 0.0, 0.0, 0.0), attitude.Target(0.3, -0.1, 1.0), 0.02), limits)
     level = attitude.Target(0.0, 0.0, 0.0)
-    within_limits(law.rates((0.8, 0.6, 0.0, 0.0), level, 0.004, BodyRates(1.0, 0.0, 0.0)), limits)
+    limit_rates(law.rates((0.8, 0.6, 0.0, 0.0), level, 0.004, BodyRates(1.0, 0.0, 0.0)), limits)
 
 
 async def _assembled(config: Config, folder: Path) -> None:
@@ -87,7 +87,7 @@ async def _assembled(config: Config, folder: Path) -> None:
     assembled.close()
 
 
-def within_limits(rates: BodyRates, limits: Any) -> None:
+def limit_rates(rates: BodyRates, limits: Any) -> None:
     """See that rates are finite and no more than the limits allow."""
     roll, pitch, yaw = rates
     assert all(map(isfinite, rates)), rates

@@ -66,6 +66,16 @@ def test_it_moves_on_from_the_newest_measurement():
     assert motion.velocity_ned == pytest.approx((0.9, -0.2, -0.1))
 
 
+def test_between_measurements_it_moves_by_velocity_and_half_the_acceleration():
+    """An observer that believes no measurement: p + v·dt + ½·a·dt², v + a·dt."""
+    observer = MotionObserver(ObserverSettings(1e-12, 1e12, 0.0, 6.0))
+    observer.observe(1.0, VehicleMotion((1.0, 2.0, 3.0), (0.5, 0.0, 0.0)), (0.0, 0.0))
+    observer.observe(1.5, VehicleMotion((9.0, 9.0, 9.0), (9.0, 9.0, 9.0)), (2.0, -1.0))
+    motion = observer.at(1.5, (0.0, 0.0))
+    assert motion.position_ned == pytest.approx((1.0 + 0.25 + 0.25, 2.0 - 0.125, 9.0))
+    assert motion.velocity_ned == pytest.approx((1.5, -0.5, 9.0))
+
+
 def test_a_gap_and_a_reset_begin_anew():
     observer = MotionObserver(SETTINGS)
     assert observer.at(0.0, (0.0, 0.0)) is None

@@ -1,0 +1,39 @@
+"""Writing a file whole or not at all: whoever reads it, at any time, reads the old or the new."""
+
+import os
+from pathlib import Path
+
+
+def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
+    """Replace a file, or make it; its text and its name are on the disk when this returns.
+
+    The text goes to a temporary file in the same folder, which then takes the file's name.
+
+    Args:
+        path: of the file; its folder exists.
+        text: all of it, written in UTF-8.
+        mode: permissions of the file, less the process's umask.
+
+    Raises:
+        OSError: it cannot be written. No temporary file is left.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+        _sync_folder(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Have the file's new name on the disk, too."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

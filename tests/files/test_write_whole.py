@@ -1,0 +1,58 @@
+"""A file is written whole or not at all."""
+
+import os
+import stat
+
+import pytest
+
+from companion.files.write_whole import write_whole
+
+
+def test_it_makes_a_file_and_replaces_it(tmp_path):
+    path = tmp_path / "settings.yaml"
+    write_whole(path, "an old text that is long\n")
+    write_whole(path, "tilt: 35 °\n")
+    assert path.read_text(encoding="utf-8") == "tilt: 35 °\n"
+    assert [each.name for each in tmp_path.iterdir()] == ["settings.yaml"]
+
+
+def test_a_secret_is_never_readable_by_others(tmp_path, monkeypatch):
+    modes, replaced = [], type(tmp_path).replace
+
+    def replace(self, target):
+        modes.append(stat.S_IMODE(self.stat().st_mode))
+        return replaced(self, target)
+
+    monkeypatch.setattr(type(tmp_path), "replace", replace)
+    write_whole(tmp_path / "stamps.json", "{}", mode=0o600)
+    assert modes == [0o600]
+
+
+def test_the_text_is_on_the_disk_before_the_name_and_the_name_before_it_returns(
+    tmp_path, monkeypatch
+):
+    """Killed at any moment, the old file or the new one is there."""
+    path, synced = tmp_path / "undo.yaml", []
+    path.write_text("old")
+
+    def fsync(descriptor):
+        folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
+        synced.append(("folder" if folder else "file", path.read_text()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_whole(path, "new")
+    assert synced == [("file", "old"), ("folder", "new")]
+
+
+def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
+    path = tmp_path / "learned.json"
+    path.write_text("old")
+
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["learned.json"]
