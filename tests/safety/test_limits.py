@@ -3,15 +3,15 @@
 from math import cos, inf, sin
 
 import pytest
+from companion.safety.ending import Exit, FlightEnded
+from companion.safety.fence import braking
+from companion.safety.silence import silence
 
 from companion.config import Config
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Fence, Place
 from companion.safety import Action, SafetyLadder, authority, envelope, estimate, resources
-from companion.safety.ending import Exit, FlightEnded
-from companion.safety.fence import braking
 from companion.safety.monitor import Monitor
-from companion.safety.silence import silence
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
