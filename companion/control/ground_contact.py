@@ -41,7 +41,7 @@ class GroundContact:
         self.takeoff_commanded = True
         self._start_height = self._state.height
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Take the newest telemetry; the watch calls this 50 times a second."""
         state = self._state
         if not state.landed:

@@ -155,7 +155,7 @@ class GuidanceLoop:
         # Under our control the safety monitors judge a landed flag: zero thrust would make it true.
         standing = self._ground.standing and not self._loop.offboard_active
         if standing:
-            self.learning.stand()
+            self.learning.on_ground()
             self._loop.resets.forget()
             if self._ground.may_idle:
                 self._loop.command = GuidanceCommand(_LEVEL, 0.0, now, idle=True)

@@ -50,7 +50,7 @@ class HoverLearning:
         north, east = limited(target.north, target.east, most)
         return target._replace(north=north, east=east)
 
-    def stand(self) -> None:
+    def on_ground(self) -> None:
         """Note that the vehicle stands on the ground."""
         self._hover_thrust.on_ground()
 

@@ -25,7 +25,7 @@ from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.transport import Tap
+from companion.mavlink.transport.base import Tap
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
@@ -135,6 +135,48 @@ def assemble(
     """Assemble a flight of `maneuvers` over an open link; its records are written to `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
+    loop, guidance_loop, ground = _control(config, link, trace, clock)
+    snapshot_builder = SnapshotBuilder(
+        link, loop, guidance_loop, real_time=not config.link.lockstep
+    )
+    same_vehicle = SameVehicle(link, clock)
+    loop.is_same_vehicle = lambda: same_vehicle.same
+    preflight = PreflightChecks(config, link, same_vehicle, unbegun(maneuvers))
+    context = FlightContext(
+        config,
+        link,
+        loop,
+        guidance_loop,
+        snapshot_builder,
+        maneuvers,
+        ground,
+        preflight,
+        same_vehicle,
+    )
+    ladder = SafetyLadder(monitors(config), config.safety.hold_s)
+    rate_requester = RateRequester(link, config.link)
+    watch = Watch(context, ladder, rate_requester, clock)
+    loop.ask_mode = watch.ask_mode
+    flight = Flight(context, watch, observer, ask_landing)
+    ladder.note = context.note = preflight.note = flight.note
+    link.clock.on_event = rate_requester.note = flight.note
+    drag_is_set = config.guidance.drag is not None
+    memory = VehicleMemory(folder.parent, guidance_loop.estimate.drag, drag_is_set, flight.note)
+    preflight.on_identity = memory.load
+    for part in context.maneuvers.parts:
+        if isinstance(part, Follow):
+            if part.slowed > 1.0:
+                flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
+            if config.guidance.kind == "nmpc":
+                guidance_loop.predictive = predictive(config, part, flight.note)
+    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
+    return Assembled(flight, context, trace, dead_time_watch, memory)
+
+
+def _control(
+    config: Config, link: Link, trace: FlightTrace, clock: Callable[[], float]
+) -> tuple[ControlLoop, GuidanceLoop, GroundContact]:
+    """The control loop, and the guidance loop that writes its commands."""
     thrust = hover_thrust(config)
     deadman = config.deadman
     loop = ControlLoop(
@@ -165,39 +207,5 @@ def assemble(
         clock=clock,
         vehicle_clock=link.clock,
     )
-    snapshot_builder = SnapshotBuilder(
-        link, loop, guidance_loop, real_time=not config.link.lockstep
-    )
-    same_vehicle = SameVehicle(link, clock)
-    loop.is_same_vehicle = lambda: same_vehicle.same
     loop.planner.attitude_target = lambda: link.state.attitude_target
-    preflight = PreflightChecks(config, link, same_vehicle, unbegun(maneuvers))
-    context = FlightContext(
-        config,
-        link,
-        loop,
-        guidance_loop,
-        snapshot_builder,
-        maneuvers,
-        ground,
-        preflight,
-        same_vehicle,
-    )
-    ladder = SafetyLadder(monitors(config), config.safety.hold_s)
-    rate_requester = RateRequester(link, config.link)
-    watch = Watch(context, ladder, rate_requester, clock)
-    loop.ask_mode = watch.ask_mode
-    flight = Flight(context, watch, observer, ask_landing)
-    ladder.note = context.note = preflight.note = flight.note
-    link.clock.on_event = rate_requester.note = flight.note
-    drag_is_told = config.guidance.drag is not None
-    memory = VehicleMemory(folder.parent, guidance_loop.estimate.drag, drag_is_told, flight.note)
-    preflight.meet = memory.meet
-    for part in context.maneuvers.parts:
-        if isinstance(part, Follow):
-            if part.slowed > 1.0:
-                flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
-            if config.guidance.kind == "nmpc":
-                guidance_loop.predictive = predictive(config, part, flight.note)
-    dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
-    return Assembled(flight, context, trace, dead_time_watch, memory)
+    return loop, guidance_loop, ground

@@ -75,7 +75,7 @@ class DeadTimeWatch:
         self._rate_loops = dict(zip(_AXES, rate_loops, strict=True))
         self._note = note
         self._due = -inf
-        self._looks = 0
+        self._measurements = 0
         # Number of rows at each of the latest measurements.
         self._rows = deque([0], maxlen=_PERIODS + 1)
         self._suspected: set[str] = set()
@@ -89,17 +89,17 @@ class DeadTimeWatch:
             return
         self._due = now + _PERIOD
         try:
-            self._look()
+            self._measure_next_axis()
         except Exception as error:  # a mere measurement must not end a flight
             self._due = inf
             self._note(f"the dead time is no longer measured: {internal(error)}")
 
-    def _look(self) -> None:
+    def _measure_next_axis(self) -> None:
         self._rows.append(len(self._trace.rates))
         if len(self._rows) > _PERIODS:
             first = self._rows[0]
-            name = _AXES[self._looks % len(_AXES)]
-            self._looks += 1
+            name = _AXES[self._measurements % len(_AXES)]
+            self._measurements += 1
             self._judge(name, self._dead_time(name, self._trace.rates_rows(first)))
 
     def over_the_flight(self) -> DeadTimes:

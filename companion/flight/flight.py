@@ -55,7 +55,7 @@ class Flight:
         """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
             asyncio.create_task(self._guarded(work))
-            for work in (self._context.guidance_loop.run, self._judge, self._tell)
+            for work in (self._context.guidance_loop.run, self._judge, self._report_progress)
         ]
         try:
             await self._fly_all()
@@ -191,7 +191,7 @@ class Flight:
         """Fly the exit; a failure in it is noted, not raised."""
         try:
             await self._exit(exit_)
-            if exit_ is Exit.HOLD and self._interrupted and await self._told_to_land():
+            if exit_ is Exit.HOLD and self._interrupted and await self._user_wants_landing():
                 await self._exit(Exit.LAND)
         except FlightEnded as ended:
             self.note(ended.reason)
@@ -210,7 +210,7 @@ class Flight:
             self.note(ended.reason)
             await self._exit(then)
 
-    async def _told_to_land(self) -> bool:
+    async def _user_wants_landing(self) -> bool:
         """Ask the user whether to land; somebody else may take over meanwhile."""
         self._asking = True
         try:
@@ -238,7 +238,7 @@ class Flight:
         except Exception as error:  # the watch goes on, because an exit needs it, too
             self.fail(error)
 
-    async def _tell(self) -> None:
+    async def _report_progress(self) -> None:
         while True:
             await asyncio.sleep(_TELL_PERIOD)
             elapsed = self._clock() - self._entered

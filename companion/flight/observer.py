@@ -51,7 +51,7 @@ class StateLogger:
         self._armed: bool | None = None
         self._last_text: StatusText | None = None
 
-    def look(self) -> None:
+    def log_changes(self) -> None:
         """Note every change since the last call."""
         state = self._state
         for text in self._new_texts():

@@ -8,8 +8,8 @@ from math import inf
 from companion.config import Config
 from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
+from companion.preflight.all_checks import blocking, run_checks, unsafe
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.examination import blocking, examine, unsafe
 from companion.preflight.finding import Finding
 from companion.preflight.session import gather, wanted_rates
 from companion.safety.actions import FlightEnded
@@ -32,7 +32,7 @@ class PreflightChecks:
 
     Attributes:
         note: takes each finding that does not block the flight, once.
-        meet: called with the vehicle's identity once it is known.
+        on_identity: called with the vehicle's identity once it is known.
 
     Args:
         config: of the flight.
@@ -45,14 +45,14 @@ class PreflightChecks:
         self, config: Config, link: Link, same_vehicle: SameVehicle, maneuvers: ManeuverSequence
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
-        self.meet: Callable[[Identity], None] = lambda _: None
+        self.on_identity: Callable[[Identity], None] = lambda _: None
         self._config, self._link, self._same_vehicle = config, link, same_vehicle
         self._maneuvers = maneuvers
         self._clock = asyncio.get_running_loop().time
         self._granted: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
         self._gathered_at = -inf
-        self._told: set[str] = set()
+        self._noted: set[str] = set()
 
     async def ask_for_telemetry(self) -> None:
         """Request the telemetry that a flight needs, and report rates that are not granted.
@@ -66,7 +66,9 @@ class PreflightChecks:
         self._granted = await self._link.set_rates(wanted, window_s=0.1)
         for message, rate in self._granted.items():
             if rate.granted < rate.asked:
-                self._tell(f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz")
+                self._note_once(
+                    f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz"
+                )
 
     async def require(self, stage: Stage) -> Evidence:
         """Check the vehicle for `stage`; returns the evidence.
@@ -88,28 +90,28 @@ class PreflightChecks:
             self._evidence, self._gathered_at = evidence, self._clock()
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
-        self.meet(evidence.identity)
+        self.on_identity(evidence.identity)
         evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
-        self._heed(examine(self._config, evidence, again=before is not None))
+        self._apply(run_checks(self._config, evidence, again=before is not None))
         return evidence
 
-    def _heed(self, findings: list[Finding]) -> None:
+    def _apply(self, findings: list[Finding]) -> None:
         """End the flight for unsafe findings that are not accepted; report all others."""
         refused = blocking(self._config, findings)
-        amiss = [
+        warnings = [
             finding.key
             for finding in findings
             if finding.result is CheckResult.INEFFECTIVE and finding not in refused
         ]
-        if amiss:
-            self._tell(f"preflight warnings: {', '.join(amiss)}; see `companion doctor`")
+        if warnings:
+            self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
         for finding in unsafe(findings):
             if finding not in refused:
-                self._tell(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
+                self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
         if refused:
             raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
 
-    def _tell(self, text: str) -> None:
-        if text not in self._told:
-            self._told.add(text)
+    def _note_once(self, text: str) -> None:
+        if text not in self._noted:
+            self._noted.add(text)
             self.note(text)

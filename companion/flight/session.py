@@ -125,11 +125,11 @@ class Session:
         state_logger = StateLogger(link.state, flight.note)
 
         def on_heartbeat(_: object) -> None:
-            state_logger.look()
+            state_logger.log_changes()
             flight.on_heartbeat()
 
         def on_current_mode(_: object) -> None:
-            state_logger.look()
+            state_logger.log_changes()
             flight.on_current_mode()
 
         link.subscribe("HEARTBEAT", on_heartbeat)
@@ -143,7 +143,7 @@ class Session:
             return "left at once by the user"
         finally:
             link.on_attitude = None
-            state_logger.look()
+            state_logger.log_changes()
 
     def _finish(
         self,
@@ -167,7 +167,7 @@ class Session:
         ):
             if mismatch_warning is not None:
                 flight.note(mismatch_warning)
-        assembled.memory.keep()
+        assembled.memory.save()
         summary = Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,

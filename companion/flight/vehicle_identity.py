@@ -12,8 +12,8 @@ from companion.vehicle.link import Link
 
 LONGEST_SILENCE = 2.0
 """A present vehicle sends a frame within this time, s, even on the worst link that is flown."""
-_LOOK = 0.1
-"""A longer interval between two looks is our own stall and does not count as silence, s."""
+_LONGEST_UPDATE = 0.1
+"""A longer interval between two updates is our own stall and does not count as silence, s."""
 
 
 class ChecksVoid(FlightEnded):
@@ -38,7 +38,7 @@ class SameVehicle:
         self._uid: str | None = None
         self._other_uid: str | None = None
         self._frames = 0
-        self._looked_at = clock()
+        self._updated_at = clock()
         self._silent_for = self._silence = 0.0
 
     def begin(self) -> None:
@@ -46,7 +46,7 @@ class SameVehicle:
         self._begun, self._committed = True, False
         self._uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
-        self._frames, self._looked_at = self._link.stats.frames, self._clock()
+        self._frames, self._updated_at = self._link.stats.frames, self._clock()
         self._silent_for = self._silence = 0.0
 
     def commit(self) -> None:
@@ -56,12 +56,12 @@ class SameVehicle:
         """
         self._committed, self._silence = True, 0.0
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Measure the silence; the watch calls this 50 times a second."""
         now, frames = self._clock(), self._link.stats.frames
-        since, self._looked_at = now - self._looked_at, now
+        since, self._updated_at = now - self._updated_at, now
         if frames == self._frames:
-            self._silent_for += min(since, _LOOK)
+            self._silent_for += min(since, _LONGEST_UPDATE)
             return
         if self._silent_for > LONGEST_SILENCE and not self._committed:
             self._silence = self._silent_for
@@ -119,17 +119,18 @@ class VehicleMemory:
     Args:
         directory: of the flights.
         estimate: of the drag.
-        told: whether the configuration sets the drag.
+        configured: whether the configuration sets the drag.
         note: takes messages for the user.
     """
 
     def __init__(
-        self, directory: Path, estimate: DragEstimate, told: bool, note: Callable[[str], None]
+        self, directory: Path, estimate: DragEstimate, configured: bool, note: Callable[[str], None]
     ) -> None:
-        self._directory, self._estimate, self._told, self._note = directory, estimate, told, note
+        self._directory, self._estimate = directory, estimate
+        self._configured, self._note = configured, note
         self._file: LearnedFile | None = None
 
-    def meet(self, identity: Identity) -> None:
+    def load(self, identity: Identity) -> None:
         """Load the learned drag of this vehicle, before it is flown."""
         if identity.uid is None:
             return
@@ -137,7 +138,7 @@ class VehicleMemory:
         if self._file is not None and self._file.path == file.path:
             return
         self._file = file
-        if self._told:
+        if self._configured:
             return
         kept, trouble = file.load()
         self._estimate.begin(ANY_VEHICLE if kept is None else prior_of(kept.drag))
@@ -149,7 +150,7 @@ class VehicleMemory:
                 f"{kept.drag.quadratic:.3f} 1/m ({file.path})"
             )
 
-    def keep(self) -> None:
+    def save(self) -> None:
         """After the flight, save the learned drag if the flight had enough motion to learn it."""
         if self._file is None or not self._estimate.certain:
             return

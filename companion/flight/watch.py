@@ -43,7 +43,7 @@ class RateRequester:
         self._section = section
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
-    def look(self, health: Health) -> None:
+    def check(self, health: Health) -> None:
         """Request each message whose rate is too low now."""
         section = self._section
         answers, positions = health.answer_rate, health.position_rate
@@ -97,8 +97,8 @@ class Watch:
         """
         now = self._clock()
         self._context.snapshot_builder.listen(now)
-        self._context.ground.look()
-        self._context.same_vehicle.look()
+        self._context.ground.update()
+        self._context.same_vehicle.update()
         self._context.same_vehicle.require()
         if phase.modes:
             require_role(self._context.link, phase.modes)
@@ -143,7 +143,7 @@ class Watch:
     def _judge_snapshot(self, now: float) -> None:
         """Give the ladder a snapshot and carry out its verdict."""
         snapshot = self._context.snapshot_builder.snapshot(now)
-        self._rate_requester.look(snapshot.health)
+        self._rate_requester.check(snapshot.health)
         verdict = self._ladder.step(snapshot)
         if verdict is None:
             return

@@ -22,7 +22,7 @@ class Vehicle:
         position = LocalPosition(self.now, self.now, (0.0, 0.0, -height), (0.0, 0.0, sinks))
         self.state.landed, self.state.flying = landed, not landed
         self.state.height, self.state.position = height, position
-        self.ground.look()
+        self.ground.update()
         return self.ground
 
 
@@ -81,5 +81,5 @@ def test_without_a_position_the_flag_alone_tells_a_landing():
     vehicle.state.landed = True
     for _ in range(3):
         vehicle.now += 0.4
-        vehicle.ground.look()
+        vehicle.ground.update()
     assert vehicle.ground.touched_down

@@ -75,8 +75,8 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
 
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
-        ground=SimpleNamespace(look=lambda: None),
-        same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
+        ground=SimpleNamespace(update=lambda: None),
+        same_vehicle=SimpleNamespace(update=lambda: None, require=lambda: None),
         fresh_heartbeat=fresh_heartbeat,
     )
 
@@ -127,8 +127,8 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     autopilot = SimpleNamespace(roles=lambda mode: frozenset({mode}))
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
-        ground=SimpleNamespace(look=lambda: None),
-        same_vehicle=SimpleNamespace(look=lambda: None, require=lambda: None),
+        ground=SimpleNamespace(update=lambda: None),
+        same_vehicle=SimpleNamespace(update=lambda: None, require=lambda: None),
         loop=loop,
         link=SimpleNamespace(state=state, autopilot=autopilot),
         fresh_heartbeat=answer.wait,

@@ -25,7 +25,7 @@ class Link(SimpleNamespace):
         for _ in range(round(seconds / step)):
             self.now += step
             self.stats.frames += heard
-            self.vehicle.look()
+            self.vehicle.update()
 
 
 def checked():

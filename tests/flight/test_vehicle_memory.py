@@ -75,46 +75,46 @@ def test_a_trajectory_is_judged_by_what_was_learned(tmp_path):
 def test_it_is_the_vehicles_own(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8, 0.02), 5.0)
     memory, estimate, notes = remembered(tmp_path)
-    memory.meet(Identity(uid=None))
-    memory.meet(Identity(uid="bb"))
+    memory.load(Identity(uid=None))
+    memory.load(Identity(uid="bb"))
     assert estimate.drag == ANY_VEHICLE.drag
     assert notes == []
-    memory.meet(Identity(uid="aa"))
+    memory.load(Identity(uid="aa"))
     assert estimate.drag == Drag(0.8, 0.02)
-    memory.meet(Identity(uid="aa"))
+    memory.load(Identity(uid="aa"))
     assert len(notes) == 1
-    memory.meet(Identity(uid="bb"))  # another vehicle in its place
+    memory.load(Identity(uid="bb"))  # another vehicle in its place
     assert estimate.drag == ANY_VEHICLE.drag
 
 
 def test_what_the_configuration_tells_wins(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8), 5.0)
     memory, estimate, notes = remembered(tmp_path, told=True)
-    memory.meet(Identity(uid="aa"))
+    memory.load(Identity(uid="aa"))
     assert estimate.drag == ANY_VEHICLE.drag
     assert notes == []
 
 
 def test_nothing_is_kept_of_a_flight_that_hardly_moved_or_of_nobody(tmp_path):
     memory, estimate, _ = remembered(tmp_path)
-    memory.meet(Identity(uid="aa"))
-    memory.keep()
+    memory.load(Identity(uid="aa"))
+    memory.save()
     moved, estimate, _ = remembered(tmp_path)
     for n in range(600):
         fast = 4.0 if n % 200 < 100 else -4.0
         estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
     assert estimate.certain
-    moved.meet(Identity(uid=None))
-    moved.keep()
+    moved.load(Identity(uid=None))
+    moved.save()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_directory_that_cannot_be_written_costs_a_sentence(tmp_path):
     memory, estimate, notes = remembered(tmp_path / "absent")
-    memory.meet(Identity(uid="aa"))
+    memory.load(Identity(uid="aa"))
     for n in range(600):
         fast = 4.0 if n % 200 < 100 else -4.0
         estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
-    memory.keep()
+    memory.save()
     assert len(notes) == 1
     assert "cannot keep the learned drag" in notes[0]
