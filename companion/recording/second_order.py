@@ -128,7 +128,7 @@ def _fit(unknown: Floats) -> SecondOrderFit:
 
 
 def _start(run: StepRun) -> Floats:
-    """(2, 2), coefficients and their speed (1/s) as measured before the first step had an effect."""
+    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     since = run.time - run.time[0]
     early = since <= _UNANSWERED
     columns = np.column_stack((np.ones(int(early.sum())), since[early]))

@@ -138,7 +138,7 @@ def test_after_a_lie_the_truth_is_learned():
 
 def test_nothing_is_learned_across_a_pause_a_gap_or_the_ground():
     thrust = HoverThrust(SETTINGS)
-    for interruption in (thrust.pause, thrust.stand):
+    for interruption in (thrust.pause, thrust.on_ground):
         thrust.observe(0.0, 0.0)
         thrust.sent(0.9, LEVEL)
         interruption()

@@ -148,13 +148,13 @@ def test_half_the_gain_is_refused():
 
 def test_a_dead_time_past_what_is_searched_is_refused():
     found = fit_rate_response(*fly(Doublets((0.5,), 1.0), 0.03, 0.6))
-    assert "dead time stands at the edge" in found.reason()
+    assert "dead time is at the edge" in found.reason()
 
 
 def test_a_response_that_comes_before_its_command_is_refused():
     times, commanded, _, rates = fly(QUICK, 0.03, 0.0)
     found = fit_rate_response(times, commanded, times - 0.05, rates)
-    assert "dead time stands at the edge" in found.reason()
+    assert "dead time is at the edge" in found.reason()
 
 
 def test_too_few_samples_and_too_much_doubt_are_refused():
