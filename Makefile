@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all matrix lint real soak fuzz bench clean
+.PHONY: demo test test-all matrix lint real soak fuzz mutants bench clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -46,6 +46,13 @@ soak: $(VENV)/.test  ## half an hour in real time over a bad link
 
 fuzz: $(VENV)/.test  ## an hour of random files, frames and telemetry
 	nice -n 19 $(BIN)/python -m tests.fuzz --minutes 60
+
+$(VENV)/.mutants: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutants]'
+	@touch $@
+
+mutants: $(VENV)/.mutants  ## do the tests notice a change of the code? ROOM=attitude; an hour or more for all
+	nice -n 19 $(BIN)/python -m tests.mutants $(ROOM)
 
 bench: $(VENV)/.test  ## latency of our link against a bare echo and MAVSDK
 	$(BIN)/companion bench link

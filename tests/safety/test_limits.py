@@ -1,0 +1,217 @@
+"""Each monitor at its limit: on which side it is a breach, when it is over, and what it says."""
+
+from math import cos, inf, sin
+
+import pytest
+
+from companion.config import Config
+from companion.control.loop_record import Unanswered
+from companion.guidance.fence import Fence, Place
+from companion.safety import Action, SafetyLadder, authority, envelope, estimate, resources
+from companion.safety.ending import Exit, FlightEnded
+from companion.safety.fence import braking
+from companion.safety.monitor import Monitor
+from companion.safety.silence import silence
+from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.table import monitors
+from companion.vehicle.records import Battery, Estimator
+
+NOW = 100.0
+OLD = NOW - 6.0
+
+
+def at(**parts):
+    return Snapshot(NOW, **parts)
+
+
+def health(name):
+    return lambda value: at(health=Health(**{name: value}))
+
+
+def leaning(angle):
+    """Pitched, so that only the second component of the vector part tells it."""
+    return at(motion=Motion(q=(cos(0.5 * angle), 0.0, sin(0.5 * angle), 0.0)))
+
+
+UPPER = {
+    "tilt": (envelope.tilt, leaning),
+    "body rate": (
+        envelope.body_rate,
+        lambda v: at(motion=Motion(body_rates=(0.6 * v, 0, 0.8 * v))),
+    ),
+    "speed": (envelope.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
+    "tracking": (envelope.tracking, lambda v: at(motion=Motion(off_course=v))),
+    "link loss": (resources.loss, health("lost")),
+    "round trip": (resources.round_trip, health("round_trip")),
+    "deadlines": (resources.deadlines, health("missed")),
+    "starvation": (resources.starvation, health("starved")),
+}
+LOWER = {
+    "answer rate": (resources.answer_rate, health("answer_rate")),
+    "position rate": (resources.position_rate, health("position_rate")),
+}
+
+
+@pytest.mark.parametrize("name", UPPER)
+def test_an_upper_limit_is_allowed_and_a_breach_is_over_below_nine_tenths_of_it(name):
+    judge, seen = UPPER[name]
+    if name != "tilt":  # an angle from a quaternion is not exact
+        assert judge(0.5)(seen(0.5), False) is None
+    assert judge(0.0)(seen(0.0), False) is None
+    assert judge(0.5)(seen(0.4999), False) is None
+    assert judge(0.5)(seen(0.5001), False)
+    assert judge(0.5)(seen(0.4501), True)
+    assert judge(0.5)(seen(0.4499), True) is None
+
+
+@pytest.mark.parametrize("name", LOWER)
+def test_a_lower_limit_is_allowed_and_a_breach_is_over_a_ninth_above_it(name):
+    judge, seen = LOWER[name]
+    assert judge(45.0)(seen(45.0), False) is None
+    assert judge(45.0)(seen(44.9), False)
+    assert judge(45.0)(seen(49.9), True)
+    assert judge(45.0)(seen(50.1), True) is None
+
+
+def test_counts_and_shares_at_their_limit_are_allowed():
+    assert resources.gaps(2)(at(health=Health(gaps=2)), False) is None
+    assert resources.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
+    found = at(resets=Resets(3, 1.0, -0.5, 0.25))
+    assert estimate.resets(3, 1.0, 0.5)(found, False) is None
+
+
+def autopilot(**told):
+    return at(autopilot=Autopilot(**told))
+
+
+SAID = [
+    (authority.landed, autopilot(landed=True), "the autopilot says that it has landed"),
+    (authority.failsafe, autopilot(failsafe=True), "the autopilot reports a failsafe"),
+    (
+        estimate.flags,
+        autopilot(estimator=Estimator(OLD, 0x33F)),
+        "the estimator's state is not reported any more",
+    ),
+    (
+        estimate.reset,
+        at(resets=Resets(1, 0.5, 0.3)),
+        "the estimator was reset: 0.5 m and 17° of heading in sum; what is flown moved along",
+    ),
+    (
+        resources.battery(0.2),
+        autopilot(battery=Battery(OLD, 16.0, 0.9)),
+        "the battery's state is not reported any more",
+    ),
+    (
+        resources.battery(0.7),
+        autopilot(battery=Battery(inf, 14.0, 0.6)),
+        "battery at 60 %, below limits.min_battery_percent 70",
+    ),
+    (
+        resources.loss(0.2),
+        at(health=Health(lost=0.6)),
+        "60 % of the vehicle's frames are lost",
+    ),
+    (
+        resources.round_trip(0.2),
+        at(health=Health(round_trip=0.6)),
+        "the link's round trip takes 600 ms",
+    ),
+    (
+        resources.deadlines(0.2),
+        at(health=Health(missed=0.6)),
+        "60 % of the answers miss deadman.deadline_ms",
+    ),
+    (
+        resources.starvation(0.2),
+        at(health=Health(starved=0.6)),
+        "this computer has no time for us: 60 % of it are lost",
+    ),
+    (
+        resources.gaps(2),
+        at(health=Health(gaps=3)),
+        "samples could not be answered 3 times within 5 s for longer than "
+        "deadman.telemetry_stale_ms",
+    ),
+]
+
+
+@pytest.mark.parametrize(("judge", "snapshot", "words"), SAID, ids=[row[2] for row in SAID])
+def test_a_breach_is_told_in_these_words(judge, snapshot, words):
+    assert judge(snapshot, False) == words
+
+
+def test_lost_velocity_and_lost_position_are_told_together():
+    lost = at(autopilot=Autopilot(estimator=Estimator(NOW, 0x33F & ~0x1A)), good_flags=0x33F)
+    assert "0x1a)" in estimate.flags(lost, False)
+
+
+def silent(reason=None, **changes):
+    """Unanswered for 0.75 s, 0.5 s of them without an attitude: all exact in binary."""
+    stages = {"answered": NOW - 0.75, "sampled": NOW - 0.5, "placed": NOW - 0.5, "reason": reason}
+    return at(control=Control(**{**stages, **changes}))
+
+
+@pytest.mark.parametrize(
+    ("snapshot", "words"),
+    [
+        (silent(), "no setpoint was sent"),
+        (silent(Unanswered.LATE), Unanswered.LATE.words),
+        (silent(Unanswered.LATE, stood_still=0.375), Unanswered.LATE.words),
+        (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
+        (silent(Unanswered.NO_TARGET, placed=NOW - 0.6), "no position from the vehicle"),
+        (
+            silent(Unanswered.OLD_TARGET, position_fresh=False),
+            "position arrives later than deadman.position_stale_ms",
+        ),
+    ],
+)
+def test_silence_tells_the_stage_that_failed_for_longer_than_its_limit(snapshot, words):
+    assert silence(0.5, heard=True)(snapshot, False) == words
+
+
+def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_asked():
+    assert silence(0.75, heard=True)(silent(), False) is None
+    unheard = silent(heard=NOW - 0.75)
+    assert silence(0.5, heard=True)(unheard, False) is None
+    assert silence(0.5, heard=False)(unheard, False)
+    verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
+    assert (verdict.action, verdict.mutes) == (Action.RELEASE, True)
+
+
+def test_it_brakes_in_time_before_a_fence_on_the_map():
+    corners = ((46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999))  # 111 m north
+    judge = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
+    moving = Motion(
+        offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=Place(47.0, 8.0)
+    )
+    assert judge(at(motion=moving), False) is None  # stops 2 m on
+    fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on
+    assert "about to stop" in judge(at(motion=fast), False)
+
+
+def odd(name, then=Action.LAND, action=Action.HOLD):
+    """A monitor that is wrong while its bit of the flags is set: 1 for a, 2 for b."""
+    bit = 1 << "ab".index(name)
+    return Monitor(name, lambda s, _: name if s.good_flags & bit else None, action, then=then)
+
+
+def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
+    told = []
+    ladder = SafetyLadder([odd("a", Action.HAND_BACK), odd("b", Action.LAND)], 2.0)
+    ladder.note = told.append
+    both = Snapshot(0.0, good_flags=3)
+    assert ladder.step(both) == (Action.HOLD, "a", False)
+    assert ladder.step(both._replace(now=1.75)) is None
+    assert ladder.step(both._replace(now=2.0)) == (Action.LAND, "b", False)
+    assert told == ["safety: a: a → hold", "safety: b: b → hold"]
+
+
+def test_a_ladder_that_nobody_listens_to_still_decides():
+    assert SafetyLadder([odd("a")], 2.0).step(Snapshot(0.0, good_flags=1)).action is Action.HOLD
+
+
+def test_how_a_flight_ended_is_kept_with_its_reason():
+    ended = FlightEnded("the fence", Exit.LAND)
+    assert (str(ended), ended.reason, ended.exit) == ("the fence", "the fence", Exit.LAND)
+    assert FlightEnded("the fence").exit is None
