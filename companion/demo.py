@@ -12,7 +12,12 @@ from typing import NamedTuple
 
 from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
-from companion.mavlink.endpoint import SerialPort, TcpClient, TcpServer, parse_endpoint
+from companion.mavlink.transport.endpoint import (
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    parse_endpoint,
+)
 
 _LOCAL_PORT_OFFSET = 40
 """The vehicle's own UDP port is this far above the one it sends to."""

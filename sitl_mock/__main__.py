@@ -13,8 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-from sitl_mock.autopilot.motion_telemetry import euler
 from sitl_mock.config.section import ConfigError
+from sitl_mock.physics.quaternion import euler
 from sitl_mock.server import Server
 from sitl_mock.settings import MockSettings, load_settings
 from sitl_mock.simulation import Simulation

@@ -12,7 +12,7 @@ from companion.demo import check_mock
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
 from companion.flight.maneuvers import configured_maneuvers
-from companion.mavlink.endpoint import parse_endpoint
+from companion.mavlink.transport.endpoint import parse_endpoint
 
 STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
 """What `init` begins with, by the name the user gives."""

@@ -23,8 +23,8 @@ from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.frame_filter import Notice
+from companion.preflight.all_checks import run_checks
 from companion.preflight.evidence import Evidence
-from companion.preflight.examination import examine
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
@@ -58,7 +58,7 @@ def doctor(options: argparse.Namespace) -> int:
     visit = _Visit(config, Console(stderr=options.json, highlight=False))
     try:
         if undo is None:
-            code = run(visit.examine(options.wait, fix=options.fix, unasked=options.yes))
+            code = run(visit.run_checks(options.wait, fix=options.fix, unasked=options.yes))
         else:
             code = run(visit.restore(undo, options.undo))
     except KeyboardInterrupt:
@@ -95,7 +95,7 @@ class _Visit:
         self._outcomes: list[Outcome] = []
         self.result: dict[str, Any] = {}
 
-    async def examine(self, wait: float, *, fix: bool, unasked: bool) -> int:
+    async def run_checks(self, wait: float, *, fix: bool, unasked: bool) -> int:
         """Look, tell, and fix if asked to; what is found after that decides the exit code."""
         config = self._config
         async with open_session(config, self._link) as vehicle:
@@ -109,7 +109,7 @@ class _Visit:
                 return self._told(vehicle.unanswered(error))
             flown, refusals = _flown(config)
             evidence = replace(evidence, maneuvers=flown)
-            findings = [*refusals, *examine(config, evidence)]
+            findings = [*refusals, *run_checks(config, evidence)]
             code = self._told(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, unasked=unasked)
@@ -156,7 +156,7 @@ class _Visit:
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _flown(config)
-        code = self._told([*refusals, *examine(config, evidence)])
+        code = self._told([*refusals, *run_checks(config, evidence)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

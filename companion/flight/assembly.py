@@ -25,7 +25,7 @@ from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.transport import Tap
+from companion.mavlink.transport.base import Tap
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace

@@ -8,8 +8,8 @@ from math import inf
 from companion.config import Config
 from companion.flight.vehicle_identity import SameVehicle
 from companion.guidance import ManeuverSequence
+from companion.preflight.all_checks import blocking, run_checks, unsafe
 from companion.preflight.evidence import Evidence, Identity, Stage
-from companion.preflight.examination import blocking, examine, unsafe
 from companion.preflight.finding import Finding
 from companion.preflight.session import gather, wanted_rates
 from companion.safety.actions import FlightEnded
@@ -92,7 +92,7 @@ class PreflightChecks:
         self._same_vehicle.require()
         self.on_identity(evidence.identity)
         evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
-        self._apply(examine(self._config, evidence, again=before is not None))
+        self._apply(run_checks(self._config, evidence, again=before is not None))
         return evidence
 
     def _apply(self, findings: list[Finding]) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from companion.mavlink.framing import Frame
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import SignatureResult
+from companion.mavlink.stamps import SignatureResult
 from companion.mavlink.stats import LinkStats
 
 Notice = Callable[[str], None]

@@ -9,7 +9,7 @@ from companion.mavlink.framing import build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, encode
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.transport import Tap, Transport
+from companion.mavlink.transport.base import Tap, Transport
 
 
 class Outbox:

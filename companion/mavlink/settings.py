@@ -14,7 +14,7 @@ class LinkSettings:
     """Where the vehicle is and who we are.
 
     Attributes:
-        endpoint: See `companion.mavlink.endpoint`.
+        endpoint: See `companion.mavlink.transport.endpoint`.
         target_system: The only system listened to and commanded.
         target_component: Its component; 1 is the autopilot.
         source_system: Our system id; companions share the vehicle's.

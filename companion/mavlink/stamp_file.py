@@ -1,6 +1,6 @@
-"""The newest time stamps of signatures on disk: one file for each key, which does not tell the key.
+"""The newest signature time stamps on disk: one file for each key, which does not reveal the key.
 
-Source: the MAVLink message-signing guide, which asks that they outlive the program.
+Source: the MAVLink message-signing guide, which asks that the stamps outlive the program.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.files.write_whole import write_whole
 from companion.mavlink.errors import SigningError
-from companion.mavlink.stamp_judge import MOST_TICKS, Stamps, Stream
+from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
 _MOST_BYTES = 1_000_000

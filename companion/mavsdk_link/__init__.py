@@ -1,1 +1,1 @@
-"""The link by way of MAVSDK, for those whose stack it is; needs the extra `mavsdk`."""
+"""The same link through MAVSDK, for users of its stack; needs the extra `mavsdk`."""

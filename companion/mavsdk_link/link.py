@@ -10,11 +10,11 @@ nothing needs nobody who ends it.
 
 import logging
 
-from companion.mavlink.endpoint import Endpoint, UdpIn
 from companion.mavlink.errors import LinkError
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport import Lost, Receiver, Tap, Transport
+from companion.mavlink.transport.base import Lost, Receiver, Tap, Transport
+from companion.mavlink.transport.endpoint import Endpoint, UdpIn
 from companion.mavsdk_link.transport import MavsdkTransport
 from companion.vehicle.link import Link
 

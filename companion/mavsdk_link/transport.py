@@ -3,7 +3,7 @@
 MAVSDK forwards between its connections. One is the vehicle's; the other is of its kind `raw`, which
 is this process itself. So each side sees each frame as the other sent it, time stamp included.
 
-What we send MAVSDK hands to a thread of its own, which has it at the kernel 0.1 ms later. It does
+MAVSDK hands what we send to a thread of its own; it reaches the kernel 0.1 ms later. MAVSDK does
 not say whether the frame left, and it queues what a serial line or a TCP connection does not take.
 """
 
@@ -21,8 +21,52 @@ from companion.mavlink.errors import EndpointError
 from companion.mavlink.framing import V2
 from companion.mavlink.loop import unwatch, watch
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport import Receive
-from companion.mavsdk_link.connection_url import connection_url
+from companion.mavlink.transport.base import Receive
+from companion.mavlink.transport.endpoint import (
+    Endpoint,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpIn,
+    UdpOut,
+    parse_endpoint,
+)
+
+
+def connection_url(endpoint: str) -> str:
+    """What `Mavsdk.add_any_connection` takes for one of our endpoints.
+
+    Raises:
+        EndpointError: With the reason and how to mend it.
+    """
+    where = parse_endpoint(endpoint)
+    if isinstance(where, UdpIn | TcpServer) and where.peers:
+        raise EndpointError(
+            f"endpoint {endpoint!r}: MAVSDK hears every sender; leave ?peer= out, or use "
+            "link.backend: direct"
+        )
+    return f"{_scheme(where)}://{_address(where)}"
+
+
+def _scheme(where: Endpoint) -> str:
+    match where:
+        case UdpIn():
+            return "udpin"
+        case UdpOut():
+            return "udpout"
+        case TcpClient():
+            return "tcpout"
+        case TcpServer():
+            return "tcpin"
+        case SerialPort():
+            return "serial"
+
+
+def _address(where: Endpoint) -> str:
+    if isinstance(where, SerialPort):
+        return f"{where.device}:{where.baud}"
+    return f"{where.host}:{where.port}"
+
 
 _MOST_WAITING = 1000
 """Frames kept for an event loop that does not come to read them; then the oldest are lost."""

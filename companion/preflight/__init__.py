@@ -1,5 +1,5 @@
-"""What would go wrong with this vehicle and this configuration, found before take-off.
+"""Preflight checks: what would go wrong with this vehicle and this configuration.
 
-`gathering` listens and asks, `examination` judges what it brought, `repair` sets parameters.
-Nothing in here arms or sends a setpoint.
+`session` listens and asks, `all_checks` judges the evidence, `parameter_fixes` sets parameters.
+Nothing here arms the vehicle or sends a setpoint.
 """

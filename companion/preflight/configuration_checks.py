@@ -1,4 +1,4 @@
-"""Checks of what our own configuration leaves undone or gets wrong, whatever the vehicle."""
+"""Checks of our own configuration, whatever the vehicle."""
 
 import json
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ SAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.INEFFECTIVE
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether `auto` came to the planner that it is meant to come to."""
+    """Whether `planner.name: auto` chose the planner for an identified vehicle."""
     name, told = config.planner_name, config.planner.name
     if told == AUTO and name == FIRST_ORDER:
         yield Finding(
@@ -34,7 +34,7 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether the newest flight answered as late as `vehicle` says; the ground cannot tell."""
+    """Whether the newest flight measured the dead time that `vehicle` states."""
     if not config.vehicle.known:
         return
     folder, measured = _newest_dead_times(config.recording.directory)
@@ -66,7 +66,7 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether each exception names something that can be found at all."""
+    """Whether each entry of `flight.accept` names a check that exists."""
     streams = {
         f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates
     }

@@ -1,4 +1,4 @@
-"""What was heard of a vehicle and its link, for the checks to judge."""
+"""What was received from a vehicle and its link: the input of the checks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from companion.vehicle.streams import StreamRate
 _ABOUT_POSITION = frozenset(
     {"LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION", "ODOMETRY"}
 )
-"""Autopilots send none of these before their estimator has a position."""
+"""Autopilots send these only once their estimator has a position."""
 
 
 class Stage(Enum):
-    """What the vehicle is about to do; the value is said of it."""
+    """What the vehicle is about to do; the value completes "ready …"."""
 
     GROUND = "to be armed"
     """It stands disarmed."""
@@ -30,7 +30,7 @@ class Stage(Enum):
 
 
 class Identity(NamedTuple):
-    """AUTOPILOT_VERSION; `None` where it was not told.
+    """AUTOPILOT_VERSION; `None` where it was not received.
 
     Attributes:
         version: Of the flight software, as in 4.7.0-dev.
@@ -52,10 +52,10 @@ class LinkQuality(NamedTuple):
         damaged: With a wrong checksum.
         not_finite: Messages refused for a NaN or infinity.
         reconnects: How often the connection was opened again.
-        round_trip: Shortest of late by TIMESYNC, s; `None` if it was never answered.
+        round_trip: Shortest recent TIMESYNC round trip, s; `None` if none was answered.
         jitter: By how much the round trips differed, s.
-        other_clock: Whether TIMESYNC counts another clock than the samples' stamps.
-        notices: What keeps the two sides from understanding each other.
+        other_clock: Whether TIMESYNC uses another clock than the samples' stamps.
+        notices: Reasons why the two sides do not understand each other.
     """
 
     frames: int
@@ -70,22 +70,22 @@ class LinkQuality(NamedTuple):
 
     @property
     def loss(self) -> float:
-        """Share of the vehicle's messages that did not come."""
+        """Share of the vehicle's messages that were lost."""
         return share_lost(self.frames, self.lost)
 
 
 class SampleTimes(NamedTuple):
-    """The attitude samples that came, by both clocks.
+    """The attitude samples received, by both clocks.
 
     Attributes:
-        heard: How many.
+        heard: Number of samples.
         longest_pause: Between two of them by our clock, s.
         not_newer: Stamped no later than the one before.
         clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
         age: Median of their ages at arrival, s; `None` where it is not known (`VehicleClock`).
-        clock_change: How the vehicle's clock jumped or restarted meanwhile, in words, or empty.
-        unusable: No unit quaternion, or with a number that is not finite.
-        rate: Hz, bursts counted as what they are (`HeldRates`); `None` for too few samples.
+        clock_change: How the vehicle's clock jumped or restarted meanwhile; empty: not at all.
+        unusable: Samples that are no unit quaternion, or hold a number that is not finite.
+        rate: Hz, lowered for bursts (`HeldRates`); `None` for too few samples.
     """
 
     heard: int = 0
@@ -99,13 +99,13 @@ class SampleTimes(NamedTuple):
 
 
 class OtherNodes(NamedTuple):
-    """Others on the link.
+    """Other nodes on the link.
 
     Attributes:
-        sources: (system, component) of all that were heard.
-        companions: Of them those whose heartbeat says onboard controller.
-        steering: Of them those who sent setpoints.
-        echo: Whether the autopilot tells of rates or thrust though nobody may fly it.
+        sources: (system, component) of every node that was heard.
+        companions: Those whose heartbeat has the type onboard controller.
+        steering: Those that sent setpoints.
+        echo: Whether ATTITUDE_TARGET shows rates or thrust although the vehicle is disarmed.
     """
 
     sources: frozenset[tuple[int, int]] = frozenset()
@@ -116,23 +116,23 @@ class OtherNodes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """All that was gathered.
+    """All evidence of one session.
 
     Attributes:
-        family: The autopilot's.
-        state: What the vehicle told, the newest of each.
+        autopilot: Which autopilot it is.
+        state: The vehicle's newest telemetry.
         survey: The parameters that matter.
-        streams: What was asked, granted and counted, by message.
-        received: How often each of these came since the link was opened.
-        window: How long was counted, s.
+        streams: Rates requested, granted and counted, by message.
+        received: Number of each of these messages since the link was opened.
+        window: Time over which was counted, s.
         link: How good the link is.
         samples: The attitude samples' times.
-        other_nodes: Who else is there.
-        resets: How often the estimator jumped meanwhile.
-        identity: What the autopilot is.
-        stage: What the vehicle is judged for.
-        words: What the autopilot said meanwhile that is a warning or worse.
-        maneuvers: What is to be flown; `None` where nothing is.
+        other_nodes: Other nodes on the link.
+        resets: Number of estimator resets meanwhile.
+        identity: The autopilot's version and hardware.
+        stage: What the vehicle is about to do.
+        words: The autopilot's texts meanwhile with severity warning or worse.
+        maneuvers: The planned maneuvers; `None`: none are planned.
     """
 
     autopilot: Autopilot
@@ -152,19 +152,19 @@ class Evidence:
 
     @property
     def awaits_position(self) -> bool:
-        """Whether the vehicle has no position yet, so that nothing about it can be told."""
+        """Whether the vehicle has no position yet."""
         readiness = self.state.readiness
         estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
         return not readiness.position or self.autopilot.not_ready(estimator_only) is not None
 
     @property
     def booting(self) -> bool:
-        """Whether nothing was told of the estimator yet: ArduPilot sends nothing else then."""
+        """Whether no estimator status came yet: until then ArduPilot sends no other telemetry."""
         return self.state.readiness.estimator_flags is None
 
     @property
     def awaited(self) -> tuple[str, ...]:
-        """Messages that do not come as long as the vehicle is not ready to send them."""
+        """Messages that the vehicle is not ready to send yet."""
         if not self.awaits_position:
             return ()
         return tuple(

@@ -1,4 +1,4 @@
-"""Checks of the link: whether enough arrives, soon enough, whole, and from whom it should."""
+"""Checks of the link: message rates, losses, delays, signing, and other nodes on it."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,17 +13,17 @@ from companion.vehicle.streams import StreamRate
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _REACHED = 0.7
-"""PX4 gives 197 Hz of 250 asked whatever one does (measured); less is somebody's fault."""
+"""PX4 sends 197 Hz of 250 requested (measured); a lower share is a fault."""
 _COUNTABLE = 5.0
-"""So many must be due while we listen for a rate to be told from a count."""
+"""Fewest messages that must be due while we listen, to judge a rate by counting."""
 _SENT_ON_CHANGE = {"CURRENT_MODE": 2.0}
-"""What is sent when it changes, and otherwise only so often, Hz, whatever is asked (PX4)."""
+"""Messages sent on change, and otherwise only at this rate, Hz, whatever is requested (PX4)."""
 _MANY_LOST = 0.2
 _SOME_DAMAGED = 0.01
 
 
 def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """What arrives of the telemetry asked for."""
+    """Whether the requested telemetry arrives at its rate."""
     link = config.link
     least = {
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
@@ -33,7 +33,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
     for name, rate in evidence.streams.items():
         trouble = _trouble(name, rate, evidence)
         if name in evidence.awaited and rate.granted >= _REACHED * rate.asked:
-            continue  # `readiness` tells of it
+            continue  # `readiness` reports it
         even = _even_rate(name, rate, evidence)
         if name in least and even < least[name][1]:
             key, limit = least[name]
@@ -61,7 +61,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
-    """The rate that counts, Hz: in flight, too, bursts are judged by the pauses between them."""
+    """The rate, Hz, lowered for bursts: in flight, too, the pauses between them count."""
     samples = evidence.samples.rate
     if name != "ATTITUDE_QUATERNION" or samples is None:
         return rate.achieved
@@ -69,7 +69,7 @@ def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 
 def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
-    """What is wrong with a message's rate, and what to do about it."""
+    """What is wrong with a message's rate, and how to fix it."""
     asked, achieved = rate.asked, rate.achieved
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
@@ -89,7 +89,7 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
 
 
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """What does not arrive, or not as it was sent."""
+    """Lost and damaged messages, and reconnects."""
     link = evidence.link
     share = link.loss
     result = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE
@@ -132,7 +132,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """How late what arrives is, and how evenly it comes."""
+    """Round trip, its jitter, and pauses between samples."""
     stale = config.deadman.telemetry_stale
     round_trip, jitter = evidence.link.round_trip, evidence.link.jitter
     if round_trip is None or jitter is None:
@@ -183,7 +183,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether both sides sign, with the same key, or neither; and who else would be the peer."""
+    """Whether both sides sign with the same key, or neither; and who claims to be the peer."""
     yield from signing_findings(evidence.link.notices)
 
 
@@ -200,7 +200,7 @@ def signing_findings(
 
 
 def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Who else speaks to the vehicle."""
+    """Other nodes that talk to the vehicle."""
     link, others = config.link, evidence.other_nodes
     ours = link.source_system, link.source_component
     if ours in others.sources:

@@ -24,16 +24,16 @@ _SETPOINTS = frozenset(
     }
 )
 _STILL = 0.05
-"""Disarmed autopilots tell of rates below 0.02 rad/s and of no thrust (recorded from both)."""
+"""Disarmed autopilots report rates below 0.02 rad/s and no thrust (recorded from both)."""
 _ENOUGH = 10
-"""Samples from which the rate of a clock can be told."""
+"""Samples needed to measure the rate of a clock."""
 
 
 class LinkListener:
-    """Listens while its block runs.
+    """Listens while its `with` block runs.
 
     Args:
-        link: To listen on; its `on_foreign` is ours meanwhile.
+        link: Link to listen on. Its `on_foreign` is replaced meanwhile.
         clock: Our clock, s.
     """
 
@@ -93,7 +93,7 @@ class LinkListener:
 
     @property
     def other_nodes(self) -> OtherNodes:
-        """Who else was heard so far."""
+        """The other nodes heard so far."""
         return OtherNodes(
             frozenset(self._sources),
             frozenset(self._companions),

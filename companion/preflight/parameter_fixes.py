@@ -27,11 +27,11 @@ class Undo(Section):
     """What to restore, and on which vehicle."""
 
     autopilot: Word
-    """Name of the autopilot's family."""
+    """Name of the autopilot."""
     system: Annotated[int, Field(ge=1, le=255)]
     """The vehicle's system id."""
     uid: Word | None
-    """AUTOPILOT_VERSION's id of the hardware; null: it was not told."""
+    """Hardware id of AUTOPILOT_VERSION; null: not received."""
     time: Word
     """When the first of them was set, UTC."""
     parameters: dict[Word, Annotated[float, Field(ge=-LARGEST, le=LARGEST)]]
@@ -45,12 +45,12 @@ class Undo(Section):
 
 
 class UndoFile:
-    """Grows by one parameter before each of them is set.
+    """The undo file: takes each parameter's old value before that parameter is set.
 
     Args:
-        directory: Where it is to be made.
+        directory: Where to create it.
         link: To the vehicle.
-        identity: What the vehicle said of itself.
+        identity: The vehicle's AUTOPILOT_VERSION.
     """
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
@@ -65,7 +65,7 @@ class UndoFile:
         )
 
     def add(self, parameter: str, old: float) -> None:
-        """Note an old value; on the disk, whole, when this returns. The first one counts.
+        """Add an old value, unless there is one. The file is whole and on disk when this returns.
 
         Raises:
             ConfigError: it cannot be written, so nothing must be set.
@@ -85,7 +85,7 @@ class UndoFile:
 
 
 def _unused(directory: Path, name: str) -> Path:
-    """A file that is not there yet: another run may have begun within the same second."""
+    """A path that does not exist yet: another run may have begun within the same second."""
     path, number = directory / f"{name}.yaml", 1
     while path.exists():
         number += 1
@@ -94,13 +94,13 @@ def _unused(directory: Path, name: str) -> Path:
 
 
 _SINGLE = 1e-6
-"""Parameters are single precision, which tells so much apart."""
+"""Relative resolution of a single-precision parameter."""
 _KNOWN_FOR = 3.0
-"""A heartbeat older than this does not tell any more whether the vehicle is armed, s."""
+"""An older heartbeat no longer tells whether the vehicle is armed, s."""
 
 
 class Answer(Enum):
-    """What the user says to a change."""
+    """The user's answer to a proposed change."""
 
     YES = "yes"
     NO = "no"
@@ -112,10 +112,10 @@ Ask = Callable[[Finding], Awaitable[Answer]]
 
 
 class Outcome(NamedTuple):
-    """What became of a change.
+    """The outcome of a change.
 
     Attributes:
-        change: It.
+        change: Which change.
         refusal: Why it was not made; empty if it was.
     """
 
@@ -124,7 +124,7 @@ class Outcome(NamedTuple):
 
 
 class VehicleArmedError(LinkError):
-    """Parameters of a vehicle that may fly are left alone."""
+    """No parameter is set on a vehicle that may fly."""
 
 
 async def apply_fixes(
@@ -134,17 +134,17 @@ async def apply_fixes(
     undo: UndoFile,
     told: Callable[[Outcome], None],
 ) -> None:
-    """Propose each change, and make those that the user agrees to.
+    """Propose each change, and make those that the user accepts.
 
     Args:
         link: To the vehicle.
-        findings: Those without a change are left out.
-        ask: Is asked before each, until it says all.
-        undo: Notes the old value before it is overwritten.
-        told: Takes what became of each change that was agreed to, as soon as that is known.
+        findings: Those without a change are skipped.
+        ask: Asks the user before each change, until the answer is ALL.
+        undo: Takes the old value before it is overwritten.
+        told: Called with the outcome of each accepted change.
 
     Raises:
-        VehicleArmedError: The vehicle is armed, or nobody knows; no more was set.
+        VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
         ConfigError: The undo file cannot be written; no more was set.
         LinkLost: The connection dropped meanwhile.
     """
@@ -165,7 +165,7 @@ async def apply_fixes(
 
 
 async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> None:
-    """Set what the undo file says, the last change first.
+    """Restore the values of the undo file, the last change first.
 
     Raises:
         VehicleArmedError, LinkLost: As `apply_fixes`.
@@ -181,7 +181,7 @@ async def restore(link: Link, undo: Undo, told: Callable[[Outcome], None]) -> No
 
 
 def require_disarmed(link: Link) -> None:
-    """Go no further with a vehicle that may fly.
+    """Raise unless the vehicle is known to be disarmed.
 
     Raises:
         VehicleArmedError: It is armed, or its last heartbeat is too old to tell.

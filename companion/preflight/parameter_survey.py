@@ -1,4 +1,4 @@
-"""Reading the parameters that matter from a vehicle."""
+"""Reads the parameters that matter from a vehicle."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -10,36 +10,36 @@ from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import ParameterRule, Values
 
 _AT_ONCE = 8
-"""So many questions under way are in nobody's way: ArduPilot queues 20 and drops the rest, and at
-57600 baud they take 30 ms."""
+"""Parameter requests under way at once. ArduPilot queues 20 and drops the rest; at 57600 baud eight
+take 30 ms."""
 
 
-class Patience(NamedTuple):
-    """For how long one parameter is asked for.
+class RetryPolicy(NamedTuple):
+    """How long one parameter is requested.
 
     Attributes:
-        timeout_s: Until a question is repeated, s.
-        tries: So many questions under each of its names.
+        timeout_s: Time until a request is repeated, s.
+        tries: Number of requests under each of its names.
     """
 
     timeout_s: float
     tries: int
 
 
-_AT_FIRST = Patience(0.5, 3)
-"""An autopilot may say nothing of a parameter that it has not, as older PX4: each costs 1.5 s."""
-_ONCE_MORE = Patience(0.75, 6)
+_AT_FIRST = RetryPolicy(0.5, 3)
+"""Older PX4 does not answer for a parameter that it lacks: each of those costs 1.5 s."""
+_ONCE_MORE = RetryPolicy(0.75, 6)
 """Where one frame in five is lost either way, three questions of a hundred get no answer to the
 first three and these six would leave one of ten thousand."""
 
 
 class Survey(NamedTuple):
-    """What was read; parameters that the autopilot has under none of their names are left out.
+    """The parameters that were read; those that the autopilot lacks are left out.
 
     Attributes:
-        values: By the newest name.
-        names: By the newest name, the one that this autopilot knows.
-        untold: Newest names of those for which neither a value came nor the word that it has none.
+        values: Values by newest name.
+        names: This autopilot's own name of each, by newest name.
+        untold: Newest names of those without any answer, neither a value nor an error.
         lossy: Whether the link lost frames meanwhile, the vehicle's or ours.
     """
 
@@ -54,21 +54,21 @@ async def survey(
     rules: Iterable[ParameterRule],
     *,
     before: Survey | None = None,
-    at_first: Patience = _AT_FIRST,
-    once_more: Patience = _ONCE_MORE,
+    at_first: RetryPolicy = _AT_FIRST,
+    once_more: RetryPolicy = _ONCE_MORE,
 ) -> Survey:
     """Read the rules' parameters, several at a time; where the link loses frames, ask again.
 
-    An old name is asked for only where the new one got no answer. What got none at all is asked for
-    once more, after all others and longer, but only where frames were lost: on a good link it is
-    what this autopilot has not, and the question costs time alone.
+    An old name is requested only if the new one got no answer. A parameter without any answer is
+    requested once more, after all others and for longer, but only if frames were lost: on a good
+    link this autopilot does not have it, and the request only costs time.
 
     Args:
         link: To the vehicle.
-        rules: Of its family.
-        before: What the same vehicle said before: what it did not tell then is not asked again, for
-            that costs seconds each time on a link that loses frames.
-        at_first: For the first question.
+        rules: Of its autopilot.
+        before: An earlier survey of the same vehicle. What it did not answer then is not requested
+            again: on a link that loses frames each costs seconds.
+        at_first: For the first round of requests.
         once_more: For the second.
 
     Raises:
@@ -83,7 +83,7 @@ async def survey(
             name for rule in rules for name in rule.names if name != before.names[rule.name]
         )
     await questions.ask(rules, at_first)
-    # Who answered nothing at all will not do so now, and that is a finding of its own.
+    # An autopilot that answered nothing at all is a finding of its own.
     if questions.values and questions.lossy:
         await questions.ask(questions.untold(rules), once_more)
     return Survey(
@@ -95,7 +95,7 @@ async def survey(
 
 
 class _Questions:
-    """What was asked of a vehicle, and what it said.
+    """The requests to one vehicle and its answers.
 
     Attributes:
         values, names: As in `Survey`.
@@ -112,41 +112,39 @@ class _Questions:
 
     @property
     def lossy(self) -> bool:
-        """Whether frames of the vehicle are missing, or ours by an answer only to a repetition."""
+        """Whether the vehicle's frames were lost, or ours: only a repeated request was answered."""
         stats = self._link.stats
         lost = share_lost(stats.frames - self._frames, stats.lost - self._lost)
         return self._repeated or lost > SOME_LOST
 
     def leave_out(self, names: Iterable[str]) -> None:
-        """The autopilot is known to have none of these names."""
+        """Do not request these names: the autopilot is known to lack them."""
         self._none.update(names)
 
     def untold(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
-        """Of the rules those without a value, unless the autopilot said that it has none."""
+        """The rules without a value, except those that the autopilot said it lacks."""
         return [
             rule
             for rule in rules
             if rule.name not in self.values and not self._none.issuperset(rule.names)
         ]
 
-    async def ask(self, rules: Iterable[ParameterRule], patience: Patience) -> None:
-        """Ask for all of them; raises `LinkLost`."""
-        await asyncio.gather(*(self._ask_under_each_name(rule, patience) for rule in rules))
+    async def ask(self, rules: Iterable[ParameterRule], policy: RetryPolicy) -> None:
+        """Request all of them. Raises `LinkLost`."""
+        await asyncio.gather(*(self._ask_under_each_name(rule, policy) for rule in rules))
 
-    async def _ask_under_each_name(self, rule: ParameterRule, patience: Patience) -> None:
+    async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
         async with self._free:
             for name in rule.names:
-                value = None if name in self._none else await self._value(name, patience)
+                value = None if name in self._none else await self._value(name, policy)
                 if value is not None:
                     self.values[rule.name], self.names[rule.name] = value, name
                     return
 
-    async def _value(self, name: str, patience: Patience) -> float | None:
-        for attempt in range(patience.tries):
+    async def _value(self, name: str, policy: RetryPolicy) -> float | None:
+        for attempt in range(policy.tries):
             try:
-                value = await self._link.read_parameter(
-                    name, timeout_s=patience.timeout_s, retries=0
-                )
+                value = await self._link.read_parameter(name, timeout_s=policy.timeout_s, retries=0)
             except UnansweredParameter:
                 continue
             except UnknownParameter:

@@ -1,4 +1,4 @@
-"""What the doctor found, as tables for people and as one object for machines."""
+"""The findings of `companion doctor`, as tables for people and as JSON for programs."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.config import Config
-from companion.preflight.examination import not_accepted, overall_result, unsafe
+from companion.preflight.all_checks import not_accepted, overall_result, unsafe
 from companion.preflight.finding import Finding
 from companion.preflight.parameter_fixes import Outcome
 from companion.vehicle.parameter_rules import CheckResult
@@ -30,7 +30,7 @@ _RESULTS = {
 
 
 def tables(config: Config, findings: Sequence[Finding]) -> RenderableType:
-    """A table for each verdict that was given, the worst first, and a last line."""
+    """A table for each result that occurred, the worst first, and a summary line."""
     parts: list[RenderableType] = []
     for result, (title, style) in _TITLES.items():
         of_it = [finding for finding in findings if finding.result is result]
@@ -70,7 +70,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
 
 
 def outcome_line(outcome: Outcome) -> str:
-    """What became of a change, for people."""
+    """The outcome of a change, for people."""
     change = outcome.change
     if outcome.refusal:
         return f"not set: {outcome.refusal}"

@@ -1,4 +1,4 @@
-"""Checks of the vehicle itself: whether it may be armed now, its battery, its estimator, itself."""
+"""Checks of the vehicle itself: readiness, battery, estimator, place and version."""
 
 from collections.abc import Iterator
 
@@ -14,11 +14,11 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 NOT_READY = CheckResult.NOT_READY
 
 _FEW_UNUSABLE = 0.01
-"""A larger share than this of the attitude samples is more than one damaged message."""
+"""Share of unusable attitude samples above which it is more than single damaged messages."""
 
 
 def armed(state: VehicleState) -> Finding:
-    """Whether the motors may turn already."""
+    """Whether the vehicle is armed already."""
     if state.armed:
         return Finding(
             Key.ARMED,
@@ -31,7 +31,7 @@ def armed(state: VehicleState) -> Finding:
 
 
 def battery(config: Config, state: VehicleState) -> Finding:
-    """Whether there is charge enough, as far as the vehicle tells."""
+    """Whether the battery has enough charge, as far as the vehicle reports it."""
     remaining = None if state.battery is None else state.battery.remaining
     least = config.limits.min_battery_percent
     source = "BATTERY_STATUS, SYS_STATUS"
@@ -65,7 +65,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
 
 
 def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether they stand still before anybody arms."""
+    """Whether the vehicle is disarmed before a flight begins."""
     if evidence.stage is Stage.GROUND:
         yield armed(evidence.state)
 
@@ -92,7 +92,7 @@ def failsafe(state: VehicleState) -> Iterator[Finding]:
 
 
 def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the autopilot would arm, and why not, in its own words."""
+    """Whether the autopilot is ready, and if not, why, in its own words."""
     state, stage = evidence.state, evidence.stage
     yield from failsafe(state)
     ready = state.readiness
@@ -120,7 +120,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether a GPS that was good still is."""
+    """Whether a GPS that had a fix still has it."""
     fault, source = evidence.state.gps_fault, "GPS_RAW_INT"
     if fault is not None:
         yield Finding(
@@ -134,7 +134,7 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether it stands on the ground, and heights mean what they should."""
+    """Whether it stands on the ground, at home's height."""
     state, source = evidence.state, "EXTENDED_SYS_STATE, LOCAL_POSITION_NED, HOME_POSITION"
     if evidence.stage is Stage.AIRBORNE:
         return
@@ -162,7 +162,7 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the attitude that arrives can be answered."""
+    """Whether the attitude samples are usable."""
     samples = evidence.samples
     if samples.unusable:
         yield Finding(
@@ -177,7 +177,7 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the estimate holds still while the vehicle does."""
+    """Whether the estimator resets while the vehicle stands still."""
     if evidence.resets:
         yield Finding(
             Key.ESTIMATOR_RESETS,
@@ -190,7 +190,7 @@ def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether it stands inside a fence that is given by latitude and longitude."""
+    """Whether it stands inside a fence given by latitude and longitude."""
     corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
     if not corners:
         return
@@ -214,20 +214,20 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
         UNSAFE,
         f"it stands at {here.latitude:.5f}, {here.longitude:.5f}, outside safety.fence_polygon_deg",
         "the flight would end as soon as it began",
-        "carry it inside, or mend the corners: each is [latitude, longitude]",
+        "carry it inside, or correct the corners: each is [latitude, longitude]",
         source,
     )
 
 
 def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """What autopilot it is."""
+    """The autopilot's version, and whether it accepts our setpoints."""
     identity, name = evidence.identity, evidence.autopilot.name
     if identity.version is None or identity.capabilities is None:
         yield Finding(
             Key.VERSION,
             INEFFECTIVE,
             f"{name} does not tell its version",
-            "which of its manners apply cannot be known",
+            "which behaviour to expect is unknown",
             "a newer version tells it",
             "AUTOPILOT_VERSION",
         )

@@ -1,1 +1,1 @@
-"""An autopilot as we see it: its link, its state, its clock, and its family."""
+"""An autopilot as we see it: its link, its state, its clock, and its kind."""

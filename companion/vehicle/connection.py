@@ -4,11 +4,11 @@ import asyncio
 import logging
 from collections.abc import Callable
 
-from companion.mavlink.endpoint import Endpoint, UdpIn, UdpOut
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.stats import LinkStats
+from companion.mavlink.transport.endpoint import Endpoint, UdpIn, UdpOut
+from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.vehicle.inbox import Inbox
 
 _LOG = logging.getLogger(__name__)

@@ -23,7 +23,7 @@ from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import FrameCounter, LinkStats
-from companion.mavlink.transport import Tap
+from companion.mavlink.transport.base import Tap
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample
 

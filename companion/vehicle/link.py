@@ -6,19 +6,19 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from companion.attitude.types import BodyRates
-from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import LinkError, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.framing import Frame
 from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
-from companion.mavlink.opening import OpenTransport, open_transport
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending
 from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.stamp_keeper import StampKeeper
+from companion.mavlink.signing import StampKeeper
 from companion.mavlink.stats import LinkStats
-from companion.mavlink.transport import Tap
+from companion.mavlink.transport.base import Tap
+from companion.mavlink.transport.endpoint import parse_endpoint
+from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.connection import Connection

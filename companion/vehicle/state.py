@@ -1,51 +1,42 @@
-"""What is known of the vehicle, from its telemetry. Values that are not finite are never kept."""
+"""What the vehicle's telemetry tells. Values that are not finite are never kept."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from math import inf, isfinite
+from math import isfinite
 
 from companion.attitude import Quaternion, is_unit
-from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.messages import Message
 from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
-from companion.vehicle.autopilot import Autopilot, Readiness
+from companion.vehicle.autopilot import Readiness
 from companion.vehicle.clock import VehicleClock
+from companion.vehicle.mode_state import ModeState
 from companion.vehicle.records import (
     GPS_FIX_3D,
     AttitudeTarget,
     AttitudeTargetThrust,
     Battery,
-    CurrentMode,
     Estimator,
     GlobalPosition,
     Gps,
-    Heartbeat,
     Home,
     Landed,
     LocalPosition,
     Prearm,
-    Vector,
     gps_fault,
     outdated,
 )
-from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
 GROUND_HEIGHT = 1.5
 """Height above home that may be read on the ground, m: the estimate drifts."""
-_ARMED = 128
 _UNKNOWN_U16 = 65535
-_AUTOPILOT_INVALID = 8
-_STATE_CRITICAL = 5
 _PREARM_CHECK = 0x10000000
 _UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 
 
 @dataclass
 class _Values:
-    heartbeat: Heartbeat | None = None
-    current_mode: CurrentMode | None = None
     landed_state: Landed | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
@@ -55,37 +46,27 @@ class _Values:
     gps: Gps | None = None
     home: Home | None = None
     estimator: Estimator | None = None
-    armings: int = 0
     positions: int = 0
     prearm: Prearm | None = None
     gps_was_good: bool = False
     reset_counter: int | None = None
 
 
-class VehicleState(_Values):
+class VehicleState(ModeState, _Values):
     """The newest of each, `None` until it came; stamped with the time of arrival.
 
+    Mode and arming are those of `ModeState`.
+
     Attributes:
-        heartbeat: See `Heartbeat`.
-        current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
-        landed_state: See `Landed`; `landed` and `taking_off` heed its age.
+        landed_state: See `Landed`; `landed` and `taking_off` ignore an outdated one.
         position: See `LocalPosition`; the newest by its own time stamp.
-        battery: See `Battery`.
-        attitude_target_thrust: See `AttitudeTargetThrust`.
-        attitude_target: See `AttitudeTarget`; only of a family with `rates_along_target`. One that
-            is no unit quaternion is passed over.
+        attitude_target: See `AttitudeTarget`; only if the autopilot takes `rates_along_target`. One
+            that is no unit quaternion is ignored.
         global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
-        gps: See `Gps`.
-        home: See `Home`.
-        estimator: See `Estimator`.
+        attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
         positions: How many positions were taken.
-        heartbeat_is_newest: Whether HEARTBEAT told the mode last, and so tells of arming as newly.
-        armings: How often it was seen to become armed.
-        prearm: See `Prearm`.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
         reset_counter: ODOMETRY: rises whenever the estimator jumps.
-        family: The autopilot's family, once its first heartbeat was heard.
-        unsupported: The error to raise if it has none.
         texts: What it said, newest last.
     """
 
@@ -97,17 +78,12 @@ class VehicleState(_Values):
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
-        super().__init__()
-        self._stats, self._assembler, self._clock = stats, texts, clock
+        _Values.__init__(self)
+        ModeState.__init__(self, router, clock)
+        self._stats, self._assembler = stats, texts
         self._vehicle_clock = vehicle_clock
         self.texts = texts.texts
-        self.heartbeat_is_newest = True
-        self._base_mode = 0
-        self.autopilot: Autopilot | None = None
-        self.unsupported: UnsupportedAutopilot | None = None
         for name, callback in {
-            "HEARTBEAT": self._on_heartbeat,
-            "CURRENT_MODE": self._on_current_mode,
             "EXTENDED_SYS_STATE": self._on_extended_sys_state,
             "LOCAL_POSITION_NED": self._on_local_position,
             "SYS_STATUS": self._on_sys_status,
@@ -124,42 +100,11 @@ class VehicleState(_Values):
             router.subscribe(name, callback)
 
     def forget(self) -> None:
-        """Know nothing but the newest heartbeat: another vehicle may have told the rest."""
-        fresh = _Values(heartbeat=self.heartbeat)
+        """Forget all but the newest heartbeat: the rest may come from another vehicle."""
+        self.current_mode, self.armings = None, 0
+        fresh = _Values()
         for field in fields(_Values):
             setattr(self, field.name, getattr(fresh, field.name))
-
-    @property
-    def mode(self) -> str | None:
-        """Name of the present mode, by whichever of HEARTBEAT and CURRENT_MODE came last."""
-        heartbeat, current = self.heartbeat, self.current_mode
-        if heartbeat is None:
-            return None
-        return heartbeat.mode if current is None or self.heartbeat_is_newest else current.mode
-
-    @property
-    def mode_received(self) -> float:
-        """When the present mode was last told, s of our clock; -inf if it never was."""
-        told = (self.heartbeat, self.current_mode)
-        return max((each.received for each in told if each is not None), default=-inf)
-
-    @property
-    def armed(self) -> bool | None:
-        """Whether the motors may turn."""
-        return self.heartbeat.armed if self.heartbeat else None
-
-    @property
-    def failsafe(self) -> bool:
-        """Whether the autopilot says that it is in a failsafe."""
-        return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
-
-    @property
-    def mode_by_failsafe(self) -> bool:
-        """Whether a failsafe chose the present mode, as far as the autopilot tells."""
-        current = self.current_mode
-        if current is None or self.heartbeat_is_newest:
-            return self.failsafe
-        return self.failsafe or current.mode != current.intended
 
     @property
     def landed(self) -> bool:
@@ -178,7 +123,7 @@ class VehicleState(_Values):
 
     @property
     def battery_silent(self) -> bool:
-        """Whether the battery was told of, and is not any more."""
+        """Whether the battery was reported and no longer is."""
         return self.battery is not None and outdated(self.battery.received, self._clock())
 
     @property
@@ -190,7 +135,7 @@ class VehicleState(_Values):
 
     @property
     def readiness(self) -> Readiness:
-        """What the family judges before arming; what was not told for a while is not known."""
+        """What the autopilot needs before arming; what is outdated counts as unknown."""
         now = self._clock()
         prearm, estimator, position = self.prearm, self.estimator, self.position
         return Readiness(
@@ -204,57 +149,6 @@ class VehicleState(_Values):
     def gps_fault(self) -> str | None:
         """What is wrong with a GPS that was good, in words, or `None`."""
         return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
-
-    @property
-    def position_ned(self) -> Vector | None:
-        """Newest position, m."""
-        return self.position.position_ned if self.position else None
-
-    @property
-    def velocity_ned(self) -> Vector | None:
-        """Newest velocity, m/s."""
-        return self.position.velocity_ned if self.position else None
-
-    def _on_heartbeat(self, message: Message) -> None:
-        if message.autopilot == _AUTOPILOT_INVALID:
-            return  # some other part of the vehicle, under the autopilot's own id
-        kind = message.autopilot, message.type in MULTIROTORS
-        if self.autopilot is not None and kind != (self.autopilot.mav_autopilot, True):
-            return  # an autopilot does not change its kind; this is some other part of the vehicle
-        if self.autopilot is None:
-            try:
-                self.autopilot, self.unsupported = (
-                    autopilot_for(message.autopilot, message.type),
-                    None,
-                )
-            except UnsupportedAutopilot as error:
-                self.autopilot, self.unsupported = None, error
-        armed = bool(message.base_mode & _ARMED)
-        self.armings += armed and not self.armed
-        mode = str(message.custom_mode)
-        if self.autopilot is not None:
-            mode = self.autopilot.mode_name(message.base_mode, message.custom_mode)
-        self.heartbeat = Heartbeat(
-            self._clock(),
-            message.autopilot,
-            message.type,
-            mode,
-            message.custom_mode,
-            armed,
-            message.system_status,
-        )
-        self._base_mode = message.base_mode
-        self.heartbeat_is_newest = True
-
-    def _on_current_mode(self, message: Message) -> None:
-        if self.autopilot is None:
-            return  # what the number means is not known yet
-        mode, intended = (
-            self.autopilot.mode_name(self._base_mode, number)
-            for number in (message.custom_mode, message.intended_custom_mode)
-        )
-        self.current_mode = CurrentMode(self._clock(), mode, intended)
-        self.heartbeat_is_newest = False
 
     def _on_extended_sys_state(self, message: Message) -> None:
         self.landed_state = Landed(self._clock(), message.landed_state)

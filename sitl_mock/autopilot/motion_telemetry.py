@@ -1,7 +1,7 @@
 """Telemetry of position and motion; the defaults follow PX4's conventions."""
 
 from collections.abc import Callable, Sequence
-from math import asin, atan2, degrees, hypot, isnan, pi
+from math import degrees, hypot, isnan
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -14,11 +14,10 @@ from sitl_mock.autopilot.setpoints import (
 from sitl_mock.autopilot.state import NAN, PositionTargetEcho, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, Origin, to_geodetic
-from sitl_mock.physics.quaternion import Quaternion, yaw
+from sitl_mock.physics.quaternion import euler, yaw
 from sitl_mock.physics.vehicle import Vehicle
 
 Builder = Callable[[], Message | None]
-
 _SEA_LEVEL_HPA = 1013.25
 MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
@@ -238,15 +237,6 @@ def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:
 
 _POSE_COVARIANCE = upper_triangle(_POSE_VARIANCES)
 _VELOCITY_COVARIANCE = upper_triangle(_VELOCITY_VARIANCES)
-
-
-def euler(q: Quaternion) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw (Z-Y-X, rad)."""
-    w, x, y, z = q
-    roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    sine = 2.0 * (w * y - z * x)
-    pitch = asin(sine) if abs(sine) < 1.0 else (pi / 2 if sine > 0 else -pi / 2)
-    return roll, pitch, yaw(q)
 
 
 def clip(value: float, bits: int) -> int:

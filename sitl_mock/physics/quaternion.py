@@ -1,6 +1,6 @@
 """Quaternion operations: (w, x, y, z), Hamilton product, body to world."""
 
-from math import atan2, cos, sin, sqrt
+from math import asin, atan2, cos, pi, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -57,3 +57,12 @@ def along_heading(q: Quaternion, vector: Vector) -> Vector:
     c, s = w * w - z * z, 2.0 * w * z
     x, y, down = vector
     return (c * x - s * y, s * x + c * y, down)
+
+
+def euler(q: Quaternion) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw (Z-Y-X, rad)."""
+    w, x, y, z = q
+    roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    sine = 2.0 * (w * y - z * x)
+    pitch = asin(sine) if abs(sine) < 1.0 else (pi / 2 if sine > 0 else -pi / 2)
+    return roll, pitch, yaw(q)

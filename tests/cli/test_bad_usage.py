@@ -12,8 +12,8 @@ import psutil
 import pytest
 
 from companion.cli.main import main
-from companion.mavlink.endpoint import parse_endpoint
 from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport.endpoint import parse_endpoint
 from sitl_mock.__main__ import main as start_vehicle
 from tests.cli.test_demo import quick_demo
 

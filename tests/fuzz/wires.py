@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from companion.mavlink.transport import Receiver
+from companion.mavlink.transport.base import Receiver
 
 
 class Wire:
@@ -20,7 +20,7 @@ class Wire:
         self._receiver: Receiver | None = None
 
     async def open(self, _endpoint: Any, receiver: Receiver, _lost: Any) -> "Wire":
-        """Open it, as `companion.mavlink.opening.open_transport` does."""
+        """Open it, as `companion.mavlink.transport.opening.open_transport` does."""
         self._receiver = receiver
         return self
 

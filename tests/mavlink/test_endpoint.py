@@ -2,7 +2,8 @@
 
 import pytest
 
-from companion.mavlink.endpoint import (
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport.endpoint import (
     PeerAddress,
     SerialPort,
     TcpClient,
@@ -11,7 +12,6 @@ from companion.mavlink.endpoint import (
     UdpOut,
     parse_endpoint,
 )
-from companion.mavlink.errors import EndpointError
 
 
 @pytest.mark.parametrize(

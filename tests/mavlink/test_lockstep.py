@@ -7,9 +7,10 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink import lockstep, udp
+from companion.mavlink import lockstep
 from companion.mavlink.errors import LinkTimeout
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.transport import udp
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import LockstepVehicle, attitude, free_port, heartbeat, until
 

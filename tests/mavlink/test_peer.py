@@ -8,14 +8,13 @@ from socket import AF_INET6, SOCK_DGRAM, socket
 import pytest
 
 from companion.attitude import BodyRates
-from companion.mavlink import tcp as tcp_module
-from companion.mavlink import udp as udp_module
-from companion.mavlink.endpoint import PeerAddress
 from companion.mavlink.errors import EndpointError, LinkTimeout
-from companion.mavlink.named_peers import resolve
-from companion.mavlink.peer import PeerRule
+from companion.mavlink.peer import PeerRule, resolve
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
+from companion.mavlink.transport import tcp as tcp_module
+from companion.mavlink.transport import udp as udp_module
+from companion.mavlink.transport.endpoint import PeerAddress
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 

@@ -11,12 +11,8 @@ from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import (
-    SignatureResult,
-    Signing,
-    key_from_hex,
-    key_from_passphrase_file,
-)
+from companion.mavlink.signing import Signing, key_from_hex, key_from_passphrase_file
+from companion.mavlink.stamps import SignatureResult
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, heartbeat, linked
 

@@ -12,10 +12,9 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.mavlink.framing import FrameScanner, build_frame
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.signing import SignatureResult, Signing
+from companion.mavlink.signing import Signing, StampKeeper
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamp_judge import EPOCH_UNIX_S
-from companion.mavlink.stamp_keeper import StampKeeper
+from companion.mavlink.stamps import EPOCH_UNIX_S, SignatureResult
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, heartbeat, until
 
@@ -318,7 +317,7 @@ def wait_for(condition):
 
 def test_the_loop_never_waits_for_the_disk(run, monkeypatch):
     """A disk that hangs: the link opens, hears, and closes after the 2 s it is given."""
-    monkeypatch.setattr("companion.mavlink.stamp_keeper._LAST_WRITE_S", 0.05)
+    monkeypatch.setattr("companion.mavlink.signing._LAST_WRITE_S", 0.05)
     monkeypatch.setattr(StampFile, "save", lambda *_: time.sleep(1.0))
 
     async def scene():

@@ -10,9 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
-from companion.mavlink import udp as udp_module
 from companion.mavlink.errors import EndpointError, LinkLost
 from companion.mavlink.settings import LinkSettings
+from companion.mavlink.transport import udp as udp_module
 from companion.vehicle import connection as connection_module
 from companion.vehicle.link import Link
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until

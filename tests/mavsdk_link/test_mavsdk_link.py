@@ -19,8 +19,8 @@ from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
 
 pytest.importorskip("mavsdk")
 
-from companion.mavsdk_link.connection_url import connection_url
 from companion.mavsdk_link.link import MavsdkLink
+from companion.mavsdk_link.transport import connection_url
 
 PROGRAM = "tests.mavsdk_link.answering_program"
 LIMIT_S = 0.3

@@ -10,8 +10,8 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed
 from companion.preflight import clock_checks, configuration_checks, link_checks, vehicle_checks
+from companion.preflight.all_checks import blocking, overall_result, run_checks
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, OtherNodes, SampleTimes
-from companion.preflight.examination import blocking, examine, overall_result
 from companion.preflight.finding import Key
 from companion.preflight.parameter_survey import Survey
 from companion.preflight.parameters import parameters
@@ -74,7 +74,7 @@ def found(check, evidence=GOOD, config=CONFIG):
 
 def test_nothing_is_amiss_with_good_evidence():
     """PX4's 197 Hz of 250 asked and a message of 1 Hz that did not come this second included."""
-    assert amiss(examine(CONFIG, GOOD)) == {}
+    assert amiss(run_checks(CONFIG, GOOD)) == {}
 
 
 @pytest.mark.parametrize(
@@ -195,8 +195,8 @@ def test_bursts_are_judged_on_the_ground_as_in_flight():
 
 def test_asked_again_nothing_is_asked_that_only_the_configuration_decides():
     unused = changed(CONFIG, {"flight": {"accept": ("NO_SUCH_CHECK",)}}, "test")
-    assert Key.ACCEPT in amiss(examine(unused, GOOD))
-    assert amiss(examine(unused, GOOD, again=True)) == {}
+    assert Key.ACCEPT in amiss(run_checks(unused, GOOD))
+    assert amiss(run_checks(unused, GOOD, again=True)) == {}
 
 
 def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
@@ -221,7 +221,7 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
 )
 def test_the_state_of_the_vehicle(changes, expected):
     evidence = replace(GOOD, state=state(**changes))
-    assert amiss(examine(CONFIG, evidence)) == expected
+    assert amiss(run_checks(CONFIG, evidence)) == expected
 
 
 BOOTING = Readiness(prearm_good=False, estimator_flags=None, position=False, home=False)
@@ -240,12 +240,12 @@ def without_position(readiness, **changes):
 def test_a_vehicle_without_a_position_yet_is_not_ready_and_nothing_else(readiness):
     """Neither its missing position nor its missing home is a fault of the link."""
     evidence = without_position(readiness)
-    findings = examine(CONFIG, evidence)
+    findings = run_checks(CONFIG, evidence)
     assert amiss(findings) == {Key.READY: NOT_READY}
     assert [finding.key for finding in blocking(CONFIG, findings)] == [Key.READY]
     assert overall_result(CONFIG, findings) is NOT_READY
     fenced = changed(CONFIG, {"safety": {"fence_polygon_deg": SQUARE}}, "test")
-    assert amiss(examine(fenced, evidence)) == {Key.READY: NOT_READY, Key.FENCE: NOT_READY}
+    assert amiss(run_checks(fenced, evidence)) == {Key.READY: NOT_READY, Key.FENCE: NOT_READY}
 
 
 def test_a_position_that_will_never_come_is_not_hidden_by_not_being_ready():
@@ -388,6 +388,6 @@ def test_an_exception_lets_one_finding_pass_and_no_other():
     evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.names))
     evidence = replace(evidence, link=QUALITY._replace(round_trip=0.5))
     accepting = changed(CONFIG, {"flight": {"accept": ("COM_OF_LOSS_T",)}}, "test")
-    refused = [finding.key for finding in blocking(accepting, examine(accepting, evidence))]
+    refused = [finding.key for finding in blocking(accepting, run_checks(accepting, evidence))]
     assert refused == [Key.ROUND_TRIP]
-    assert len(blocking(CONFIG, examine(CONFIG, evidence))) == 2
+    assert len(blocking(CONFIG, run_checks(CONFIG, evidence))) == 2

@@ -10,7 +10,7 @@ import pytest
 
 from companion.config.files import changed
 from companion.mavlink import lockstep
-from companion.preflight.examination import examine
+from companion.preflight.all_checks import run_checks
 from companion.preflight.parameter_survey import survey
 from companion.preflight.session import gather
 from companion.vehicle.parameter_rules import CheckResult
@@ -120,13 +120,13 @@ async def _visit(folder, mock):
     config = configured(folder, mock)
     async with met(config) as vehicle:
         evidence = await vehicle.gather(10.0)
-        found = {"good": amiss(examine(config, evidence))}
+        found = {"good": amiss(run_checks(config, evidence))}
         link = vehicle.link
         for name, value, _ in PARAMETERS[mock.autopilot]:
             before = await link.read_parameter(name)
             await link.write_parameter(name, value)
             seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-            found[name, value] = amiss(examine(config, seeded))
+            found[name, value] = amiss(run_checks(config, seeded))
             await link.write_parameter(name, before)
         found["lossy"] = await _on_a_lossy_link(mock, config, link, evidence)
         for section, keys, name, _ in OUR_OWN[mock.autopilot]:
@@ -134,12 +134,12 @@ async def _visit(folder, mock):
             if name == "planner.name":
                 changes["vehicle"] = {"lag_ms": None}
             ours = changed(config, changes, "the seed")
-            found[section, str(keys)] = amiss(examine(ours, evidence))
+            found[section, str(keys)] = amiss(run_checks(ours, evidence))
         for fault, _, _ in FAULTS:
             assert mock.ask({"fault": fault}) == {"ok": True}
             # Not before what was known is replaced: the autopilot tells its checks at 5 Hz.
             await asyncio.sleep(0.25)
-            spoilt = examine(config, await gather(link, evidence.streams, 0.7, thorough=True))
+            spoilt = run_checks(config, await gather(link, evidence.streams, 0.7, thorough=True))
             found[str(fault)] = amiss(spoilt)
             mock.ask({"clear": True})
             if fault["kind"] == "refuse_arming":
@@ -166,7 +166,7 @@ async def _on_a_lossy_link(mock, config, link, evidence):
     await asyncio.sleep(0.25)
     for name, value in before.items():
         await link.write_parameter(name, value)
-    return set(names), seeded.survey, amiss(examine(config, seeded))
+    return set(names), seeded.survey, amiss(run_checks(config, seeded))
 
 
 def test_no_unsafe_value_is_lost_with_the_frames_of_a_lossy_link(visit):

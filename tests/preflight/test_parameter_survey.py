@@ -4,7 +4,7 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from companion.preflight.parameter_survey import Patience, Survey, survey
+from companion.preflight.parameter_survey import RetryPolicy, Survey, survey
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from tests.mavlink.fakes import linked
@@ -27,7 +27,7 @@ def test_an_old_version_answers_to_the_old_names():
     async def scene():
         async with linked() as (link, vehicle):
             vehicle.answers["PARAM_REQUEST_READ"] = answer
-            return await survey(link, rules, at_first=Patience(0.05, 1))
+            return await survey(link, rules, at_first=RetryPolicy(0.05, 1))
 
     values, names, untold, lossy = asyncio.run(scene())
     assert (untold, lossy) == ({"ARMING_SKIPCHK"}, False)
@@ -101,7 +101,7 @@ class Lossy:
                 vehicle.answers["PARAM_REQUEST_READ"] = lambda request: self.answer(
                     vehicle, request
                 )
-                patience = {"at_first": Patience(0.05, 2), "once_more": Patience(0.05, 3)}
+                patience = {"at_first": RetryPolicy(0.05, 2), "once_more": RetryPolicy(0.05, 3)}
                 return await survey(link, rules, **patience)
 
         return asyncio.run(scene())

@@ -135,8 +135,8 @@ def test_another_parts_heartbeat_is_not_the_autopilots(bench):
 def test_position_with_both_times(bench):
     state = bench.take(dialect.MAVLink_local_position_ned_message(2500, 1, 2, -3, 0.5, -0.5, 0.25))
     assert (state.position.received, state.position.vehicle_time) == (10.0, 2.5)
-    assert state.position_ned == (1.0, 2.0, -3.0)
-    assert state.velocity_ned == (0.5, -0.5, 0.25)
+    assert state.position.position_ned == (1.0, 2.0, -3.0)
+    assert state.position.velocity_ned == (0.5, -0.5, 0.25)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

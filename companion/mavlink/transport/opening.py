@@ -2,7 +2,8 @@
 
 from collections.abc import Awaitable, Callable
 
-from companion.mavlink.endpoint import (
+from companion.mavlink.transport.base import Lost, Receiver, Transport
+from companion.mavlink.transport.endpoint import (
     Endpoint,
     SerialPort,
     TcpClient,
@@ -11,10 +12,9 @@ from companion.mavlink.endpoint import (
     UdpOut,
     parse_endpoint,
 )
-from companion.mavlink.serial_port import SerialTransport
-from companion.mavlink.tcp import open_tcp_client, open_tcp_server
-from companion.mavlink.transport import Lost, Receiver, Transport
-from companion.mavlink.udp import open_udp
+from companion.mavlink.transport.serial_port import SerialTransport
+from companion.mavlink.transport.tcp import open_tcp_client, open_tcp_server
+from companion.mavlink.transport.udp import open_udp
 
 OpenTransport = Callable[[Endpoint, Receiver, Lost], Awaitable[Transport]]
 """As `open_transport`, for a parsed endpoint."""

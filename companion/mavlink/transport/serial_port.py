@@ -7,10 +7,10 @@ import time
 
 import serial
 
-from companion.mavlink.endpoint import SerialPort
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.transport import Lost, Receive
+from companion.mavlink.transport.base import Lost, Receive
+from companion.mavlink.transport.endpoint import SerialPort
 
 _READ_BYTES = 4096
 

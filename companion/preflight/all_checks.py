@@ -1,4 +1,4 @@
-"""All checks in their order, and what a flight makes of what they find: the one place for both."""
+"""All preflight checks in their order, and which findings forbid a flight."""
 
 from collections.abc import Callable, Iterable, Iterator
 
@@ -43,11 +43,11 @@ ONCE: tuple[Check, ...] = (
     configuration_checks.dead_time,
     configuration_checks.accepted,
 )
-"""What a flight need not ask twice: only the configuration decides it."""
+"""Checks that a flight runs once only: their result depends on nothing but the configuration."""
 
 
-def examine(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """All that is found, safe things included; `again`: without what is asked `ONCE`."""
+def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
+    """Run all checks, and return safe findings too; `again`: without those that run `ONCE`."""
     return [
         finding
         for check in CHECKS
@@ -57,28 +57,28 @@ def examine(config: Config, evidence: Evidence, *, again: bool = False) -> list[
 
 
 def blocking(config: Config, findings: Iterable[Finding]) -> list[Finding]:
-    """With any of these nothing is flown: unsafe and not excepted, or not ready."""
+    """The findings that forbid a flight: unsafe and not accepted, or not ready."""
     findings = tuple(findings)
     waiting = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
     return [*not_accepted(config, findings), *waiting]
 
 
 def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
-    """What is unsafe and not excepted by `flight.accept`."""
+    """The unsafe findings that `flight.accept` does not list."""
     return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
 
 
 def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
-    """What it comes to: the gravest verdict that `companion fly` would heed, else safe."""
+    """The worst result that would stop `companion fly`, else safe."""
     findings = tuple(findings)
-    verdicts = {finding.result for finding in findings}
-    if CheckResult.NOT_CONNECTED in verdicts:
+    results = {finding.result for finding in findings}
+    if CheckResult.NOT_CONNECTED in results:
         return CheckResult.NOT_CONNECTED
     if not_accepted(config, findings):
         return CheckResult.UNSAFE
-    return CheckResult.NOT_READY if CheckResult.NOT_READY in verdicts else CheckResult.SAFE
+    return CheckResult.NOT_READY if CheckResult.NOT_READY in results else CheckResult.SAFE
 
 
 def unsafe(findings: Iterable[Finding]) -> list[Finding]:
-    """Of the findings those by which somebody may be hurt or the vehicle lost."""
+    """The findings by which somebody may be hurt or the vehicle lost."""
     return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

@@ -5,11 +5,10 @@ import errno
 import socket
 import time
 
-from companion.mavlink.endpoint import TcpClient, TcpServer
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.named_peers import NamedPeers, resolve, spelled
-from companion.mavlink.peer import CLAIM_LASTS_S
-from companion.mavlink.transport import OPEN_TIMEOUT_S, Lost, Receiver
+from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, resolve, spelled
+from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
+from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
 _MAX_UNSENT_BYTES = 2048  # some 40 setpoints; a vehicle that far behind must not get older ones
 

@@ -9,11 +9,11 @@ import struct
 import time
 from typing import Any
 
-from companion.mavlink.endpoint import UdpIn, UdpOut
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.named_peers import NamedPeers, resolve, spelled
-from companion.mavlink.transport import Receiver
+from companion.mavlink.peer import NamedPeers, resolve, spelled
+from companion.mavlink.transport.base import Receiver
+from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
 _LOG = logging.getLogger(__name__)
 

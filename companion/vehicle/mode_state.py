@@ -1,0 +1,115 @@
+"""The autopilot's mode and arming, from HEARTBEAT and CURRENT_MODE."""
+
+from collections.abc import Callable
+from math import inf
+
+from companion.mavlink.errors import UnsupportedAutopilot
+from companion.mavlink.messages import Message
+from companion.mavlink.router import Router
+from companion.vehicle.autopilot import Autopilot
+from companion.vehicle.records import CurrentMode, Heartbeat
+from companion.vehicle.registry import MULTIROTORS, autopilot_for
+
+_ARMED = 128
+_AUTOPILOT_INVALID = 8
+_STATE_CRITICAL = 5
+
+
+class ModeState:
+    """The newest heartbeat and mode, `None` until they came.
+
+    Args:
+        router: Brings both messages.
+        clock: Event-loop time, s.
+
+    Attributes:
+        heartbeat: See `Heartbeat`.
+        current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
+        heartbeat_is_newest: Whether HEARTBEAT told the mode last; its arming is then as new.
+        armings: How often the vehicle was seen to become armed.
+        autopilot: How to command it, once its first heartbeat was heard.
+        unsupported: The error to raise if we cannot fly it.
+    """
+
+    def __init__(self, router: Router, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self.heartbeat: Heartbeat | None = None
+        self.current_mode: CurrentMode | None = None
+        self.heartbeat_is_newest = True
+        self.armings = 0
+        self.autopilot: Autopilot | None = None
+        self.unsupported: UnsupportedAutopilot | None = None
+        self._base_mode = 0
+        router.subscribe("HEARTBEAT", self._on_heartbeat)
+        router.subscribe("CURRENT_MODE", self._on_current_mode)
+
+    @property
+    def mode(self) -> str | None:
+        """Name of the present mode, by whichever of HEARTBEAT and CURRENT_MODE came last."""
+        heartbeat, current = self.heartbeat, self.current_mode
+        if heartbeat is None:
+            return None
+        return heartbeat.mode if current is None or self.heartbeat_is_newest else current.mode
+
+    @property
+    def mode_received(self) -> float:
+        """When the present mode was last received, s of our clock; -inf if it never was."""
+        told = (self.heartbeat, self.current_mode)
+        return max((each.received for each in told if each is not None), default=-inf)
+
+    @property
+    def armed(self) -> bool | None:
+        """Whether the motors may turn."""
+        return self.heartbeat.armed if self.heartbeat else None
+
+    @property
+    def failsafe(self) -> bool:
+        """Whether the autopilot says that it is in a failsafe."""
+        return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
+
+    @property
+    def mode_by_failsafe(self) -> bool:
+        """Whether a failsafe chose the present mode, as far as the autopilot says."""
+        current = self.current_mode
+        if current is None or self.heartbeat_is_newest:
+            return self.failsafe
+        return self.failsafe or current.mode != current.intended
+
+    def _on_heartbeat(self, message: Message) -> None:
+        if message.autopilot == _AUTOPILOT_INVALID:
+            return  # some other part of the vehicle, under the autopilot's own id
+        kind = message.autopilot, message.type in MULTIROTORS
+        if self.autopilot is not None and kind != (self.autopilot.mav_autopilot, True):
+            return  # an autopilot does not change its kind; this is some other part of the vehicle
+        if self.autopilot is None:
+            try:
+                self.autopilot = autopilot_for(message.autopilot, message.type)
+                self.unsupported = None
+            except UnsupportedAutopilot as error:
+                self.unsupported = error
+        armed = bool(message.base_mode & _ARMED)
+        self.armings += armed and not self.armed
+        mode = str(message.custom_mode)
+        if self.autopilot is not None:
+            mode = self.autopilot.mode_name(message.base_mode, message.custom_mode)
+        self.heartbeat = Heartbeat(
+            self._clock(),
+            message.autopilot,
+            message.type,
+            mode,
+            message.custom_mode,
+            armed,
+            message.system_status,
+        )
+        self._base_mode = message.base_mode
+        self.heartbeat_is_newest = True
+
+    def _on_current_mode(self, message: Message) -> None:
+        if self.autopilot is None:
+            return  # what the number means is not known yet
+        mode, intended = (
+            self.autopilot.mode_name(self._base_mode, number)
+            for number in (message.custom_mode, message.intended_custom_mode)
+        )
+        self.current_mode = CurrentMode(self._clock(), mode, intended)
+        self.heartbeat_is_newest = False
