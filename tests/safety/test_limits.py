@@ -9,7 +9,9 @@ from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Fence, Place
 from companion.safety import Action, SafetyLadder, autopilot_judges, link_judges, motion_judges
 from companion.safety.actions import Exit, FlightEnded
+from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
+from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
@@ -167,21 +169,21 @@ def silent(reason=None, **changes):
     ],
 )
 def test_silence_tells_the_stage_that_failed_for_longer_than_its_limit(snapshot, words):
-    assert link_judges.silence(0.5, heard=True)(snapshot, False) == words
+    assert silence(0.5, heard=True)(snapshot, False) == words
 
 
 def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_asked():
-    assert link_judges.silence(0.75, heard=True)(silent(), False) is None
+    assert silence(0.75, heard=True)(silent(), False) is None
     unheard = silent(heard=NOW - 0.75)
-    assert link_judges.silence(0.5, heard=True)(unheard, False) is None
-    assert link_judges.silence(0.5, heard=False)(unheard, False)
+    assert silence(0.5, heard=True)(unheard, False) is None
+    assert silence(0.5, heard=False)(unheard, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
     assert (verdict.action, verdict.mutes) == (Action.RELEASE, True)
 
 
 def test_it_brakes_in_time_before_a_fence_on_the_map():
     corners = ((46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999))  # 111 m north
-    judge = motion_judges.braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
+    judge = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
     moving = Motion(
         offset=(80.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0, origin=Place(47.0, 8.0)
     )
@@ -196,7 +198,7 @@ def odd(name, then=Action.LAND, action=Action.HOLD):
     return Monitor(name, lambda s, _: name if s.good_flags & bit else None, action, then=then)
 
 
-def test_a_hold_that_does_not_end_its_breach_leads_to_the_more_severe_next_action():
+def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
     told = []
     ladder = SafetyLadder([odd("a", Action.HAND_BACK), odd("b", Action.LAND)], 2.0)
     ladder.note = told.append
