@@ -1,6 +1,6 @@
 """Airframe, battery and wind of the vehicle. The key names carry the units.
 
-The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink; see README.
+The defaults reproduce the PX4 SIH quadrotor (1 kg) as measured over MAVLink: docs/mock-vehicle.md.
 """
 
 from typing import Annotated

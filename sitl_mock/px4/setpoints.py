@@ -1,4 +1,4 @@
-"""Decodes offboard setpoints by PX4's type-mask rules (measured, see README)."""
+"""Decodes offboard setpoints by PX4's type-mask rules (docs/mock-vehicle.md)."""
 
 import math
 import struct

@@ -3,15 +3,15 @@
 from math import cos, inf, sin
 
 import pytest
-from companion.safety.ending import Exit, FlightEnded
-from companion.safety.fence import braking
-from companion.safety.silence import silence
 
 from companion.config import Config
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Fence, Place
-from companion.safety import Action, SafetyLadder, authority, envelope, estimate, resources
+from companion.safety import Action, SafetyLadder, autopilot_judges, link_judges, motion_judges
+from companion.safety.actions import Exit, FlightEnded
+from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
+from companion.safety.motion_judges import braking
 from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
@@ -34,21 +34,21 @@ def leaning(angle):
 
 
 UPPER = {
-    "tilt": (envelope.tilt, leaning),
+    "tilt": (motion_judges.tilt, leaning),
     "body rate": (
-        envelope.body_rate,
+        motion_judges.body_rate,
         lambda v: at(motion=Motion(body_rates=(0.6 * v, 0, 0.8 * v))),
     ),
-    "speed": (envelope.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
-    "tracking": (envelope.tracking, lambda v: at(motion=Motion(off_course=v))),
-    "link loss": (resources.loss, health("lost")),
-    "round trip": (resources.round_trip, health("round_trip")),
-    "deadlines": (resources.deadlines, health("missed")),
-    "starvation": (resources.starvation, health("starved")),
+    "speed": (motion_judges.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
+    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(off_course=v))),
+    "link loss": (link_judges.loss, health("lost")),
+    "round trip": (link_judges.round_trip, health("round_trip")),
+    "deadlines": (link_judges.deadlines, health("missed")),
+    "starvation": (link_judges.starvation, health("starved")),
 }
 LOWER = {
-    "answer rate": (resources.answer_rate, health("answer_rate")),
-    "position rate": (resources.position_rate, health("position_rate")),
+    "answer rate": (link_judges.answer_rate, health("answer_rate")),
+    "position rate": (link_judges.position_rate, health("position_rate")),
 }
 
 
@@ -74,10 +74,12 @@ def test_a_lower_limit_is_allowed_and_a_breach_is_over_a_ninth_above_it(name):
 
 
 def test_counts_and_shares_at_their_limit_are_allowed():
-    assert resources.gaps(2)(at(health=Health(gaps=2)), False) is None
-    assert resources.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
+    assert link_judges.gaps(2)(at(health=Health(gaps=2)), False) is None
+    assert (
+        autopilot_judges.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
+    )
     found = at(resets=Resets(3, 1.0, -0.5, 0.25))
-    assert estimate.resets(3, 1.0, 0.5)(found, False) is None
+    assert autopilot_judges.estimator_resets(3, 1.0, 0.5)(found, False) is None
 
 
 def autopilot(**told):
@@ -85,50 +87,50 @@ def autopilot(**told):
 
 
 SAID = [
-    (authority.landed, autopilot(landed=True), "the autopilot says that it has landed"),
-    (authority.failsafe, autopilot(failsafe=True), "the autopilot reports a failsafe"),
+    (autopilot_judges.landed, autopilot(landed=True), "the autopilot says that it has landed"),
+    (autopilot_judges.failsafe, autopilot(failsafe=True), "the autopilot reports a failsafe"),
     (
-        estimate.flags,
+        autopilot_judges.estimator_flags,
         autopilot(estimator=Estimator(OLD, 0x33F)),
         "the estimator's state is not reported any more",
     ),
     (
-        estimate.reset,
+        autopilot_judges.estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
-        "the estimator was reset: 0.5 m and 17° of heading in sum; what is flown moved along",
+        "the estimator was reset: 0.5 m and 17° of heading in sum; the references moved along",
     ),
     (
-        resources.battery(0.2),
+        autopilot_judges.battery(0.2),
         autopilot(battery=Battery(OLD, 16.0, 0.9)),
         "the battery's state is not reported any more",
     ),
     (
-        resources.battery(0.7),
+        autopilot_judges.battery(0.7),
         autopilot(battery=Battery(inf, 14.0, 0.6)),
         "battery at 60 %, below limits.min_battery_percent 70",
     ),
     (
-        resources.loss(0.2),
+        link_judges.loss(0.2),
         at(health=Health(lost=0.6)),
         "60 % of the vehicle's frames are lost",
     ),
     (
-        resources.round_trip(0.2),
+        link_judges.round_trip(0.2),
         at(health=Health(round_trip=0.6)),
         "the link's round trip takes 600 ms",
     ),
     (
-        resources.deadlines(0.2),
+        link_judges.deadlines(0.2),
         at(health=Health(missed=0.6)),
         "60 % of the answers miss deadman.deadline_ms",
     ),
     (
-        resources.starvation(0.2),
+        link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
-        "this computer has no time for us: 60 % of it are lost",
+        "CPU starvation: our timer is late by 60 % of the time",
     ),
     (
-        resources.gaps(2),
+        link_judges.gaps(2),
         at(health=Health(gaps=3)),
         "samples could not be answered 3 times within 5 s for longer than "
         "deadman.telemetry_stale_ms",
@@ -143,7 +145,7 @@ def test_a_breach_is_told_in_these_words(judge, snapshot, words):
 
 def test_lost_velocity_and_lost_position_are_told_together():
     lost = at(autopilot=Autopilot(estimator=Estimator(NOW, 0x33F & ~0x1A)), good_flags=0x33F)
-    assert "0x1a)" in estimate.flags(lost, False)
+    assert "0x1a)" in autopilot_judges.estimator_flags(lost, False)
 
 
 def silent(reason=None, **changes):
