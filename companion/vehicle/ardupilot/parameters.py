@@ -133,11 +133,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         vital=True,
     ),
     ParameterRule(
-        ("GUID_TIMEOUT",),
-        "for how long the last rates are held",
-        rates_held,
-        _MEASURED,
-        vital=True,
+        ("GUID_TIMEOUT",), "for how long the last rates are held", rates_held, _MEASURED, vital=True
     ),
     ParameterRule(
         ("ATC_RATE_FF_ENAB",),
@@ -237,17 +233,9 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         _REFERENCE,
         universal=True,
     ),
+    ParameterRule(("FENCE_ACTION",), "what ArduPilot does at its own geofence", _fence, _REFERENCE),
     ParameterRule(
-        ("FENCE_ACTION",),
-        "what ArduPilot does at its own geofence",
-        _fence,
-        _REFERENCE,
-    ),
-    ParameterRule(
-        ("FENCE_ENABLE",),
-        "whether ArduPilot has a geofence of its own",
-        _any_value,
-        _REFERENCE,
+        ("FENCE_ENABLE",), "whether ArduPilot has a geofence of its own", _any_value, _REFERENCE
     ),
     ParameterRule(
         ("BATT_FS_LOW_ACT",),
