@@ -25,8 +25,6 @@ from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, 
 _REFERENCE = "ArduCopter parameter reference"
 _MEASURED = "measured on ArduCopter 4.7, 2025"
 _STOPS_MOTORS = "the motors stop in the air"
-_THRUST_AS_THRUST = 8
-_CENTI = 0.01
 
 
 def _angle_boost(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
@@ -95,7 +93,7 @@ def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Pro
         return None
     return Problem(
         INEFFECTIVE,
-        "ArduPilot does nothing about an empty battery; nobody lands should our program have ended",
+        "ArduPilot does nothing about an empty battery; nobody lands should our program end",
         1.0,
     )
 
@@ -107,7 +105,7 @@ def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
         ParameterRule(
             (f"ATC_ACCEL_{axis}_MAX",),
             f"{meaning}, in hundredths of a degree (before 4.7)",
-            acceleration_limit(_CENTI, name),
+            acceleration_limit(0.01, name),
             _REFERENCE,
         ),
     )
@@ -119,7 +117,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "whether our thrust is a thrust or a climb rate",
         bit_set(
             UNSAFE,
-            _THRUST_AS_THRUST,
+            8,
             "our thrust would be obeyed as a climb rate (bit 3, value 8, makes it a thrust)",
         ),
         f"{_REFERENCE}; {_MEASURED}",
