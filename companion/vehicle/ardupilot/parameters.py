@@ -70,9 +70,7 @@ def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem 
     if value >= settings.attitude_rate_hz:
         return None
     asked = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(
-        INEFFECTIVE, f"no message is sent more often, so {asked} is denied; ask for less"
-    )
+    return Problem(INEFFECTIVE, f"no message is sent more often, so {asked} is denied; lower it")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
