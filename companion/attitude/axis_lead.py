@@ -1,4 +1,4 @@
-"""What one of roll and pitch is sent, so that it turns as planned when it answers."""
+"""Lead of one axis, roll or pitch: the rate to send so that the axis turns as planned."""
 
 from math import cos, sin
 
@@ -12,12 +12,12 @@ ROLL, PITCH = 0, 1
 class AxisLead:
     """Leads the planned rate of one axis by that axis's own lag: ω + τ·ω̇ + σ·ω̈.
 
-    The axis that answers sooner waits, so that what is planned for one time acts on both at once.
+    The axis with the shorter dead time waits, so that the plan acts on both axes at once.
 
     Args:
         index: `ROLL` or `PITCH`.
         axis: its response.
-        wait: by how long it answers sooner than the other one, s.
+        wait: by how much its dead time is shorter than that of the other axis, s.
         plans: of tilt and heading.
     """
 
@@ -39,8 +39,7 @@ class AxisLead:
     def command(self, dt: float, heading: float) -> float:
         """The rate to send for the sample of `dt` seconds that ends with the newest plan, rad/s.
 
-        At each end of the sample it is seen from the heading that the body is expected to have
-        there, so that what turns with the body is led with it.
+        The plan is turned into the body at each end of the sample, by the heading predicted for it.
 
         Args:
             dt: s.

@@ -1,4 +1,4 @@
-"""`exact`: the paper's planner in discrete time, without its residual of discretisation."""
+"""`exact`: the paper's planner in discrete time, without its discretisation error."""
 
 from math import asin, atan2, cos, exp, inf, sin, sqrt
 
@@ -22,7 +22,7 @@ LONGEST_SAMPLE = 1.0
 
 _SETTLED = 1e-14
 _PASSES = 20
-"""At most, of the limits' fixed point; a pass leaves about θ²/12 of the error, four are usual."""
+"""Most iterations of the limits' fixed point; one leaves about θ²/12 of the error, 4 are usual."""
 
 
 def exact(
@@ -133,9 +133,10 @@ def _reach(
     part: float,
     half_sine: float,
 ) -> float:
-    """How far along the line the thrust axis may go if it turns by Θ, sin(Θ/2) = `half_sine`.
+    """Share of the line, at most `part`, that a turn of the thrust axis by Θ allows.
 
-    At most `part`. With n the thrust axis over the line, n(0)·n(s) = cos Θ is a quadratic in s.
+    sin(Θ/2) = `half_sine`. With n the thrust axis along the line,
+    n(0)·n(s) = cos Θ is a quadratic in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
     along = 2.0 * a * (x * east_left - y * north_left)

@@ -36,7 +36,7 @@ def first_order(
         cosine = cos_low
         square = max(square, SMALLEST_A * SMALLEST_A)
     a = sqrt(square)
-    both = 1.0 / (square * cosine)  # one division for two: they cost a batch the most
+    both = 1.0 / (square * cosine)  # one division instead of two: divisions cost a batch the most
     inverse = both * cosine
     faded = share * gain
     e_x = faded * (east - 2.0 * ax)

@@ -1,11 +1,11 @@
-"""Where a plan stood a while ago, and where it goes on to."""
+"""The plan over time: what was planned, when it acts, and how long a command is held."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _TRIMMED = 64
-"""Rows that no delay reaches any more are dropped by so many at once."""
+"""Rows older than every delay are dropped in blocks of this many."""
 
 
 def between(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -59,10 +59,10 @@ Row = TypeVar("Row", PlannedTilt, PlannedYaw)
 
 
 class History(Generic[Row]):
-    """What was planned, over the longest delay that is asked for.
+    """Plan over time, linear between rows.
 
     Args:
-        span: that delay, s.
+        span: the longest delay that is looked up, s.
     """
 
     __slots__ = ("_rows", "_span", "_times")
@@ -73,13 +73,13 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Forget all; up to `row` the plan moved evenly, by `motion` a second."""
+        """Start anew: before `row` the plan moved steadily, by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
 
     def add(self, time: float, row: Row) -> None:
-        """A newer row; rows that no delay reaches are dropped."""
+        """Add a newer row; drop rows that are older than every delay."""
         times = self._times
         times.append(time)
         self._rows.append(row)
@@ -88,7 +88,7 @@ class History(Generic[Row]):
 
     @property
     def newest(self) -> Row:
-        """The plan as it was last added."""
+        """The row that was added last."""
         return self._rows[-1]
 
     def at(self, time: float) -> Row:
@@ -162,20 +162,20 @@ class PlanHistory:
 
 
 _SHARE = 0.05
-"""Of a sample's period in the one that is expected next."""
+"""Share of the newest sample's period in the period that is expected next."""
 
 
 class SampleHold:
-    """Turns a planned motion into rates that are held until the next sample, whenever that comes.
+    """Turns a planned motion into rates that are held until the next sample.
 
-    The plan reaches ahead of now by the period that is expected. Where a sample comes later or
-    earlier (PX4's come after 4 or 8 ms, ArduPilot's some in pairs), the vehicle has turned further
-    than planned or less far, roll and pitch by different amounts, and a step would bend. So the
-    next answer makes up for it, but after a pause no more than is due for one period.
+    The plan reaches ahead by the expected sample period. Samples come later or earlier (PX4: after
+    4 or 8 ms, ArduPilot: some in pairs); the vehicle then has turned further or less far than
+    planned, and a step would bend. The next answer corrects this, after a pause for one period at
+    most.
 
     Attributes:
         late: how much later than expected the sample came, s.
-        step: by how much the plan is to move on, s.
+        step: time by which the plan advances, s.
     """
 
     __slots__ = ("_pitch", "_roll", "_share", "late", "period", "step")
@@ -184,20 +184,20 @@ class SampleHold:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what was sent."""
+        """Forget the rates that were sent."""
         self.period = self.late = self.step = self._roll = self._pitch = self._share = 0.0
 
     def take(self, dt: float) -> None:
         """Take the time since the last sample, s."""
         before = self.period or dt
         self.late = late = dt - before
-        # Never so much shorter that the plan would stand still.
+        # Bounded, so that the plan always advances.
         self.period = period = before + _SHARE * max(min(late, before), -0.5 * dt / _SHARE)
         self.step = period + late
         self._share = min(late / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:
-        """What to send, given the mean rates of the plan's newest step, all in rad/s."""
+        """Rates to send for the mean rates of the plan's newest step, all in rad/s."""
         self._roll = roll + self._share * (roll - self._roll)
         self._pitch = pitch + self._share * (pitch - self._pitch)
         return self._roll, self._pitch

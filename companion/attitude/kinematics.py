@@ -68,10 +68,10 @@ def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float
 def rates_to_speed(
     w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
 ) -> tuple[float, float, float]:
-    """The way back: speed (north, east) of the coefficients, 1/s, and of the heading, rad/s.
+    """The inverse: speed (north, east) of the coefficients, 1/s, and of the heading, rad/s.
 
-    Under body rates in rad/s the thrust axis −R·e_z moves with −R·(ω × e_z), and the heading with
-    what the yaw rate is more than the R_z that would keep it still.
+    Under body rates ω in rad/s the thrust axis −R·e_z moves with −R·(ω × e_z). The heading moves
+    with the yaw rate less the R_z that would keep it still.
     """
     north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
     east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch

@@ -1,11 +1,11 @@
-"""What a planner may ask of the vehicle."""
+"""Limits of a planner, and the constants that its law is computed with."""
 
 from dataclasses import dataclass
 from math import cos, inf, isfinite, pi, radians, sin
 from typing import Literal, NamedTuple
 
 _LEAST = 1e-6
-"""Least limit that is not taken for a slip: rad, rad/s."""
+"""Smallest limit that is accepted: rad, rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class Limits:
         max_tilt: largest tilt of a target, rad, in (0, π/2).
         max_tilt_rate: W_M, largest √(ω_x² + ω_y²), rad/s.
         max_yaw_rate: largest |ω_z|, rad/s.
-        shape: how W_M is kept. "tight" scales the tilt rate only where it would exceed W_M;
+        shape: form of the limit W_M. "tight" scales the tilt rate only where it would exceed W_M;
             "paper" bounds the coefficient rate by W_M·cos(max_tilt) (equation 33), which is slower.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The one way to a planner: by its name."""
+"""The registry of planners: `make_planner` makes one by its name."""
 
 from collections.abc import Callable
 from math import inf
@@ -29,20 +29,20 @@ class Planner(Protocol):
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """The autopilot takes the rates along the axes of `q`, which stood so `age` s ago.
+        """Take the attitude target (ATTITUDE_TARGET) that the autopilot had `age` seconds ago.
 
-        Told of autopilots that do so only (ArduPilot's attitude target, by ATTITUDE_TARGET); the
-        others take them along the body's.
+        Called only for autopilots that take the rates along its axes (ArduPilot); the others take
+        them along the axes of the body.
         """
         ...
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Forget what was planned: after a gap, a change of mode, a jump of the estimate."""
+        """Plan anew: after a gap, a change of mode, a jump of the estimate."""
         ...
 
 
 class LawPlanner:
-    """A planner without memory: checks what comes in, and applies one law.
+    """A planner without memory: checks its input, and applies one law.
 
     Attributes:
         law: the scalar formula, which a batch compiles (`companion.batch`).
@@ -66,13 +66,13 @@ class LawPlanner:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: a value of `target` is not finite.
         """
-        if target is not self._asked:  # a target stands for many samples; it cannot change
+        if target is not self._asked:  # one target serves many samples; a tuple cannot change
             self._admitted = admissible(target, self.constants.longest_target)
             self._asked = target if isinstance(target, tuple) else None
         return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Which axes the rates are taken along is not looked at."""
+        """Ignored: the law commands rates along the axes of the body."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Nothing is remembered, so there is nothing to forget."""
@@ -113,9 +113,9 @@ def make_planner(
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
         limits: bounds on tilt and rates.
-        options: what the named planner takes beyond these: `recovery_angle`, rad. Without
+        options: further options of that planner: `recovery_angle`, rad. Without
             `limits.max_tilt` it is also the largest tilt of a target, with every planner.
-            `model-following` takes what `RateResponse` holds: `lag` and `dead_time` of the rate
+            `model-following` takes those of `RateResponse`: `lag` and `dead_time` of the rate
             loop, s (0 by default: it follows at once), `acceleration`, rad/s² (None: no limit), the
             same with `pitch_` or `yaw_` before them (None: those of roll), `frame_lead`, s.
 
@@ -174,7 +174,7 @@ def _or_as(
     acceleration: float | None,
     damping: float,
 ) -> AxisResponse:
-    """An axis of which these are known; what is None is as roll's."""
+    """An axis with these values; roll's where a value is None."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,

@@ -15,9 +15,9 @@ class AxisResponse:
     """Dead time, then a limit of acceleration, then a lag with a gain of 1.
 
     Attributes:
-        lag: τ, s. In second order 2ζ/ω: in either, by how long it is late on average.
-        dead_time: from a sample's time to the beginning of the effect of its answer, s.
-        acceleration: the autopilot changes the rate it aims at no faster, rad/s².
+        lag: τ, s; in second order 2ζ/ω. In both it is the mean delay.
+        dead_time: from the time of a sample to the first effect of its answer, s.
+        acceleration: slew limit of the rate that the autopilot aims at, rad/s².
         damping: ζ of a lag of second order; infinite in first order.
     """
 
@@ -43,9 +43,9 @@ class RateResponse:
 
     Attributes:
         roll, pitch, yaw: of each axis.
-        frame_lead: s by which the axes along which the autopilot takes the rates are ahead of the
-            body in yaw: ArduPilot's attitude target turns before the body does. None: what `lead`
-            makes of the rest.
+        frame_lead: time by which the axes along which the autopilot takes the rates lead the body
+            in yaw, s: ArduPilot's attitude target turns before the body does. None: `lead` derives
+            it from the other times.
 
     Raises:
         ValueError: a time is negative, longer than 1 s or not finite, or a limit not positive.
@@ -101,11 +101,11 @@ def _check_time(name: str, value: float) -> None:
 
 
 def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
-    """Largest stable gain (1/s) of an integrator behind e^(−θs)/(σs² + τs + 1).
+    """Largest stable feedback gain (1/s) of an integrator in series with e^(−θs)/(σs² + τs + 1).
 
     At the frequency ω where ωθ + ∠(1 − σω² + jωτ) = π/2 the loop has turned by half a circle; it is
     stable while its magnitude is below 1 there, so k = ω·|1 − σω² + jωτ|. Without a dead time every
-    gain is stable behind a lag of first order.
+    gain is stable with a lag of first order.
 
     Args:
         lag: τ, s.
@@ -116,7 +116,7 @@ def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
         return inf
     low, high = 0.0, 0.5 * pi / dead_time if dead_time > 0.0 else inf
     if square > 0.0:
-        high = min(high, 1.0 / sqrt(square))  # there the lag alone has turned by as much
+        high = min(high, 1.0 / sqrt(square))  # there the lag alone gives that phase
     for _ in range(60):
         middle = 0.5 * (low + high)
         if middle * dead_time + atan2(middle * lag, 1.0 - square * middle * middle) < 0.5 * pi:

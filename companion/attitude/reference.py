@@ -1,7 +1,7 @@
 """The linear models that the coefficients should follow, exact at any sample rate.
 
 Each is the closed solution over one sample with the target held, so that it has no discretisation
-of its own: what differs from it is the response's fault alone.
+error: a deviation from it is a deviation of the response.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from companion.attitude.types import Coefficients
 
 
 def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> float:
-    """What is left of a distance to the target after `dt` seconds, first order with a top speed.
+    """Distance to the target after `dt` seconds, first order with a top speed.
 
     d' = −min(gain·d, max_speed): at the top speed (equation 33) until gain·d falls below it, from
     there on exponentially.
@@ -105,9 +105,9 @@ class SecondOrderReference:
 
 
 def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
-    """How far a rate moves on within `dt` on its way to `aim`, and the rate then.
+    """One step of lag·ṙ = aim − r: the integral of the rate over `dt`, and the rate at its end.
 
-    lag·ṙ = aim − r; `lag` and `dt` in s, the way in the rate's unit times s.
+    `lag` and `dt` in s; the integral in the unit of the rate times s.
     """
     kept = exp(-dt / lag)
     return aim * dt + (rate - aim) * lag * (1.0 - kept), aim + (rate - aim) * kept
@@ -130,7 +130,7 @@ class Lag:
             self._model = SecondOrderReference(1.0 / sqrt(square), 0.5 * lag / sqrt(square))
 
     def after(self, rate: float, slope: float, aim: float, dt: float) -> tuple[float, float, float]:
-        """How far a rate moves on within `dt`, the rate then, and its slope.
+        """The integral of the rate over `dt`; the rate and its slope at the end.
 
         Args:
             rate: in any unit.

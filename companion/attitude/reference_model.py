@@ -8,12 +8,13 @@ from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
 _FURTHEST = sin(1.4)
-"""No reference is longer: an attitude has to have it, and its rates have to be finite."""
+"""Longest reference: an attitude must exist for it, and its rates must be finite."""
 _DAMPED = 2.7
-"""4·ζ² of the model, at least."""
+"""Smallest 4·ζ² of the model."""
 _LONGEST_STEP = 0.1
-"""Of the model, times p; a longer sample takes several steps."""
-_MOMENT = 1e-4  # s
+"""Longest step of the model, as p·dt; a longer sample is divided into several steps."""
+_MOMENT = 1e-4
+"""Over which rates are differenced, s."""
 
 
 def rates_along(
@@ -21,7 +22,7 @@ def rates_along(
 ) -> tuple[float, float, float]:
     """Body rates (rad/s) that move these coefficients at this speed (1/s) at heading 0, kept still.
 
-    `kinematics.into_body` turns the first two to another heading; the third is the same at all.
+    `kinematics.into_body` turns the first two to another heading; the third does not depend on it.
     """
     cosine = sqrt(1.0 - north * north - east * east)
     square = 0.5 + 0.5 * cosine  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
@@ -43,9 +44,9 @@ def model_lag(gain: float, lag: float) -> float:
 
 
 def braking(gain: float, lag: float) -> float:
-    """κ of the model, s: by how long it brakes ahead, so that a slow rate loop overshoots by 1 %.
+    """κ of the model, s: the time by which it brakes ahead, so that it overshoots by 1 % at most.
 
-    Of τ·c̈ + (1 + p·κ)·ċ + p·c the damping is 0.82 then, or more where κ is 0.
+    The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more where κ is 0.
     """
     return max(0.0, sqrt(_DAMPED * lag / gain) - 1.0 / gain)
 
@@ -59,16 +60,15 @@ def model_response(gain: float, lag: float) -> tuple[float, float]:
 class ReferenceModel:
     """σ·c⃛ + τ·c̈ + ċ = v with v = p·(c_d − c − κ·ċ), limited.
 
-    v is scaled as a whole, so a step moves on a straight line. It is limited such that the body
-    rates that go with it stay within the limits; and so does what is commanded, led by the lag of
-    the vehicle (τ and σ), which is no slower. Where the autopilot limits the acceleration of the
-    rates it aims at, v changes no faster than that, and is never more than can be slowed down in
-    time: so the autopilot's limit is never felt.
+    The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
+    of the motion within the limits. The commanded rates, led by the lag of the vehicle (τ and σ),
+    then stay within them too. Where the autopilot has a slew limit, v changes no faster, and is
+    small enough to be slowed down in time: the slew limit is never reached.
 
     Args:
         constants: gains and limits.
         lag: τ, s.
-        acceleration: the autopilot's limit, rad/s².
+        acceleration: slew limit of the autopilot, rad/s².
         square: σ, s²; 0 for a vehicle whose lag is of first order.
 
     Attributes:
@@ -117,11 +117,11 @@ class ReferenceModel:
         self._slope_north = self._slope_east = 0.0
 
     def rates(self) -> tuple[float, float, float]:
-        """Body rates that go with the reference as it stands, at heading 0, rad/s."""
+        """Body rates of the reference now, at heading 0, rad/s."""
         return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
     def rate_slopes(self) -> tuple[float, float]:
-        """How roll and pitch rate of `rates` change, rad/s², by their difference over `_MOMENT`."""
+        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences."""
         roll, pitch, _ = self.rates()
         later_roll, later_pitch, _ = rates_along(
             self.north + _MOMENT * self.speed_north,
@@ -152,7 +152,7 @@ class ReferenceModel:
         self._stay_inside(north, east, dt)
 
     def _aim(self, target: Target, dt: float) -> None:
-        """Choose v for the coming step, by where the reference will stand in its middle."""
+        """Choose v for the next step, by the reference predicted for its middle."""
         constants = self._constants
         ahead, half = 0.5 * dt + self._braking, 0.5 * dt * self._braking
         north = self.north + ahead * self.speed_north + half * self._slope_north
@@ -176,7 +176,7 @@ class ReferenceModel:
         self._v_north, self._v_east = v_north, v_east
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
-        """Not beyond the largest tilt, or no further beyond it than (north, east) was."""
+        """Keep it within the largest tilt, or no further beyond it than (north, east) was."""
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:
             return

@@ -1,4 +1,4 @@
-"""Attitude as a user sees it: coefficients and heading, and the way back to a quaternion."""
+"""Attitude as coefficients and heading, and the checks of what a planner is given."""
 
 from math import atan2, inf, pi, sqrt
 

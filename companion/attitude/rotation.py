@@ -25,7 +25,7 @@ def attitude_of(north: float, east: float, heading: float) -> Quaternion:
 
 
 def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
-    """q⁻¹ ⊗ q_d, the rotation still to be made as the body sees it, the short way (w ≥ 0).
+    """q⁻¹ ⊗ q_d, the remaining rotation in the body frame, the short way (w ≥ 0).
 
     Both ways of an exact half turn are as short; the same is taken for q and −q.
     """
@@ -107,7 +107,7 @@ def clamp(value: float, bound: float) -> float:
 def limit_rates(
     roll: float, pitch: float, yaw: float, max_tilt_rate: float, max_yaw_rate: float
 ) -> tuple[float, float, float]:
-    """Body rates with roll and pitch scaled together to the one limit, yaw clipped to the other."""
+    """Body rates with roll and pitch scaled together to their limit, and yaw clamped to its own."""
     rate = sqrt(roll * roll + pitch * pitch)
     if rate > max_tilt_rate:
         scale = max_tilt_rate / rate

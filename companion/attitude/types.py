@@ -1,4 +1,4 @@
-"""The words of the attitude core: plain tuples of floats, SI units, radians, body → world."""
+"""Types of the attitude law, and the errors it raises: tuples of floats, SI units, radians."""
 
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class BodyRates(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What guidance asks of a planner.
+    """The setpoint that guidance gives a planner.
 
     `north`, `east` are the wanted acceleration coefficients; `heading` is the wanted tilt-yaw
     heading in rad and `heading_rate` its feed-forward in rad/s.

@@ -1,4 +1,4 @@
-"""How `model-following` plans the heading: second order, the short way, within the limits."""
+"""Yaw in `model-following`: the planned heading, the predicted turn of the body, the axes."""
 
 from math import inf, radians
 
@@ -12,7 +12,7 @@ from companion.attitude.types import Target
 
 
 class HeadingModel:
-    """ψ̈ = (v − ψ̇)/τ with v = k·(ψ_d − ψ) + ψ̇_d, limited in itself and in how fast it changes.
+    """ψ̈ = (v − ψ̇)/τ with v = k·(ψ_d − ψ) + ψ̇_d; v has a limit and a slew limit.
 
     Args:
         constants: gains and limits.
@@ -50,7 +50,7 @@ class HeadingModel:
 
 
 class YawModel:
-    """The yaw axis's answer but for its dead time: limit of acceleration, then lag.
+    """Response of the yaw axis without its dead time: slew limit, then lag.
 
     Attributes:
         rate: rad/s.
@@ -76,7 +76,7 @@ class YawModel:
         """Hold the yaw rate `command` (rad/s) for `dt` seconds."""
         before, most = self._aimed, self._acceleration * dt
         aimed = self._aimed = before + clamp(command - before, most) if most < inf else command
-        # The aim as it stands at the end of a short sample: within half a sample of the truth.
+        # Uses the aim at the end of the sample: at most half a sample early.
         moved, self.rate = first_order_step(self.rate, aimed, self._lag, dt)
         self.turned += moved
 
@@ -85,17 +85,20 @@ LARGEST_LEAD = radians(45.0)
 """ArduPilot does not let its attitude target lead the body in yaw by more."""
 
 OLDEST = 0.25
-"""Told longer ago than this, s, the target's attitude is not used any more."""
+"""An attitude target older than this is not used, s."""
 
 _BEHIND_TARGET = 0.008
-"""Of the dead time of roll and pitch, this part lies between target and body, s (measured)."""
+"""Part of the dead time of roll and pitch between attitude target and body, s (measured)."""
 
 _TRIMMED = 128
-"""Rows that are too old are dropped by so many at once."""
+"""Rows that are too old are dropped in blocks of this many."""
 
 
 class TargetFrame:
-    """The heading of these axes, carried on from when it was told.
+    """Heading of the axes along which ArduPilot takes body rates: those of its attitude target.
+
+    Rates turn the target at once, but for its slew limit; the body follows, in yaw a fifth of a
+    second later. ATTITUDE_TARGET tells the heading; it turns on by the rates sent since.
 
     Args:
         response: of the vehicle's rate loop.
@@ -122,13 +125,13 @@ class TargetFrame:
         self.forget()
 
     def forget(self) -> None:
-        """Where these axes stand is not known."""
+        """Forget the heading of these axes."""
         self._time, self._told_at = 0.0, -inf
         self._offset = self._aim = 0.0
         self._times[:], self._ways[:] = [0.0], [0.0]
 
     def note(self, heading: float, age: float) -> None:
-        """They had this heading (rad) so long ago, s, by the time of the newest sample."""
+        """Take their heading (rad) `age` seconds before the newest sample."""
         if not 0.0 <= age <= OLDEST:
             return
         self._told_at = self._time - age
@@ -137,7 +140,7 @@ class TargetFrame:
     def advance(self, yaw: float, still: float, dt: float) -> None:
         """The yaw rate is sent for `dt` seconds; `still` of it keeps the heading (rad/s)."""
         if self._told_at == -inf:
-            return  # the body's own axes, as far as is known
+            return  # no attitude target was received: the rates are along the body's axes
         self._aim += clamp(yaw - self._aim, self._acceleration * dt)
         self._time += dt
         times = self._times
@@ -149,7 +152,7 @@ class TargetFrame:
     def lead(self, heading: float, plans: PlanHistory) -> float:
         """How far these axes lead the body in yaw when the answer to this sample acts, rad.
 
-        By what the autopilot told of them; else by their lead in time (`RateResponse.lead`).
+        From the newest attitude target; without one, from their lead in time (`RateResponse.lead`).
 
         Args:
             heading: of the body then, without the turn that is planned until then, rad.
@@ -170,7 +173,7 @@ class TargetFrame:
         return self._offset + self._ways[-1]
 
     def _way(self, time: float) -> float:
-        """How far what was sent until `time` turns them, rad: linear between samples."""
+        """How far the rates sent until `time` turn them, rad: linear between samples."""
         times, ways = self._times, self._ways
         if time < times[0]:
             return ways[0]

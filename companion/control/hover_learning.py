@@ -52,7 +52,7 @@ class HoverLearning:
 
     def on_ground(self) -> None:
         """Note that the vehicle stands on the ground."""
-        self._hover_thrust.stand()
+        self._hover_thrust.on_ground()
 
     def pause(self) -> None:
         """Stop learning until the next `step`."""

@@ -163,7 +163,7 @@ class Session:
         for mismatch_warning in (
             guidance_loop.learning.mismatch_warning(),
             guidance_loop.estimate.mismatch_warning(),
-            trace.mismatch_warning(),
+            trace.lost_rows_warning(),
         ):
             if mismatch_warning is not None:
                 flight.note(mismatch_warning)

@@ -1,4 +1,4 @@
-"""Maneuver `identify`: doublets that tell how the vehicle answers body rates and thrust."""
+"""Maneuver `identify`: doublets that measure the response to body rates and thrust."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -61,9 +61,9 @@ class _Part(NamedTuple):
 class Doublets:
     """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
 
-    Each axis is excited in half its size, then in full. The angle, A·T at most, returns to where it
-    was; what drift remains is taken out by position hold, which lasts `settle` seconds before each
-    doublet and at the end. Climbs are flown closed loop about a reference that moves so.
+    Each axis is excited with half its size, then with all of it. The angle, A·T at most, returns to
+    its value before. Position hold corrects the drift for `settle` seconds before each doublet and
+    at the end. Climbs are flown closed loop along a reference that moves like a doublet.
 
     Attributes:
         tilt_rate: of roll and pitch, rad/s.
@@ -104,7 +104,7 @@ class Doublets:
         return *rates, *(_CLIMBS * [_Part(self.climb_step, climb=self.climb)])
 
     def check_times(self) -> list[float]:
-        """All over each doublet, and once in each hold."""
+        """Finely over each doublet, and the end, s."""
         times, begin = [0.0], 0.0
         for part in self._parts:
             begin += self.settle

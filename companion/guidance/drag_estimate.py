@@ -1,4 +1,4 @@
-"""The drag there is, learned from how the vehicle slows down against what its thrust gives."""
+"""Drag, estimated from the measured acceleration less that of the thrust."""
 
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
@@ -17,7 +17,7 @@ _WIND = 2.0
 _WIND_CHANGE = 0.2
 """and of its change within a second."""
 _CLIPPED = 3.0
-"""A measurement counts for no more standard deviations than these: a bump is not drag."""
+"""An innovation is clamped to this many standard deviations: a bump is not drag."""
 _MOST_ABOVE = 2.0
 """The learned drag is at most this much larger than at first, 1/s,"""
 _MOST_QUADRATIC = 0.3
@@ -28,7 +28,7 @@ _CERTAIN = 0.1
 
 @dataclass(frozen=True, slots=True)
 class DragPrior:
-    """What is believed of the drag before the vehicle has moved.
+    """Drag and its uncertainty before the vehicle has moved.
 
     Attributes:
         drag: the most likely.
@@ -42,7 +42,7 @@ class DragPrior:
 
 
 ANY_VEHICLE = DragPrior(Drag(0.3), 0.4, 0.03)
-"""A multirotor that nobody knows: between 0.2/s (bare frame) and 1/s (PX4's simulated vehicle)."""
+"""An unknown multirotor: between 0.2/s (bare frame) and 1/s (PX4's simulated vehicle)."""
 
 
 class DragEstimate:
@@ -59,7 +59,7 @@ class DragEstimate:
         self.begin(prior)
 
     def begin(self, prior: DragPrior) -> None:
-        """Forget all but `prior`."""
+        """Start anew from `prior`."""
         self.first = prior.drag
         self._top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0])
@@ -71,12 +71,12 @@ class DragEstimate:
 
     @property
     def drag(self) -> Drag:
-        """What is known by now."""
+        """The drag estimated so far."""
         return self._drag
 
     @property
     def certain(self) -> bool:
-        """Whether the vehicle has moved about enough to tell."""
+        """Whether the vehicle has moved enough for a certain estimate."""
         speed, p = self._top_speed, self._covariance
         variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
         return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN
@@ -87,7 +87,7 @@ class DragEstimate:
         return self._top_speed
 
     def observe(self, dt: float, velocity: Vector, left: Horizontal) -> None:
-        """Take what the thrust does not explain; what is not finite is passed over.
+        """Take the acceleration that the thrust does not explain; ignored if it is not finite.
 
         Args:
             dt: over which it was measured, s.

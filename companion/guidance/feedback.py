@@ -1,4 +1,4 @@
-"""Feedback gains of the chain position – velocity – acceleration, linear-quadratic."""
+"""Feedback: linear-quadratic gains for the horizontal chain, and a cascade for the height."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -46,7 +46,7 @@ class ChainGains:
 
 
 def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
-    """The gains that are best for ė_p = e_v, ė_v = e_a − drag·e_v, ė_a = (u − e_a)/lag.
+    """The optimal gains (LQR) for ė_p = e_v, ė_v = e_a − drag·e_v, ė_a = (u − e_a)/lag.
 
     From the stable eigenvectors of the Hamiltonian matrix: with X and Y their upper and lower
     halves, Y·X⁻¹ solves the algebraic Riccati equation.

@@ -60,12 +60,12 @@ class HeldFigure:
 
 @dataclass(slots=True)
 class Follow:
-    """Flies a trajectory from where it begins; first it turns to the trajectory's heading.
+    """Flies a trajectory from a file, after a turn on the spot to its heading.
 
     Attributes:
-        trajectory: what is followed.
+        trajectory: to follow.
         yaw_rate: largest in the turn before it, rad/s.
-        slowed: by which factor it was slowed down to be feasible.
+        slowed: factor by which it was slowed down to be feasible.
     """
 
     trajectory: Trajectory
@@ -76,12 +76,12 @@ class Follow:
 
     @property
     def name(self) -> str:
-        """That of the trajectory."""
+        """Name of the trajectory."""
         return self.trajectory.name
 
     @property
     def duration(self) -> float:
-        """With the turn before it, the longest there could be until its beginning is known, s."""
+        """Duration with the turn before it, s; until the start is known, with the longest turn."""
         if self._turned is not None:
             return self._turned.duration
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
@@ -89,11 +89,11 @@ class Follow:
 
     @property
     def turns_for(self) -> float:
-        """How long it turns before the trajectory begins, as far as that is known, s."""
+        """Duration of the turn before the trajectory, s; 0 until it is known."""
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """Those of the trajectory: the turn before it is on the spot."""
+        """Check times of the trajectory, s; the turn before it is on the spot."""
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:

@@ -105,7 +105,7 @@ class HoverThrust:
         return min(max(self._signal(thrust), settings.lowest), settings.highest)
 
     def sent(self, normalised: float, q: Quaternion) -> None:
-        """Note a thrust that the vehicle obeys, and its attitude then."""
+        """Note a thrust that the vehicle follows, and its attitude then."""
         vertical = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
             vertical *= cos_tilt(q[1], q[2])
@@ -131,15 +131,15 @@ class HoverThrust:
         self._begin(time, velocity_down)
 
     def pause(self) -> None:
-        """Forget the window that was begun: nothing is learned across this."""
+        """Drop the current window: nothing is learned across a pause."""
         self._began = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the battery's voltage in V, at a time in s; None where it is not known."""
         self._battery.note(time, voltage)
 
-    def stand(self) -> None:
-        """The vehicle stands on the ground: nothing is learned, and the battery is not loaded."""
+    def on_ground(self) -> None:
+        """On the ground: learn nothing, and take the next voltage in the air as the first."""
         self.pause()
         self._battery.reset()
 

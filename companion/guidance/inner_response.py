@@ -1,4 +1,4 @@
-"""The response of the attitude loop to its targets, and the lead that undoes it."""
+"""Response of the attitude loop to its targets, and the lead that compensates it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ Path = Callable[[float], Coefficients]
 """Coefficients over time, s."""
 
 _STEP = 2e-3
-"""Over which a path is differentiated, s: its error is some 1e-7 on what a multirotor can fly."""
+"""Step of the central differences along a path, s: their error is about 1e-7 in flight."""
 
 
 @dataclass(frozen=True, slots=True)
 class InnerResponse:
-    """ċ + lag·c̈ = gain·(c_d − c), some time later.
+    """ċ + lag·c̈ = gain·(c_d − c), after a dead time.
 
     Attributes:
         gain: p, 1/s.
@@ -39,7 +39,7 @@ class InnerResponse:
         return 1.0 / self.gain + self.lag + self.dead_time
 
     def target(self, path: Path, time: float) -> Coefficients:
-        """The target to ask for at `time`, so that the coefficients follow `path` without error."""
+        """The target at `time` with which the coefficients follow `path` without error."""
         acts = time + self.dead_time
         before, there, after = path(acts - _STEP), path(acts), path(acts + _STEP)
         held = there if self.follows_model or self.dead_time == 0.0 else path(time)

@@ -18,7 +18,7 @@ ReferenceAt = Callable[[float], Reference]
 
 @dataclass(frozen=True, slots=True)
 class LinearSettings:
-    """What linear guidance is computed with.
+    """Settings of linear guidance.
 
     Attributes:
         gains: of the horizontal feedback.
@@ -27,7 +27,7 @@ class LinearSettings:
         heading: response of the heading to its target.
         max_horizontal: largest horizontal acceleration asked for, m/s².
         thrust_lag: of the rotors, s.
-        period: for which a command holds, s: its target moves along, its feedback does not.
+        period: of the guidance loop, s; within it the target moves and the feedback is constant.
     """
 
     gains: ChainGains
@@ -40,13 +40,13 @@ class LinearSettings:
 
 
 class GuidanceInput(NamedTuple):
-    """What guidance knows when it makes a command.
+    """Input of one guidance step.
 
     Attributes:
         now: motion as it is.
         acts: motion as it will be when what is commanded now acts.
         thrust: horizontal acceleration by the thrust there is, m/s².
-        disturbance: horizontal acceleration that nobody asked for, m/s².
+        disturbance: horizontal acceleration by wind and bias, m/s².
         drag: of the vehicle.
         thrust_limits: smallest and largest specific thrust there is, m/s².
     """
@@ -60,11 +60,11 @@ class GuidanceInput(NamedTuple):
 
 
 class LinearCommand(NamedTuple):
-    """What linear guidance asks for.
+    """Output of one guidance step.
 
     Attributes:
         target: the planner's, now.
-        later: the same a period later; between the two it moves on a straight line.
+        later: target one period later; between the two it moves on a straight line.
         down: wanted acceleration downwards, m/s².
     """
 
@@ -76,8 +76,8 @@ class LinearCommand(NamedTuple):
 class LinearGuidance:
     """Acceleration = the reference's + feedback of the chain position – velocity – acceleration.
 
-    Drag and the observed disturbance are fed forward. What comes out is a path of coefficients, and
-    the target is led such that they follow it through the inner response (`InnerResponse.target`).
+    Drag and the observed disturbance are fed forward. The result is a path of coefficients. The
+    target is led so that they follow the path through the inner response (`InnerResponse.target`).
     """
 
     def __init__(self, settings: LinearSettings) -> None:
@@ -85,23 +85,23 @@ class LinearGuidance:
 
     @property
     def acts_after(self) -> float:
-        """How long after it is made the feedback of a command acts, on average, s."""
+        """Mean time from a command to the effect of its feedback, s."""
         return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(
-        self, reference_at: ReferenceAt, time: float, situation: GuidanceInput
+        self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
     ) -> LinearCommand:
         """One step.
 
         Args:
-            reference_at: the reference; asked for a little ahead of `time` too.
+            reference_at: the reference over time; also read a little ahead of `time`.
             time: now, s.
-            situation: the vehicle.
+            inputs: motion, thrust and disturbance of the vehicle.
         """
         reference = reference_at(time)
         lifted = reference_at(time + self._settings.thrust_lag).acceleration_ned
         down = acceleration_down(
-            self._settings.height, reference._replace(acceleration_ned=lifted), situation.now
+            self._settings.height, reference._replace(acceleration_ned=lifted), inputs.now
         )
         ends = time, time + self._settings.period
         if reference.coefficients is not None:
@@ -109,10 +109,10 @@ class LinearGuidance:
                 Target(*reference.coefficients, *self._heading(reference_at, at)) for at in ends
             )
             return LinearCommand(target, later, down)
-        feedback = self._feedback(reference, reference_at(time + self.acts_after), situation)
+        feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
 
         def path(at: float) -> Coefficients:
-            return self._coefficients(reference_at(at), feedback, down, situation)
+            return self._coefficients(reference_at(at), feedback, down, inputs)
 
         target, later = (
             Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
@@ -120,17 +120,17 @@ class LinearGuidance:
         )
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, acts: Reference, situation: GuidanceInput) -> Horizontal:
+    def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
         """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
-        settings, gains, wind = self._settings, self._settings.gains, situation.disturbance
+        settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.drifting:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
-        wanted, slowed = [], situation.drag.deceleration(situation.now.velocity_ned)
+        wanted, slowed = [], inputs.drag.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
-            place = situation.acts.position_ned[axis] - acts.position_ned[axis]
-            speed = situation.acts.velocity_ned[axis] - acts.velocity_ned[axis]
+            place = inputs.acts.position_ned[axis] - acts.position_ned[axis]
+            speed = inputs.acts.velocity_ned[axis] - acts.velocity_ned[axis]
             acceleration = (
-                situation.thrust[axis] - slowed[axis] + wind[axis] - now.acceleration_ned[axis]
+                inputs.thrust[axis] - slowed[axis] + wind[axis] - now.acceleration_ned[axis]
             )
             wanted.append(
                 -gains.position * place
@@ -141,16 +141,16 @@ class LinearGuidance:
         return limited(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
-        self, reference: Reference, more: Horizontal, down: float, situation: GuidanceInput
+        self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Of the thrust that gives the reference's acceleration and `more` against drag."""
-        slowed = situation.drag.deceleration(reference.velocity_ned)
+        """Coefficients of the thrust for the reference's acceleration and `more`, against drag."""
+        slowed = inputs.drag.deceleration(reference.velocity_ned)
         north, east = limited(
             reference.acceleration_ned[0] + slowed[0] + more[0],
             reference.acceleration_ned[1] + slowed[1] + more[1],
             self._settings.max_horizontal,
         )
-        north, east, down = height_first((north, east, down), *situation.thrust_limits)
+        north, east, down = height_first((north, east, down), *inputs.thrust_limits)
         # Its vertical part carries g − a_D, the rest is horizontal.
         vertical = GRAVITY - down
         thrust = sqrt(north * north + east * east + vertical * vertical)

@@ -1,4 +1,4 @@
-"""What can be flown: maneuvers give the reference as a function of the time since they began."""
+"""Maneuvers: the reference as a function of the time since the maneuver began."""
 
 import math
 from collections.abc import Sequence
@@ -9,8 +9,8 @@ from companion.attitude import Coefficients
 from companion.guidance.reference import Pose, Reference
 
 _REST = 1.0
-"""Before open-loop steps the vehicle drifts this long, s: a step is measured from an attitude at
-rest, and a hold that still corrects is not."""
+"""The position hold pauses this long before open-loop steps, s: its corrections would disturb the
+attitude from which a step is measured."""
 
 
 class Maneuver(Protocol):
@@ -31,7 +31,7 @@ class Maneuver(Protocol):
         ...
 
     def check_times(self) -> list[float]:
-        """When to look at it to judge all of it, s, ascending."""
+        """Times at which to check it against limits and fence, s, ascending."""
         ...
 
 
@@ -45,9 +45,8 @@ def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
 class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
-    Each begins from an attitude at rest, for which the hold pauses. A doublet leaves the vehicle,
-    on an ideal response, where it was and at rest; what remains is taken out by position hold for
-    `settle` seconds after each.
+    Each begins from an attitude at rest, for which the hold pauses. With an ideal response the
+    vehicle ends where it began, at rest. Position hold corrects the rest for `settle` seconds.
 
     Attributes:
         coefficient: length of c, the sine of the tilt.
@@ -72,7 +71,7 @@ class Steps:
         return _REST + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
-        """All over each doublet, and once in each settling."""
+        """Finely over each doublet, whose end stands for the settling, s."""
         begins = [which * self._period + _REST for which in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
@@ -130,7 +129,7 @@ class Corners:
         return _REST + len(self.CORNERS) * self.step + self.settle
 
     def check_times(self) -> list[float]:
-        """All over the corners, and the end."""
+        """Finely over the corners, and the end, s."""
         return [*spread(_REST, _REST + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:

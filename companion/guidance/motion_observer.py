@@ -1,4 +1,4 @@
-"""Where the vehicle is now, how fast, and which acceleration nobody asked for: wind and bias."""
+"""Observer of position, velocity and disturbance (wind, bias), and the history of the tilt."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,13 +11,12 @@ from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limi
 
 @dataclass(frozen=True, slots=True)
 class ObserverSettings:
-    """How quickly it believes what it measures.
+    """How strongly measurements correct the observer.
 
     Attributes:
         bandwidth: of the disturbance, rad/s: both poles of the observer.
-        position_time: with which the position follows the measured one, s.
-        position_pull: speed by which the measured velocity is believed to be off, 1/s per metre
-            of the measured position.
+        position_time: time constant with which the position follows the measured one, s.
+        position_pull: correction of the velocity per position error, 1/s.
         largest: bound on the disturbance, m/s².
     """
 
@@ -28,11 +27,11 @@ class ObserverSettings:
 
 
 class MotionObserver:
-    """A model that is carried along by the measured attitude and corrected by the measured motion.
+    """A model driven by the measured attitude and corrected by the measured motion.
 
-    The horizontal acceleration is that of the thrust, which the measured tilt gives, plus drag,
-    plus a disturbance that changes slowly. Since it is the thrust there was and not the one asked
-    for, a saturated command does not wind the disturbance up.
+    The horizontal acceleration is that of the thrust by the measured tilt, plus drag, plus a
+    disturbance that changes slowly. The measured tilt counts, not the commanded one, so a saturated
+    command does not wind the disturbance up.
 
     Attributes:
         disturbance: horizontal, m/s².
@@ -45,7 +44,7 @@ class MotionObserver:
         self._time = 0.0
 
     def reset(self) -> None:
-        """Forget all: nobody obeyed, or the estimator jumped."""
+        """Start anew: offboard control was not active, or the estimator jumped."""
         self._motion = None
         self.disturbance = (0.0, 0.0)
 
@@ -83,14 +82,14 @@ class MotionObserver:
         self.disturbance = limited(found[0], found[1], settings.largest)
 
     def turn(self, angle: float) -> None:
-        """The measured attitudes jumped in heading by an angle in rad, and the vehicle did not.
+        """Turn the disturbance by a jump of the measured heading, rad.
 
-        It leans against the disturbance; so that it goes on leaning that way, this turns along.
+        The vehicle did not turn: it must keep leaning the same way against the disturbance.
         """
         self.disturbance = rotated(*self.disturbance, angle)
 
     def at(self, time: float, known: Horizontal) -> VehicleMotion | None:
-        """The motion at a vehicle time (s), moved on from the newest measurement.
+        """The motion at a vehicle time (s), predicted from the newest measurement.
 
         Args:
             time: vehicle time, s.
@@ -117,14 +116,14 @@ def _vector(values: list[float]) -> Vector:
 
 
 _KEPT = 200
-"""Attitudes: 0.8 s of them at 250 Hz, and more than any position takes to come."""
+"""Attitudes kept: 0.8 s at 250 Hz, longer than any position is delayed."""
 
 
 class SlopeHistory:
     """Horizontal per vertical thrust over vehicle time, as its running integral.
 
-    Positions come late, seldom, and not in step with guidance: what happened between two of them is
-    told by their own time stamps, not by when they were looked at.
+    Positions come late, seldom, and not in step with guidance. The mean between two of them is
+    taken between their own time stamps.
     """
 
     def __init__(self) -> None:
@@ -158,12 +157,12 @@ class SlopeHistory:
         self.newest = slope
 
     def forget(self) -> None:
-        """Start anew: the attitudes before are seen from another north."""
+        """Start anew: the north of the earlier attitudes was another one."""
         self._times.clear()
         self._sums.clear()
 
     def mean(self, start: float, end: float) -> Horizontal:
-        """The mean slope between two vehicle times, s; before and after what is known, as there."""
+        """The mean slope between two vehicle times, s; constant beyond the known attitudes."""
         if not start < end or not self._times:
             return self.newest
         (n0, e0), (n1, e1) = self._integral(start), self._integral(end)

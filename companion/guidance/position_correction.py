@@ -1,4 +1,4 @@
-"""What the autopilot's estimator has still to correct in its position, taken ahead of it."""
+"""Anticipates the correction that the autopilot's estimator will still make to its position."""
 
 from dataclasses import dataclass
 from math import exp
@@ -6,18 +6,18 @@ from math import exp
 from companion.guidance.reference import Horizontal, VehicleMotion, limited
 
 _LONGEST = 0.5
-"""Between two positions, s: further apart they do not tell what was corrected in between."""
+"""Longest time between two positions that are compared, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class CorrectionSettings:
-    """How far the estimator's own correction is believed.
+    """How much of the estimator's correction is anticipated.
 
     Attributes:
-        ahead: for how long the estimator would go on correcting, s: 1/(its gain on a position).
-        window: over which its correction is averaged, twice, s, positive: positions are noisy.
-        largest: of what is taken ahead, m.
-        lateness: by which its position is late even when it has corrected all, s.
+        ahead: time constant of the estimator's correction, s: 1/(its gain on a position).
+        window: time constant of the two low-pass filters of its correction, s, positive.
+        largest: bound on the anticipated correction, m.
+        lateness: delay of its position once it has corrected everything, s.
     """
 
     ahead: float
@@ -27,15 +27,15 @@ class CorrectionSettings:
 
 
 class PositionCorrection:
-    """Corrects horizontal positions by what the estimator's own velocity does not explain.
+    """Corrects horizontal positions by the part that the estimator's velocity does not explain.
 
     A Kalman filter moves its position by its velocity, and towards GPS. The second part,
-    r = ṗ − v, is its gain times what it is off GPS by, so ahead·r is that distance. Where
-    GPS is also later than the filter believes, the position stays behind by lateness·v.
-    Without a correction and at rest nothing changes.
+    r = ṗ − v, is its gain times the distance to GPS, so ahead·r is that distance. Where GPS is
+    later than the filter assumes, the position lags by lateness·v. At rest and without a
+    correction nothing changes.
 
     Args:
-        settings: what it does with them.
+        settings: of the correction.
     """
 
     def __init__(self, settings: CorrectionSettings) -> None:
@@ -43,7 +43,7 @@ class PositionCorrection:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all: the estimate has jumped."""
+        """Start anew: the estimate has jumped."""
         self._time = 0.0
         self._before: VehicleMotion | None = None
         self._unexplained: Horizontal = (0.0, 0.0)
@@ -74,7 +74,7 @@ class PositionCorrection:
         )
 
     def _take(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
-        """Go on by what the velocity does not explain of the way since the last position."""
+        """Add the part of the step since the last position that the velocity does not explain."""
         settings = self._settings
         kept = exp(-dt / settings.window)
         (p_before, v_before), (p_now, v_now) = before, now

@@ -1,7 +1,7 @@
-"""Where a maneuver takes the vehicle: its reference, and what follows of its open-loop commands.
+"""Predicted motion of a maneuver: its reference, and the effect of its open-loop commands.
 
-An open-loop step gives the acceleration that its tilt has while the height is held; how long the
-tilt takes to build up is left out, which shifts the way in time and hardly changes it.
+An open-loop step accelerates as its tilt does while the height is held. The time in which the tilt
+builds up is neglected: it delays the motion and hardly changes it.
 """
 
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from companion.guidance.maneuvers import Maneuver
 from companion.guidance.reference import GRAVITY, Horizontal, Pose, Reference, Vector, rotated
 
 _LARGEST_TILT = 1.4
-"""Rates that turn farther, rad, are nothing that is flown."""
+"""The predicted tilt is clamped to this, rad: no maneuver tilts further."""
 
 
 class Moment(NamedTuple):

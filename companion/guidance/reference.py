@@ -1,4 +1,4 @@
-"""The words of guidance. World NED, SI units, radians; headings are tilt-yaw headings."""
+"""Types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
 
 from math import cos, hypot, sin
 from typing import NamedTuple
@@ -13,25 +13,25 @@ GRAVITY = 9.80665
 
 
 class Pose(NamedTuple):
-    """Where a maneuver begins."""
+    """Position (m) and heading (rad) where a maneuver begins."""
 
     position_ned: Vector
     heading: float
 
 
 class VehicleMotion(NamedTuple):
-    """What guidance knows of the vehicle: position in m and velocity in m/s."""
+    """Position in m and velocity in m/s of the vehicle."""
 
     position_ned: Vector
     velocity_ned: Vector
 
 
 class Reference(NamedTuple):
-    """Where the vehicle ought to be at one instant.
+    """Where the vehicle should be at one instant.
 
-    With `coefficients` given, the horizontal acceleration is commanded open loop, and position and
-    velocity count for the height only. With `body_rates` given the same holds of these. `drifting`
-    pauses the horizontal feedback: only what holds against the wind is asked for.
+    `coefficients` command the horizontal acceleration open loop; position and velocity then count
+    for the height only. So do `body_rates`. `drifting` pauses the horizontal feedback: only the
+    disturbance is compensated.
     """
 
     position_ned: Vector
@@ -46,17 +46,17 @@ class Reference(NamedTuple):
 
     @property
     def closed_loop(self) -> bool:
-        """Whether guidance says which acceleration it takes, and nobody else does."""
+        """Whether guidance computes the acceleration: no coefficients or rates are commanded."""
         return self.coefficients is None and self.body_rates is None
 
     @property
     def position_is_meant(self) -> bool:
-        """Whether the horizontal position is meant, and not only the height."""
+        """Whether the horizontal position counts, not only the height."""
         return self.closed_loop and not self.drifting
 
     @property
     def height_is_steady(self) -> bool:
-        """Whether thrust changes no faster than the rotors follow: in no doublet."""
+        """Whether the thrust changes no faster than the rotors follow: not in a doublet."""
         return not self.thrust_steps and self.body_rates is None
 
 

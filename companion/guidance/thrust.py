@@ -1,4 +1,4 @@
-"""Thrust: from the wanted acceleration to specific thrust in m/s², height first."""
+"""Thrust: from the wanted acceleration to specific thrust, m/s², and to the signal, 0..1."""
 
 from math import acos, hypot, isfinite, sqrt
 
@@ -7,10 +7,10 @@ from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY, Vector
 
 FOR_TILT = 0.95
-"""Share of the largest thrust that may be spent on tilt; what is left climbs against a gust."""
+"""Share of the largest thrust available for tilt; the rest is a reserve against a gust."""
 
 _MIN_COSINE = 0.5
-"""Beyond 60° of tilt height is given up rather than thrust raised without end."""
+"""Beyond 60° of tilt the thrust is not raised further, at the cost of height."""
 
 
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
@@ -80,7 +80,7 @@ _SMOOTHING = 0.3
 """Time constant of the voltage, s; ArduPilot's (MOT_BAT_V_MAX) is filtered at 0.5 Hz."""
 
 _PLAUSIBLE = 0.6, 1.2
-"""A voltage further from where it began is a broken reading and no sag."""
+"""Range of voltage / first voltage; outside it the reading is broken."""
 
 
 class ThrustCurve:
@@ -110,7 +110,7 @@ class ThrustCurve:
 
 
 class BatterySag:
-    """How much thrust is left of what the battery gave in the air at first: (V/V₀)^exponent.
+    """Thrust relative to that at the first voltage in the air: (V/V₀)^exponent.
 
     The configured hover thrust holds for a vehicle that hovers, so V₀ is the first voltage in the
     air, under load.
@@ -119,8 +119,8 @@ class BatterySag:
         factor: of the thrust; 1 while the voltage is not known.
 
     Args:
-        exponent: 2 for plain speed controllers, whose rotors turn as fast as the voltage allows; 0
-            where the autopilot or the speed controllers see to it.
+        exponent: 2 for plain speed controllers, whose rotor speed follows the voltage; 0 where the
+            autopilot or the speed controllers compensate the voltage.
     """
 
     def __init__(self, exponent: float) -> None:
@@ -131,12 +131,12 @@ class BatterySag:
         self._time = 0.0
 
     def reset(self) -> None:
-        """On the ground: the next voltage is V₀."""
+        """Take the next voltage as V₀; called on the ground."""
         self._first = None
         self._ratio = self.factor = 1.0
 
     def note(self, time: float, voltage: float | None) -> None:
-        """Take the whole battery's voltage in V, at a time in s; None or garbage is no news."""
+        """Take the whole battery's voltage in V, at a time in s; an unusable one is ignored."""
         if voltage is None or not isfinite(voltage) or voltage <= 0.0 or self._exponent == 0.0:
             return
         if self._first is None:

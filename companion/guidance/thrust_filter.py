@@ -1,4 +1,4 @@
-"""How much specific thrust a vehicle gives per share of thrust, learned from how it moves."""
+"""Specific thrust per share of full thrust, estimated from the measured acceleration."""
 
 from math import copysign
 
@@ -17,16 +17,16 @@ _NOISE = 0.2
 """Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds for it."""
 
 _FIRST_NOISE, _LEAST_NOISE, _MOST_NOISE = 1.0, 0.05, 100.0
-"""At first there is more: the rotors are still on the way from the thrust before."""
+"""Larger at first: the rotors still change from the thrust before takeover. (m/s²)²."""
 
 _NOISE_TIME = 2.0
-"""With which that variance is learned, s."""
+"""Time constant with which that variance is learned, s."""
 
 _REFUSAL_TIME = 1.0
-"""With which lasting refusals are told from single ones, s."""
+"""Time constant of the mean of refusals, s."""
 
 _LASTING = 0.2
-"""Of refusals to one side; about 0.25 s of nothing else."""
+"""Mean of refusals to one side that counts as lasting: about 0.25 s of refusals only."""
 
 
 class ThrustFilter:

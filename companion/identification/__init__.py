@@ -1,11 +1,11 @@
 """How a vehicle answers body rates and thrust, from what a flight has recorded; needs only NumPy.
 
-Commands stand at the vehicle time of the sample they answered, so that a dead time found here runs
-from a sample to the first effect of its answer: what `vehicle.dead_time_ms` means.
+The time of a command is the vehicle time of the sample it answered. So a dead time found here is
+the time from a sample to the first effect of its answer, as `vehicle.dead_time_ms` is.
 """
 
 from companion.identification.correlation import dead_time_by_correlation
-from companion.identification.fit import SecondOrderFit
+from companion.identification.delayed_model import SecondOrderFit
 from companion.identification.fragment import kept_axes, vehicle_fragment
 from companion.identification.response import (
     BadFitError,

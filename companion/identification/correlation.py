@@ -1,8 +1,8 @@
-"""The delay between commands and measurements, by where they resemble each other most.
+"""The delay between commands and measurements, by their cross-correlation.
 
-Compared is only how they move at about the frequency where a first-order lag describes a real rate
-loop best. In slow turns an autopilot's rate integrator makes up for the lag: PX4 answers a circle's
-1 rad/s after 40 ms, and steps after 87 ms. In quick ones its second order shows.
+Both are filtered to the frequency where a first-order lag describes a real rate loop best. In slow
+turns the autopilot's rate integrator compensates the lag: PX4 answers a circle's 1 rad/s after
+40 ms, and steps after 87 ms. In fast turns its second order shows.
 """
 
 import numpy as np
@@ -14,22 +14,22 @@ from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretche
 Floats = NDArray[np.float64]
 
 _GRID = 0.004
-"""Spacing of the samples that are compared, s."""
+"""Period of the samples that are correlated, s."""
 _DELAYS = int(LONGEST_DEAD_TIME / _GRID)
 _PHASE = 0.38
-"""Compared is at the frequency where the known lag turns the phase by about this, rad, within"""
+"""They are compared at the frequency where the lag's phase is about this, rad, clamped to"""
 _FREQUENCIES = 5.0, 9.0
-"""these two, rad/s: flights tell enough about them. Found on PX4 (8 rad/s) and ArduPilot (9 rad/s),
-where steps, circles, figure-eights and doublets then tell dead times within 3 ms of each other."""
+"""these two, rad/s. Measured on PX4 (8 rad/s) and ArduPilot (9 rad/s): there the dead times of
+steps, circles, figure-eights and doublets agree within 3 ms."""
 _RESEMBLING = 0.63
-"""The lag of first order that resembles PX4's of second order, as a share of that."""
+"""First-order lag nearest to PX4's second-order lag, as a share of that."""
 _REACH = 3.5
-"""Of the filter to each side, in its standard deviations."""
+"""Half width of the filter, in its standard deviations."""
 _ALIKE = 0.985
-"""Share of the movement (R²) that the commands must explain: what else moves the vehicle, such as
-gusts or another axis, would be taken for a delay."""
+"""Share of the movement (R²) that the commands must explain: gusts or the motion of another axis
+would distort the delay."""
 _EXCITED = 0.005
-"""Root mean square of the commands' movement below which there is nothing to compare, rad/s."""
+"""Smallest root mean square of the filtered commands, rad/s."""
 
 
 def dead_time_by_correlation(
@@ -56,8 +56,8 @@ def dead_time_by_correlation(
         damping: ζ of a lag of second order, which is `lag` = 2ζ/ω late; infinite in first order.
 
     Returns:
-        s, at most 0.5; None where the commands moved too little, or something else moved the
-        vehicle too much.
+        s, at most 0.5; None where the commands changed too little, or explain too little of
+        the movement.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length, or the lag is
@@ -85,7 +85,7 @@ def dead_time_by_correlation(
 
 
 def _frequency(lag: float, damping: float) -> float:
-    """The frequency that is compared, rad/s."""
+    """Centre frequency of the filter, rad/s."""
     slowest, quickest = _FREQUENCIES
     if damping < np.inf:
         lag *= _RESEMBLING
@@ -93,7 +93,7 @@ def _frequency(lag: float, damping: float) -> float:
 
 
 def _later(lag: float, damping: float) -> float:
-    """By how much a lag of second order is later than one of first order, s."""
+    """Delay of a second-order lag beyond that of a first-order one, s."""
     frequency = _frequency(lag, damping)
     turned = frequency * lag
     phase = np.arctan2(turned, 1.0 - (0.5 * turned / damping) ** 2)
@@ -103,7 +103,7 @@ def _later(lag: float, damping: float) -> float:
 def _band_pass(lag: float, damping: float) -> Floats:
     """(k,), a filter without phase for samples on the grid: a Gaussian's third derivative.
 
-    Its gain ∝ ω³·exp(−1.5·(ω/ω₀)²) is 1 at its greatest, and all but blind to slow turns.
+    Its gain ∝ ω³·exp(−1.5·(ω/ω₀)²) has a maximum of 1 and nearly suppresses slow turns.
     """
     frequency = _frequency(lag, damping)
     deviation = 3.0**0.5 / frequency

@@ -1,6 +1,7 @@
-"""The two models of a rate loop that are fitted, each told by the logarithms of its shape."""
+"""The two models of a rate loop that are fitted, and their fit to a record with a dead time."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import exp, log, nan
 from typing import Protocol
 
@@ -26,19 +27,19 @@ class Model(Protocol):
     """A linear response of gain 1.
 
     Attributes:
-        lowest: (k,), smallest shape that is searched.
-        highest: (k,), the largest.
+        lowest: (k,), lower bound of the search, logarithms of the parameters.
+        highest: (k,), upper bound.
     """
 
     lowest: Floats
     highest: Floats
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
-        """What it makes of the commands, at the times (m,), begun at rest."""
+        """Response to the commands at the times (m,), from rest."""
         ...
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """(m, k), how the state at the start dies away, `since` (m,) seconds later."""
+        """(m, k), decay of the initial state after `since` (m,) seconds."""
         ...
 
 
@@ -59,7 +60,7 @@ class FirstOrder:
 class SecondOrder:
     """ω and ζ; its shape is (log 2ζ/ω, log ζ): unlike ω and ζ these hardly depend on one another.
 
-    2ζ/ω is by how much, s, it is late at a ramp.
+    2ζ/ω is its delay on a ramp, s.
     """
 
     lowest, highest = np.log([0.002, 0.2]), np.log([1.0, 4.0])
@@ -79,8 +80,38 @@ def frequency_damping(shape: Floats) -> tuple[float, float]:
     return 2.0 * damping / exp(shape[0]), damping
 
 
+@dataclass(frozen=True, slots=True)
+class SecondOrderFit:
+    """ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
+
+    Attributes:
+        frequency: ω, rad/s.
+        damping: ζ.
+        dead_time: s.
+        gain: measured per commanded.
+        slew: of the command, per second; None where there is no sign of a limit.
+        explained: R².
+    """
+
+    frequency: float
+    damping: float
+    dead_time: float
+    gain: float
+    slew: float | None
+    explained: float
+
+    @property
+    def described(self) -> str:
+        """In one line."""
+        return (
+            f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
+            f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
+            f"{self.explained:.1%}"
+        )
+
+
 DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
-"""Between what the dead time is searched, s."""
+"""Range in which the dead time is searched, s."""
 _RAMPS = 0.01, 0.5
 """Shortest and longest time the largest change of command may take at the slew limit, s."""
 _ALIKE = 0.005
@@ -88,11 +119,11 @@ _ALIKE = 0.005
 
 
 class DelayedModel:
-    """A record, every `thinning`-th sample of it, and what a model makes of its commands.
+    """A record, thinned, and the response of a model to its commands.
 
-    y(t) = gain·x(t − dead time) + offset + what is left of each stretch's start, x the model's
-    exact response. Gain, offset and starts are linear: they are eliminated. The unknowns are the
-    model's shape, the dead time (s), and perhaps the logarithm of the slew limit.
+    y(t) = gain·x(t − dead time) + offset + decay of the initial state of each stretch, with x the
+    model's exact response. Gain, offset and initial states are linear: they are eliminated. The
+    unknowns are the model's shape, the dead time (s), and perhaps the logarithm of the slew limit.
 
     Attributes:
         thinning: of the samples.
@@ -116,7 +147,7 @@ class DelayedModel:
         self._slewed: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Weights (gain, offset, starts), and what they leave of the measurements (m,)."""
+        """Weights (gain, offset, initial states), and the residual (m,)."""
         moved = self.response(unknown)
         if self.gain is None:
             columns = np.column_stack((moved, self._rest(unknown)))
@@ -125,22 +156,22 @@ class DelayedModel:
         return np.concatenate(([self.gain], weights)), residual
 
     def response(self, unknown: Floats) -> Floats:
-        """(m,), what the model makes of the delayed commands."""
+        """(m,), response of the model to the delayed commands."""
         shape = unknown[: self._delay]
         return self._each(unknown, lambda knots, at: self.model.response(shape, knots, at))
 
     def asked(self, unknown: Floats, later: float = 0.0) -> Floats:
-        """(m,), the commands themselves behind the slew limit, delayed by `later` seconds more."""
+        """(m,), the commands after slew limit and dead time, delayed by `later` more seconds."""
         return self._each(
             unknown, lambda knots, at: value_at(knots, np.maximum(at - later, knots.time[0]))
         )
 
     def dead_time(self, unknown: Floats) -> float:
-        """Of these unknowns, s."""
+        """Dead time of these unknowns, s."""
         return float(unknown[self._delay])
 
     def slew(self, unknown: Floats) -> float | None:
-        """The limit of these unknowns, per second; None where they have none."""
+        """Slew limit of these unknowns, per second; None where they have none."""
         return exp(unknown[-1]) if unknown.size > self._delay + 1 else None
 
     def search(self, start: Floats) -> Solution:
@@ -151,7 +182,7 @@ class DelayedModel:
         return minimise(self.projection, start, lowest, highest)
 
     def best_of(self, points: list[Floats]) -> Floats:
-        """The point of a grid that leaves the smallest squares."""
+        """The point of a grid with the smallest sum of squares."""
         residuals = [self.projection(point)[1] for point in points]
         return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
 
@@ -161,10 +192,10 @@ class DelayedModel:
         return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
 
     def _rest(self, unknown: Floats) -> Floats:
-        """(m, 1 + starts): ones, and how what each stretch began with dies away.
+        """(m, 1 + initial states): ones, and the decay of the initial state of each stretch.
 
-        Counted from its first sample: from its first command on, it would have died away to next
-        to nothing, which weights without bound could still make use of.
+        Counted from its first sample: counted from its first command, the state would have decayed
+        to nearly nothing, and its weight would be unbounded.
         """
         shape = unknown[: self._delay]
         decays = [self.model.decay(shape, times - times[0]) for times in self.times]

@@ -14,6 +14,7 @@ from companion.identification.delayed_model import (
     FirstOrder,
     Model,
     SecondOrder,
+    SecondOrderFit,
     frequency_damping,
 )
 from companion.identification.record import Stretch, most_excited
@@ -23,64 +24,35 @@ from companion.least_squares import Solution
 Floats = NDArray[np.float64]
 
 LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
-"""Between what the lag is searched, s."""
+"""Range in which the lag is searched, s."""
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Times of the largest change of command at the slew limit, from which the search may begin, s."""
+"""Starts of the search: times of the largest change of command at the slew limit, s."""
 _LEFT_OF_LAG = (0.15, 0.4, 1.0)
 _LEFT_OF_DEAD_TIME = (0.6, 1.0)
-"""Of what was found without a slew limit, the shares from which the search with one may begin."""
+"""Starts of the search with a slew limit, as shares of lag and dead time found without one."""
 _CLEARLY = 0.6
-"""More unknowns are believed if they leave less than this share of the squared residuals."""
+"""A larger model is accepted if its sum of squares is below this share of the smaller one's."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_SHARES = (0.0, 0.3, 0.6)
-"""Of the whole delay, those that may be the dead time of the second order."""
+"""Starts of the search for the second order's dead time, as shares of the whole delay."""
 _ON_ITS_WAY = 0.02
-"""Excited: further from the command than this share of the commands' range."""
+"""A sample is excited if it is further from the command than this share of their range."""
 _MEMORY = 4.0
-"""So many times the whole delay a vehicle remembers its commands, and its noise itself."""
+"""Memory of the vehicle and correlation time of its noise, in multiples of the whole delay."""
 _COARSE = 500
-"""About so many samples find where to begin."""
+"""About this many samples are used to find the start."""
 _FINE = 4000
-"""At most so many samples find the rest: what more of them would add to the fit is time."""
+"""At most this many samples are used for the fit: more take longer and change nothing."""
 _FEWEST = 10
-_NEIGHBOUR = 0.005  # s
-
-
-@dataclass(frozen=True, slots=True)
-class SecondOrderFit:
-    """ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
-
-    Attributes:
-        frequency: ω, rad/s.
-        damping: ζ.
-        dead_time: s.
-        gain: measured per commanded.
-        slew: of the command, per second; None where there is no sign of a limit.
-        explained: R².
-    """
-
-    frequency: float
-    damping: float
-    dead_time: float
-    gain: float
-    slew: float | None
-    explained: float
-
-    @property
-    def described(self) -> str:
-        """In one line."""
-        return (
-            f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
-            f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
-            f"{self.explained:.1%}"
-        )
+_NEIGHBOUR = 0.005
+"""Shift of lag and dead time to the neighbouring minima, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """What was found; seconds, and the units of commands and measurements.
+    """Result of a fit; seconds, and the units of commands and measurements.
 
     Attributes:
         dead_time: s.
@@ -119,8 +91,8 @@ def fit_lag(
 
     Args:
         record: what was commanded and measured.
-        gain: what lag and dead time are to be found for; None finds it with them.
-        may_slew: whether a slew limit is looked for.
+        gain: given gain, for which lag and dead time are fitted; None fits it too.
+        may_slew: whether to look for a slew limit.
     """
     record = most_excited(record)
     samples = sum(part.measured.size for part in record)

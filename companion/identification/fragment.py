@@ -1,4 +1,4 @@
-"""What the configuration includes of an identified vehicle, written from fits that may be used."""
+"""The configuration fragment of an identified vehicle, written from good fits."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -12,7 +12,7 @@ Known = Mapping[str, Sequence[float | None]]
 
 _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _UNLIMITED = 100_000.0
-"""Written where roll has a slew limit and this axis has none: null would mean that of roll."""
+"""Written where roll has a slew limit and this axis has none: null would mean roll's, °/s²."""
 _ALIKE_MS = 3.0
 _ALIKE_SLEW = 0.1
 """Roll and pitch that differ by less, as a share, have one slew limit."""
@@ -41,15 +41,15 @@ class AxisValues(NamedTuple):
 
 
 def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
-    """YAML that the configuration includes, a comment on how good each fit is above it.
+    """YAML for the configuration to include, with a comment on the quality of each fit.
 
     Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
     a comment says so. Pitch is written where it differs from roll, a slew limit where one was found
     (the planner takes the lead of ArduPilot's frame from these times), the hover thrust where the
     thrust map is good.
 
-    Second order is told and not written: flown with it, a real PX4 bends the steps at 90 °/s less
-    (0.002, not 0.004) and those at 400 °/s more (0.006, not 0.004).
+    A second-order fit is written as a comment only: flown with it, a real PX4 bends the steps at
+    90 °/s less (0.002, not 0.004) and those at 400 °/s more (0.006, not 0.004).
 
     Args:
         vehicle: as identified.

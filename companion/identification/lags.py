@@ -1,4 +1,4 @@
-"""Exact response of a first-order lag to held commands, at any time, with or without a slew limit.
+"""Exact response of first- and second-order lags to held commands, with or without a slew limit.
 
 Between two knots the lag's input is a straight line v + m·(t − t_i), and the output solves
 τ·ẋ = v + m·(t − t_i) − x:  x(t) = v + m·(t − t_i − τ) + (x_i − v + m·τ)·exp(−(t − t_i)/τ).
@@ -15,7 +15,7 @@ Numbers = NDArray[Any]
 """Real or complex."""
 
 _LONGEST_PART = 500.0
-"""e to this power still is a number."""
+"""Largest exponent that does not overflow."""
 
 
 class Knots(NamedTuple):
@@ -35,8 +35,8 @@ class Knots(NamedTuple):
 def held(time: Floats, commanded: Floats, alike: float = 0.0) -> Knots:
     """Commands (n,) held from their times (n,) on.
 
-    A command makes a piece of its own where it differs by more than `alike` from the latest that
-    does: what a noisy sensor makes a planner ask for would else be most of the work.
+    A command begins a new piece where it differs by more than `alike` from the latest piece: noise
+    in the commands would otherwise be most of the work.
     """
     kept, latest = [], np.inf
     for number, value in enumerate(commanded.tolist()):
@@ -60,9 +60,9 @@ def slewed(commands: Knots, slew: float) -> Knots:
 
 
 def _before_each(commands: Knots, slew: float) -> Floats:
-    """(n,), where the slewed value stands as each command comes.
+    """(n,), the slewed value at the time of each command.
 
-    The one loop that must go through the commands in turn, since each start is the end before it.
+    A loop, because each start is the end of the piece before it.
     """
     value = float(commands.value[0])
     starts, reaches = [value], slew * np.diff(commands.time)
@@ -79,7 +79,7 @@ def _before_each(commands: Knots, slew: float) -> Floats:
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
-    """What a lag of `lag` > 0 seconds makes of the commands, at the times (m,), begun at rest.
+    """Response of a lag of `lag` > 0 seconds to the commands at the times (m,), from rest.
 
     No time in `at` may lie before the first knot.
     """
@@ -87,7 +87,7 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 
 
 def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """`lagged` for a lag that may be complex: one of a pair that is an oscillation."""
+    """`lagged` for a lag that may be complex: one of the pair of an oscillation."""
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
@@ -130,7 +130,7 @@ _NEARLY_CRITICAL = 1e-6
 
 
 def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
-    """What the loop makes of the commands at the times (m,), begun at rest.
+    """Response of a second-order lag to the commands at the times (m,), from rest.
 
     Args:
         commands: none of `at` may lie before the first knot.
@@ -148,7 +148,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
 
 def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
-    """(m, 2), how the state at the start dies away, `since` (m,) seconds later."""
+    """(m, 2), decay of the initial state after `since` (m,) seconds."""
     first, second = _lags(frequency, damping)
     if first.imag:
         turning = np.exp(-since / first)

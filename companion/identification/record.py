@@ -1,4 +1,4 @@
-"""Commands and what was measured of them, cut where control stood still."""
+"""Commands and measurements, cut into stretches where control paused."""
 
 from typing import NamedTuple
 
@@ -8,16 +8,16 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 LONGEST_DEAD_TIME = 0.5
-"""The longest dead time that is looked for, s."""
+"""Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
 """A command is taken as held this long, s; autopilots leave our control after about 1 s."""
 
 _MOST_ROWS = 16_000
-"""Commands and samples that a fit takes on: of each about half a minute at 250 Hz."""
+"""Most commands and samples of a fit: about half a minute of both at 250 Hz."""
 _WINDOW = 10.0
 """Length of the parts of which the most excited are kept, s: some doublets and their answers."""
 _LEAD = 1.5
-"""Commands so long before a part come along with it: the longest dead time and ramp, s."""
+"""Commands kept before a part, s: the longest dead time and ramp."""
 
 
 class Stretch(NamedTuple):
@@ -27,7 +27,7 @@ class Stretch(NamedTuple):
         time: (n,), of the commands, s.
         commanded: (n,).
         measured_time: (m,), s; none is earlier than `LONGEST_DEAD_TIME` after the first command or
-            later than the last one, so that it is known what acts on it whatever the dead time.
+            later than the last one, so that its command is known for every dead time.
         measured: (m,), in the commands' unit.
     """
 
@@ -65,10 +65,10 @@ def stretches(
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
-    """A record, or of a long one the parts in which the commands moved most.
+    """A record; of a long one the parts in which the commands changed most.
 
-    A flight of half an hour tells no more of the response than its liveliest minute, and each step
-    of a fit goes through all that is left of it. Each part brings the commands before it along.
+    Half an hour of flight holds no more information on the response than its most excited minute.
+    Each part keeps the commands shortly before it.
     """
     if sum(part.time.size + part.measured_time.size for part in record) <= _MOST_ROWS:
         return record

@@ -1,9 +1,9 @@
-"""What a fit leaves over, parted: what the commands still explain is misfit, the rest is noise.
+"""The residual of a fit, split: the part that the commands explain is misfit, the rest is noise.
 
-Misfit is the model's fault: it is the same in each flight, and says how far predictions are off.
-Noise is what makes one flight's result differ from the next one's: standard errors follow from it
-alone. The residual is regressed on the commands at many delays (a finite impulse response), which
-takes up whatever a linear model of any order could explain (Ljung, System Identification, 16.6).
+Misfit is an error of the model: it is the same in each flight, and says how wrong predictions are.
+Noise makes the results of flights differ: the standard errors follow from it alone. The residual is
+regressed on the commands at many delays (a finite impulse response), which explains whatever a
+linear model of any order could (Ljung, System Identification, 16.6).
 """
 
 from collections.abc import Callable
@@ -18,11 +18,11 @@ Floats = NDArray[np.float64]
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
-"""So many excited samples are needed for each delay: else it would take up the noise, too."""
+"""Excited samples needed for each delay: with fewer the regression would fit the noise."""
 
 
 class Residuals(NamedTuple):
-    """The two parts, and what noise makes of the unknowns.
+    """The two parts, and the standard errors of the unknowns.
 
     Attributes:
         misfit: root mean square of what the commands explain, in the measurements' unit.
@@ -43,15 +43,15 @@ def analyse(
     excited: int,
     correlated: int,
 ) -> Residuals:
-    """Part a residual.
+    """Split a residual.
 
     Args:
         residual: (m,), measured − modelled.
         slopes: (m, k), how it changes with each unknown, the linear ones projected out.
-        commands: (m,), the commands so many seconds before they act by the model.
+        commands: delay in s → (m,), the commands that much later than the model has them.
         memory: s, over which the vehicle may remember commands.
-        excited: samples that tell of the response.
-        correlated: samples over which the noise resembles itself.
+        excited: number of excited samples.
+        correlated: number of samples over which the noise is correlated.
     """
     delays = min(_MOST_DELAYS, excited // _SAMPLES_PER_DELAY)
     noise = residual

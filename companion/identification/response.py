@@ -1,24 +1,24 @@
-"""One axis's answer to body rates: what was found, how good it is, when it is too bad to use."""
+"""Response of one axis to body rates: the fit, its quality, and when it must not be used."""
 
 from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from companion.identification.delayed_model import DEAD_TIMES
-from companion.identification.fit import LAGS, SecondOrderFit, fit_lag
+from companion.identification.delayed_model import DEAD_TIMES, SecondOrderFit
+from companion.identification.fit import LAGS, fit_lag
 from companion.identification.record import stretches
 
 
 class BadFitError(ValueError):
-    """A fit that must not be used; says why."""
+    """A fit must not be used; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class FitQuality:
-    """How far a fit can be trusted.
+    """Quality of a fit.
 
     Attributes:
-        explained: R², share of the measurements' variance that the model explains; 1 is all.
+        explained: R², share of the measurements' variance that the model explains.
         misfit: how far the model is off, as a share of the movement: the root mean square of what
             commands explain of the residual. The same in each flight.
         dead_time_error: standard error of the dead time, s, by noise: how far flights differ.
@@ -38,7 +38,7 @@ class FitQuality:
 
 @dataclass(frozen=True, slots=True)
 class FitNeeds:
-    """What a fit must reach to be used.
+    """Requirements of a fit that may be used.
 
     Attributes:
         misfit: largest misfit, as a share of the movement.
@@ -69,8 +69,7 @@ class RateResponse:
         dead_time: from the sample that a command answers to its first effect, s; NaN if not found.
         lag: time constant, s; NaN if not found.
         gain: of the steady rate, as measured; NaN if not found.
-        slew: largest change of the rate that the autopilot asks of itself, rad/s², in front of the
-            lag; None where the response shows none.
+        slew: slew limit of the autopilot before the lag, rad/s²; None where none was found.
         fit: how good it is.
         second_order: the model that is clearly nearer, where one is.
     """
@@ -94,15 +93,15 @@ class RateResponse:
             ),
             (
                 _at_edge(self.dead_time, DEAD_TIMES),
-                f"dead time stands at the edge of what was searched, {1e3 * self.dead_time:.0f} ms",
+                f"dead time is at the edge of the searched range, {1e3 * self.dead_time:.0f} ms",
             ),
             (
                 _at_edge(self.lag, LAGS),
-                f"lag stands at the edge of what was searched, {1e3 * self.lag:.0f} ms",
+                f"lag is at the edge of the searched range, {1e3 * self.lag:.0f} ms",
             ),
             (
                 fit.excited < needs.excited,
-                f"too little excitation: {fit.excited} samples tell of the response, "
+                f"too little excitation: {fit.excited} samples show the response, "
                 f"{needs.excited} are needed",
             ),
             (
@@ -122,7 +121,7 @@ class RateResponse:
         return next((text for wrong, text in faults if wrong), None)
 
     def is_good(self, needs: FitNeeds = NEEDS) -> bool:
-        """Whether it may be used: `reason` has nothing to say."""
+        """Whether it may be used: there is no `reason` against it."""
         return self.reason(needs) is None
 
 
@@ -155,9 +154,8 @@ def fit_rate_response(
         commanded: (n,), body rates of one axis, rad/s; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
-        gain: what lag and dead time are found for, such as the 1 that a planner takes it to be:
-            they then make up, as well as they can, for what the true one differs. None finds it
-            with them.
+        gain: given gain, for which lag and dead time are fitted, such as the 1 that planners
+            assume. None fits it too.
 
     Returns:
         The response; without any change of command, one of NaN whose `reason` says so.

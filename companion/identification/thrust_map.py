@@ -1,4 +1,4 @@
-"""Specific thrust over the normalised thrust that MAVLink carries, from what a flight measured."""
+"""Specific thrust over normalised thrust (SET_ATTITUDE_TARGET), fitted to a flight."""
 
 from dataclasses import dataclass
 
@@ -10,11 +10,11 @@ from companion.identification.record import Stretch, stretches
 
 _LEAST_EXPLAINED = 0.8
 _FAR = 0.2
-"""From the usual thrust by this share of the range: it is excited, and for some time after."""
+"""A command is excited if it differs from the median by this share of the range."""
 _HOVER = 0.05, 0.95
-"""Normalised thrust in hover, between what the configuration takes."""
+"""Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
-"""Rotors and their commands are not slower than this together, s."""
+"""Largest sum of lag and dead time of the rotors, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class ThrustMap:
         return (specific_thrust - self.offset) / self.slope
 
     def is_good(self, gravity: float) -> bool:
-        """Whether the thrust followed the commands upwards, soon, and by little else.
+        """Whether the thrust followed the commands: rising, soon, and well explained.
 
         Args:
             gravity: m/s²; the vehicle must hover between 0.05 and 0.95.
@@ -62,7 +62,7 @@ class ThrustMap:
 
 
 def _excited(record: list[Stretch]) -> list[Stretch]:
-    """The record without the samples of steady thrust: they tell of vibration and gusts only."""
+    """The record without samples of steady thrust: they hold only vibration and gusts."""
     if not record:
         return []
     thrust = np.concatenate([part.commanded for part in record])

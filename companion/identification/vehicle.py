@@ -23,7 +23,7 @@ AXES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedVehicle:
-    """How a vehicle answers body rates and thrust; each fit tells whether it may be used.
+    """How a vehicle answers body rates and thrust; each fit says whether it may be used.
 
     Attributes:
         roll: as fitted.
@@ -43,7 +43,7 @@ class IdentifiedVehicle:
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
     def faults(self) -> dict[str, str]:
-        """Why which axis must not be used; empty if all of them may be."""
+        """Reason for each axis whose fit must not be used; empty if all may be used."""
         reasons = {name: response.reason() for name, response in self.axes.items()}
         return {name: reason for name, reason in reasons.items() if reason is not None}
 
@@ -51,12 +51,12 @@ class IdentifiedVehicle:
 def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> IdentifiedVehicle:
     """Fit each axis and the thrust map.
 
-    Lag and dead time are those of a rate loop of gain 1, since that is what a planner takes it for;
-    where the loop is of another order or falls short, they are the ones that come nearest to it.
+    Lag and dead time are fitted for a rate loop of gain 1, because planners assume that. Where the
+    loop is of another order or gain, they are the nearest ones.
 
     Args:
         setpoints: (n, 5), vehicle time of the sample answered in s, roll, pitch and yaw rate in
-            rad/s, normalised thrust; those that the vehicle obeyed.
+            rad/s, normalised thrust; those that the vehicle followed.
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
     """
@@ -76,7 +76,7 @@ def _response(asked: Floats, measured: Floats, axis: int) -> RateResponse:
 
 
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
-    """A row an axis, what is nearer to it, a line of the thrust; at most 80 columns wide.
+    """Table of the fits, a row an axis, and a line on the thrust; at most 80 columns wide.
 
     Args:
         vehicle: as identified.

@@ -40,8 +40,8 @@ def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
     if len(payload) < _ATTITUDE_BYTES:
         payload = payload.ljust(_ATTITUDE_BYTES, b"\0")
     time_boot_ms, w, x, y, z, roll, pitch, yaw = _ATTITUDE.unpack_from(payload)
-    # One test for all: seven float32 cannot overflow a double, so the sum is finite exactly if
-    # all of them are.
+    # One test for all: the sum of seven float32 cannot overflow a double, so it is finite
+    # exactly if all of them are.
     if not isfinite(w + x + y + z + roll + pitch + yaw):
         return None
     return time_boot_ms, (w, x, y, z), BodyRates(roll, pitch, yaw)
@@ -50,8 +50,8 @@ def decode_attitude(payload: bytes) -> tuple[int, Quaternion, BodyRates] | None:
 class SetpointEncoder:
     """Builds SET_ATTITUDE_TARGET frames, by rates and thrust.
 
-    Nothing but finite rates and a thrust of 0..1 gets through: measured on both autopilots, a NaN
-    or negative thrust is a free fall and an infinite rate a runaway spin.
+    It refuses all but finite rates and a thrust of 0..1: on both autopilots (measured) a NaN or
+    negative thrust is a free fall, and an infinite rate a spin that does not stop.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class SetpointEncoder:
             InvalidSetpoint: Thrust outside 0..1 or time stamp outside uint32.
         """
         roll, pitch, yaw = rates
-        # Written so that NaN fails too: it compares false with everything.
+        # Written so that NaN fails too: every comparison with it is false.
         if not (
             -_FLOAT32_MAX <= roll <= _FLOAT32_MAX
             and -_FLOAT32_MAX <= pitch <= _FLOAT32_MAX
@@ -101,7 +101,7 @@ class SetpointEncoder:
             self._component,
             SET_ATTITUDE_TARGET,
             0,
-            # payload; the quaternion is ignored, and the identity harms nobody who looks at it
+            # payload; the quaternion is ignored, and the identity is harmless
             time_boot_ms,
             1.0,
             0.0,

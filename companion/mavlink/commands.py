@@ -34,8 +34,8 @@ class Command(NamedTuple):
 
 _ACCEPTED = 0
 _IN_PROGRESS = 5
-_IN_PROGRESS_TIMEOUT_S = 30.0  # for the next word of a command that the vehicle is working on
-_WORDS_WINDOW_S = 0.3  # the reason comes as a text shortly before or after the ACK
+_IN_PROGRESS_TIMEOUT_S = 30.0  # until the next ACK of a command in progress
+_WORDS_WINDOW_S = 0.3  # the reason comes as a STATUSTEXT shortly before or after the ACK
 
 
 def command_name(command: int) -> str:
@@ -51,9 +51,9 @@ def result_name(result: int) -> str:
 
 
 class CommandClient:
-    """Sends commands and waits for their ACKs; one at a time of each kind.
+    """Sends commands and waits for their ACKs; one at a time of each command.
 
-    An ACK names only its command, so two of one kind under way could not be told apart.
+    An ACK names only its command, so two of the same command could not be told apart.
     """
 
     def __init__(
@@ -130,8 +130,8 @@ class CommandClient:
         )
 
     def _on_ack(self, message: Message) -> None:
-        # The extension fields name whom the ACK is for; zeros mean an autopilot that leaves
-        # them out. Another station's ACKs are not ours.
+        # The extension fields name the addressee; zeros mean an autopilot that leaves them out.
+        # An ACK to another station is not ours.
         if message.target_system not in (0, self._settings.source_system):
             return
         if message.target_component not in (0, self._settings.source_component):

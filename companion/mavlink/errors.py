@@ -6,11 +6,11 @@ class LinkError(Exception):
 
 
 class EndpointError(LinkError):
-    """The endpoint cannot be understood or opened; the message says how to mend it."""
+    """The endpoint cannot be understood or opened; the message says what to do."""
 
 
 class LinkTimeout(LinkError):  # noqa: N818 - "timeout" is the field's word, and says it is one
-    """The vehicle said nothing, or not what was waited for, in the given time."""
+    """The expected message did not come in the given time."""
 
 
 class LinkLost(LinkError):  # noqa: N818
@@ -18,11 +18,11 @@ class LinkLost(LinkError):  # noqa: N818
 
 
 class NotConnected(LinkError):  # noqa: N818
-    """The vehicle has not been heard yet, so the question has no answer."""
+    """No heartbeat of the vehicle was received yet."""
 
 
 class UnsupportedAutopilot(LinkError):  # noqa: N818
-    """The vehicle's autopilot is none that this program knows how to fly."""
+    """This program cannot fly the vehicle's autopilot."""
 
 
 class UnknownMessage(LinkError):  # noqa: N818

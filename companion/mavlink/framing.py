@@ -1,8 +1,8 @@
 """MAVLink framing: bytes to checked frames and back, for version 2 and (inwards) version 1.
 
-Source: the MAVLink serialization guide. A frame that is not intact is never delivered; the
-checksum covers a message's CRC_EXTRA, so a frame of a message the dialect does not know cannot
-be checked and is skipped.
+Source: the MAVLink serialization guide. A frame that is not intact is never delivered. The
+checksum covers the message's CRC_EXTRA, so a frame of an unknown message cannot be checked and is
+skipped.
 """
 
 import struct
@@ -134,7 +134,7 @@ class FrameScanner:
         return end - at
 
     def _fault(self, data: bytes, at: int, check_at: int, end: int, message_id: int) -> int | None:
-        """What is done instead of taking the frame at `at`..`end`; None if it is intact."""
+        """How many bytes to skip instead of the frame at `at`..`end`; None if it is intact."""
         extra = self._crc_extra.get(message_id)
         if extra is None:
             return self._unknown_frame(data, at, end)
@@ -147,8 +147,8 @@ class FrameScanner:
         return _NOT_A_FRAME
 
     def _unknown_frame(self, data: bytes, at: int, end: int) -> int:
-        # Without a checksum only what follows can tell a frame from garbage: another frame, or
-        # the end of what came.
+        # Without a checksum only what follows can tell a frame from garbage: the start of another
+        # frame, or the end of the data.
         if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
             self._stats.unknown += 1
             return end - at
@@ -165,9 +165,9 @@ def build_frame(
     component: int,
     signed: bool = False,
 ) -> bytes:
-    """Build a version 2 frame; with `signed`, all of it but the signature, which is then due.
+    """Build a version 2 frame; with `signed`, all but the signature, which must follow.
 
-    Trailing zeros of the payload are cut, all but the first byte, as the standard asks.
+    Trailing zeros of the payload are cut, except the first byte, as the standard asks.
     """
     trimmed = payload.rstrip(b"\0") or payload[:1]
     body = (

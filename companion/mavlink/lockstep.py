@@ -1,9 +1,9 @@
-"""Flying on vehicle time: an event loop whose clock the vehicle moves, step by step.
+"""Lockstep: an event loop whose clock the vehicle moves, step by step.
 
 The vehicle ends each of its steps with a beacon, SYSTEM_TIME(time_boot_ms = t), and waits for our
 answer. Between beacon and answer everything that is due on our side runs, in vehicle time; then
-the answer goes out as the last datagram of the step. Nothing depends on how fast either side is,
-so a flight is the same to the bit each time, and as fast as both can compute.
+the answer goes out as the last datagram of the step. Nothing depends on the speed of either side,
+so a flight is bit-identical each time, and runs as fast as both can compute.
 """
 
 import asyncio
@@ -19,14 +19,16 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
-"""Wall time without any I/O after which the vehicle counts as gone and time goes on without it."""
+"""Wall time without I/O, s, after which the vehicle counts as gone and time goes on without it."""
 
 _SPIN_S = 0.0005
 
 _TIMERS_IN_ORDER = 1_000_000
 _TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
 
-_MAX_ITERATIONS = 200  # of the loop in one settling; a task that never rests may not stop the world
+_MAX_ITERATIONS = (
+    200  # of the loop until it counts as settled: a task that never rests must not block
+)
 
 
 class _VehicleClock:
@@ -36,7 +38,7 @@ class _VehicleClock:
         self._wall_start = time.monotonic()
         self._waiting_since = self._wall_start
         self._vehicle: float | None = None
-        self._offset = 0.0  # stays 0 unless the vehicle went away or started anew in between
+        self._offset = 0.0  # stays 0 unless the vehicle went away or restarted in between
 
     def read(self) -> float:
         if self._vehicle is None:
@@ -48,7 +50,7 @@ class _VehicleClock:
         if self._vehicle is not None and vehicle_time <= self._vehicle:
             if self._vehicle - vehicle_time < 1.0:
                 return False
-            # The vehicle started anew. Our time does not go back; its time counts from here.
+            # The vehicle restarted. Our time does not go back; its time continues from here.
             self._offset += self._vehicle - vehicle_time
         self._vehicle = vehicle_time
         return True
@@ -64,7 +66,7 @@ class _VehicleClock:
         return max(0.0, self._waiting_since + PATIENCE_S - time.monotonic())
 
     def go_on_alone(self) -> None:
-        """The vehicle let its time pass: timeouts on our side must still end."""
+        """The vehicle did not answer in time: timeouts on our side must still end."""
         self._offset += PATIENCE_S
         self.start_waiting()
 
@@ -102,13 +104,13 @@ class _SteppingSelector(HotSelector):
         return ready
 
     def _spin(self) -> Ready:
-        """Look for the next beacon without sleeping: to be woken costs more than to look."""
+        """Poll for the next beacon without sleeping: being woken takes longer."""
         give_up = time.perf_counter() + _SPIN_S
         while time.perf_counter() < give_up:
             ready = super().select(0)
             if ready or self._when_idle is not None:
                 return ready
-            os.sched_yield()  # whoever else wants this core may have it
+            os.sched_yield()  # let other processes use this core
         return []
 
 
@@ -167,7 +169,7 @@ class LockstepClient:
     Args:
         loop: The loop to drive.
         process: Handles one step's frames, in order, after the clock was moved.
-        deliver: Hands the step's attitude sample, if any, to whoever controls.
+        deliver: Hands the step's attitude sample, if any, to the control loop.
         answer: Sends what closes the step `time_boot_ms`.
     """
 
@@ -203,14 +205,14 @@ class LockstepClient:
         self._loop.settle(self._after_tasks)
 
     def close(self) -> None:
-        """Take part no more: the open step gets no sample and no answer."""
+        """Stop: the open step gets no sample and no answer."""
         self._closed = True
 
     def _after_tasks(self) -> None:
         if self._closed:
             return
         self._deliver()
-        # Once more, so that what the control loop set off is sent before the step is closed.
+        # Settle again, so that tasks started by the control loop send before the step closes.
         self._loop.settle(self._close)
 
     def _close(self) -> None:

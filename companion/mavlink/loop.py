@@ -24,7 +24,7 @@ class HotSelector(selectors.DefaultSelector):
     """A selector that serves some file descriptors on the spot.
 
     It waits for the hot descriptors, and for the one descriptor of the selector that has all the
-    others. So what must be quick passes no bookkeeping.
+    others. So hot descriptors skip asyncio's bookkeeping.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What leaves: numbered, signed, sent at once or not at all."""
+"""Frames we send: numbered, signed, sent at once or not at all."""
 
 import asyncio
 from math import inf
@@ -13,7 +13,7 @@ from companion.mavlink.transport.base import Tap, Transport
 
 
 class Outbox:
-    """Numbers, signs and sends frames. It keeps nothing: what cannot leave now is dropped.
+    """Numbers, signs and sends frames. A frame that cannot be sent now is dropped.
 
     Attributes:
         transport: The open connection, if there is one.
@@ -81,7 +81,7 @@ class Outbox:
     def _send(self, frame: bytes, *, record: bool = True) -> bool:
         if self._signing is not None:
             frame = self._signing.sign(frame)
-        if record:  # how often a step is closed again hangs on the wall clock: it counts nothing
+        if record:  # a step may be closed again, as the wall clock has it: that must not count
             self._sequence = (self._sequence + 1) & 0xFF
         if self.transport is None or not self.transport.send(frame):
             self._stats.not_sent += 1

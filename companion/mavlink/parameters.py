@@ -148,7 +148,7 @@ class ParameterClient:
             integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
-        # NaN and infinity are no integers; whoever asked is to see them as they came.
+        # NaN and infinity are no integers; the caller gets them as they came.
         return int(number) if value.kind in _INTEGERS and isfinite(number) else number
 
     def _bytes(self, name: str, value: float, kind: int) -> bytes:

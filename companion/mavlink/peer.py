@@ -14,7 +14,7 @@ from companion.mavlink.transport.endpoint import PeerAddress
 
 
 async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
-    """Look the names up.
+    """Look up the names of peers.
 
     Raises:
         EndpointError: A host is unknown.
@@ -34,7 +34,7 @@ async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "Nam
 
 
 class NamedPeers:
-    """Whom the endpoint lets in; everybody if it names nobody.
+    """The senders that the endpoint lets in; all of them if it names none.
 
     Args:
         admitted: IP address and port; port `None` is any.
@@ -52,7 +52,7 @@ class NamedPeers:
 
 
 def plain_host(host: str) -> str:
-    """An IP address in one spelling; what IPv6 says of an IPv4 host as IPv4."""
+    """An IP address in its normal form; an IPv4 address mapped into IPv6 as IPv4."""
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
@@ -122,7 +122,7 @@ class PeerRule:
         return fields[_AUTOPILOT] != _AUTOPILOT_INVALID and fields[_TYPE] != MAV_TYPE_GCS
 
     def renew(self) -> None:
-        """The peer made its claim again."""
+        """The peer has repeated its claim."""
         self._claimed_at = self._clock()
 
     def lapsed(self) -> bool:

@@ -1,4 +1,4 @@
-"""Answers that are waited for; all of them end at once when the connection drops."""
+"""Answers that tasks wait for; when the connection drops, all waiting ends at once."""
 
 import asyncio
 from typing import Generic, TypeVar
@@ -11,7 +11,7 @@ T = TypeVar("T")
 class Pending(Generic[T]):
     """A mailbox between a callback of the link and the task that waits for it.
 
-    Use as a context manager; answers that come before they are asked for are kept in order.
+    Use as a context manager. Answers are kept in order until they are taken.
     """
 
     def __init__(self, registry: "PendingRegistry") -> None:
@@ -48,7 +48,7 @@ class Pending(Generic[T]):
 
 
 class PendingRegistry:
-    """All mailboxes of a link that somebody waits at."""
+    """All mailboxes of a link at which a task waits."""
 
     def __init__(self) -> None:
         # A dict, not a set: failing in a fixed order keeps flights repeatable.

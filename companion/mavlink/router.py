@@ -1,4 +1,4 @@
-"""Who wants to hear what: decoded messages or bare payloads, by message."""
+"""Passes messages to their subscribers, decoded or as payloads."""
 
 import logging
 from collections.abc import Callable
@@ -19,7 +19,7 @@ class Router:
     """Calls the subscribers of a message, synchronously, in the order of their subscription.
 
     A message nobody subscribed to is never decoded. An exception in a subscriber is reported to
-    `on_error` (the log, if that is not set) and goes no further.
+    `on_error` (the log, if that is not set) and does not spread.
     """
 
     def __init__(self, stats: LinkStats) -> None:

@@ -21,8 +21,8 @@ class LinkSettings:
         source_component: Our component id.
         heartbeat_type: MAV_TYPE of our heartbeat. PX4 sends its STATUSTEXTs only on links where
             it hears type GCS (6).
-        heartbeat_rate_hz: Ours. It says that we live and nothing more; no setpoint hangs on it.
-        signing: Sign what we send and refuse what is not signed; `None` leaves both out.
+        heartbeat_rate_hz: Rate of our heartbeat. No setpoint depends on it.
+        signing: Signs what we send and refuses what is not signed; `None`: neither.
         lockstep: Vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`.
         first_beacon_timeout_s: Lockstep: wall time to wait for the vehicle when opening.
     """

@@ -29,11 +29,11 @@ _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
 _QUESTIONS = 16
 
 PERIOD_S = 10.0
-"""The guide asks for once a minute. A shorter time costs less where the program is killed."""
+"""Between two writes, s. The guide asks for once a minute; less is lost if we are killed."""
 _RESERVE = 15 * TICKS_PER_S
-"""While the link is open the file is ahead of the truth by more than a period: after a kill our
-stamps still rise, and nothing that was heard before it is heard again. The vehicle, too, is refused
-until its stamps are past that, for 15 s at most."""
+"""While the link is open, the file holds stamps this far ahead, more than a period. So after a kill
+our stamps still rise, and no older frame is accepted again. The vehicle is refused, too, until its
+stamps are past that, for 15 s at most."""
 _LAST_WRITE_S = 2.0
 
 
@@ -75,8 +75,8 @@ class Signing:
 
     Attributes:
         file: As given.
-        remarks: What the user should know of the date; who reads the sentences takes them out.
-        changed: Set when `stamps` should be written soon.
+        remarks: Sentences about time stamps for the user; the reader removes them.
+        changed: Set when `stamps` must be written soon.
 
     Raises:
         SigningError: The key is not 32 bytes.
@@ -115,7 +115,7 @@ class Signing:
         return frame + tail + self._hash(frame + tail)
 
     def check(self, frame: Frame) -> SignatureResult:
-        """Judge a frame; only a good one moves what is kept of its stream."""
+        """Check a frame; only a good one updates its stream."""
         self._unproven = 0
         if not frame.signed:
             return SignatureResult.UNSIGNED
@@ -128,22 +128,22 @@ class Signing:
         if verdict is SignatureResult.GOOD:
             self._stamp = max(self._stamp, stamp)
         elif verdict is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
-            # A question that is older than what the vehicle knows it would not answer.
+            # The vehicle would not answer a request with an older stamp than it knows.
             self._stamp = max(self._stamp, stamp)
             self._unproven = stamp
         return verdict
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because a question of ours is not answered."""
+        """Whether the last frame was refused only because our TIMESYNC request is unanswered."""
         return self._unproven != 0
 
     def stamps(self) -> Stamps:
-        """What this run adds to what is kept; asked for by another thread."""
+        """What this run adds to the kept stamps; called by another thread."""
         return Stamps(self._judge.date(), self._stamp, self._judge.streams())
 
     def _answers(self, frame: Frame) -> bool:
-        """Whether it is the answer to a TIMESYNC question of this run, which no recording has."""
+        """Whether it answers a TIMESYNC request of this run, which no recording can contain."""
         if frame.message_id != _TIMESYNC_ID:
             return False
         answer_at, question = _timesync(frame.payload)
@@ -154,7 +154,7 @@ class Signing:
 
 
 def _timesync(payload: bytes) -> tuple[bytes, bytes]:
-    """tc1, zero in a question, and ts1, the asker's time, which the answer repeats."""
+    """tc1, zero in a request, and ts1, the sender's time, which the answer repeats."""
     whole = payload.ljust(16, b"\0")
     return whole[:8], whole[8:16]
 
@@ -162,11 +162,11 @@ def _timesync(payload: bytes) -> tuple[bytes, bytes]:
 class StampKeeper:
     """A thread that writes every 10 s, at a new stream, and at the end.
 
-    The event loop never waits for a disk. What fails is told once, in `Signing.remarks`.
+    The event loop never waits for a disk. A failure is told once, in `Signing.remarks`.
 
     Args:
-        signing: Whose stamps; it names the file.
-        file: Where to.
+        signing: Holds the stamps to write.
+        file: Takes them.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:

@@ -15,14 +15,14 @@ from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
 _MOST_BYTES = 1_000_000
-"""Above what 65536 streams of one vehicle take. Larger is no file of ours."""
+"""More than 65536 streams of one vehicle take; a larger file is not ours."""
 
 
 class StampFile:
     """Time stamps in the user's state directory ($XDG_STATE_HOME, or ~/.local/state), mode 0600.
 
     Args:
-        key: Whose stamps; the file's name is a hash of it.
+        key: The signing key; the file's name is a hash of it.
 
     Attributes:
         path: The file.
@@ -36,7 +36,7 @@ class StampFile:
         self.path = _state_directory() / _FOLDER / f"{name}.json"
 
     def load(self) -> tuple[Stamps, str | None]:
-        """What is kept, and what is to be told if that cannot be read. Never raises."""
+        """The kept stamps, and a sentence for the user if they cannot be read. Never raises."""
         try:
             with self.path.open("rb") as file:
                 return _parsed(file.read(_MOST_BYTES)), None

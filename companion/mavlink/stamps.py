@@ -1,4 +1,4 @@
-"""Which time stamps of signatures are believed, and what the date is.
+"""Which signature time stamps are believed, and which date we assume.
 
 Source: the MAVLink message-signing guide, "Timestamp handling": stamps of a stream must rise, a new
 stream may be a minute behind, the newest stamp is kept on disk, and it starts at the later of clock
@@ -17,11 +17,11 @@ TICKS_PER_S = 100_000
 _DAY = 86_400 * TICKS_PER_S
 _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
-"""2026-09-01. No clock that is right says less; raise it with a release."""
+"""2026-09-01. A right clock never says less; raise it with a release."""
 _FURTHEST = 5 * 365 * _DAY
 
 MOST_TICKS = 2**48 - 2 * _FURTHEST
-"""No date of ours is later (2094), so that no stamp outgrows its 48 bits."""
+"""Our date is never later (2094), so no stamp exceeds its 48 bits."""
 
 Stream = tuple[int, int, int]
 """System, component and link id."""
@@ -30,7 +30,7 @@ SET_CLOCK = "set this computer's clock (NTP, or by hand)"
 
 
 class SignatureResult(Enum):
-    """What a signature is worth."""
+    """Result of checking a frame's signature and its time stamp."""
 
     GOOD = "signed with our key, and newer than all before it on its stream"
     UNSIGNED = "not signed"
@@ -41,7 +41,7 @@ class SignatureResult(Enum):
 
 @dataclass(frozen=True)
 class Stamps:
-    """What is kept from one run of the program to the next, in ticks of 10 us.
+    """The stamps kept from one run of the program to the next, in ticks of 10 us.
 
     Attributes:
         date: Our own date at the end.
@@ -76,8 +76,8 @@ class StampJudge:
         elapsed: Monotonic time in s.
 
     Attributes:
-        remarks: Sentences for the user; who reads them takes them out.
-        changed: Set when a stream is heard that this run has not heard before.
+        remarks: Sentences for the user; the reader removes them.
+        changed: Set at the first frame of a stream in this run.
     """
 
     def __init__(
@@ -105,17 +105,17 @@ class StampJudge:
         return self._start + int((self._elapsed() - self._started) * TICKS_PER_S)
 
     def awaits_answer(self, stamp: int) -> bool:
-        """Whether only an answer to a question of ours is wanting before `stamp` is believed."""
+        """Whether `stamp` would be believed if it answered a TIMESYNC request of ours."""
         date = self.date()
         in_reach = date + _DAY < stamp <= date + _FURTHEST
-        # Once somebody in our own time was heard, nobody else moves us.
+        # Once a signer in our own time was heard, no other changes our date.
         return in_reach and not self._answered and not self._newest[False]
 
     def judge(self, stream: Stream, stamp: int, *, answers: bool) -> SignatureResult:
-        """Judge a stamp; only a good one moves anything.
+        """Judge a stamp; only a good one is remembered.
 
         Args:
-            stream: Whose it is.
+            stream: The signer's stream.
             stamp: Ticks.
             answers: Whether the frame answers a question that we asked in this run.
         """
@@ -152,7 +152,7 @@ class StampJudge:
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
         """The newest stamps of each stream heard in this run."""
-        heard = dict(self._heard)  # whole, as another thread asks
+        heard = dict(self._heard)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:
             floors = (
@@ -162,7 +162,7 @@ class StampJudge:
         return newest
 
     def _oldest(self, stream: Stream, ahead: bool, date: int) -> int:
-        """What a stamp must be newer than."""
+        """The stamp than which the next must be newer."""
         heard = self._heard.get((stream, ahead))
         if heard is not None:
             return heard

@@ -3,17 +3,17 @@
 from dataclasses import dataclass, field
 
 SOME_LOST = 0.02
-"""This share of messages may be lost before anything comes of it."""
+"""Share of messages that may be lost without consequences."""
 
 
 def share_lost(frames: int, lost: int) -> float:
-    """Share of what was sent that did not come, of what came and what is missing."""
+    """Share of the sent messages that were lost, from those received and those missing."""
     return lost / max(1, lost + frames)
 
 
 @dataclass
 class LinkStats:
-    """What a link has seen so far. All but the last four count frames.
+    """Counters of one link. All but the last four count frames.
 
     Attributes:
         frames: Accepted from the vehicle.
@@ -76,7 +76,7 @@ class SequenceTracker:
         return step - 1
 
     def reset(self) -> None:
-        """Start anew, after a reconnect."""
+        """Restart, after a reconnect."""
         self._last = None
 
 
@@ -107,5 +107,5 @@ class FrameCounter:
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
     def reset(self) -> None:
-        """Start anew, after a reconnect."""
+        """Restart, after a reconnect."""
         self._sequence.reset()

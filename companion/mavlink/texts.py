@@ -27,8 +27,8 @@ class StatusText(NamedTuple):
 class TextAssembler:
     """Joins the pieces of long texts. The newest 100 texts are kept in `texts`.
 
-    A text whose end or middle never comes is given as far as it is known when the next one
-    begins. What is told as a text and as an event as well is kept once.
+    An incomplete text is kept as far as it came, once the next one begins. What comes both as a
+    text and as an event is kept once.
     """
 
     def __init__(self) -> None:
@@ -76,5 +76,5 @@ class TextAssembler:
 
 
 def _told(told: deque[StatusText], words: str, now: float) -> bool:
-    """Whether these words are among those of the last second."""
+    """Whether these words came within the last second."""
     return any(one.text == words for one in told if one.time >= now - _SAME_WITHIN_S)

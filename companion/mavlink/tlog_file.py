@@ -18,7 +18,7 @@ _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
 def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
     """The intact frames of these messages, in the order in which they were recorded.
 
-    What was being written when recording broke off is left out.
+    An incomplete record at the end is left out.
 
     Raises:
         LogError: the file cannot be read, or is not a `.tlog`.

@@ -55,7 +55,7 @@ async def gather(
     """Listen for `seconds`, and read the parameters meanwhile.
 
     Args:
-        link: To a vehicle that was heard.
+        link: To a vehicle whose heartbeat was received.
         granted: The message rates that were requested.
         seconds: Time to count messages, s.
         stage: What the vehicle is about to do.
@@ -149,7 +149,7 @@ class PreflightSession:
         self.link = link
 
     async def wait_for_vehicle(self) -> list[Finding]:
-        """Wait for the heartbeat; return findings only if there is nobody to check further."""
+        """Wait for the heartbeat; return findings only if no further check is possible."""
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkTimeout as error:

@@ -1,1 +1,1 @@
-"""What is written down of a flight, and what is computed from it afterwards."""
+"""Recording of a flight, and the measurements computed from it afterwards."""

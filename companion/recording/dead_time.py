@@ -1,4 +1,4 @@
-"""The dead time that a flight showed, beside the one that the planner was told."""
+"""Measured dead time of a flight, compared with the configured one."""
 
 from dataclasses import dataclass, field
 from math import nan
@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 _TOLERATED = 0.3
 """Share of the configured dead time by which the measured one may differ."""
-_DOUBT = 0.008
-"""And it may always differ by this, s: no rate loop is just a lag behind a dead time, so what is
-measured depends on what is flown: by up to 3 ms over a flight, by up to 7 ms over a few seconds."""
+_UNCERTAINTY = 0.008
+"""Difference that is always tolerated, s: no rate loop is exactly a lag with a dead time, so the
+result depends on the maneuver: by up to 3 ms over a flight, by up to 7 ms over a few seconds."""
 
 
 class AxisDeadTime(NamedTuple):
     """One axis; each from a sample to the first effect of its answer, s.
 
     Attributes:
-        measured: None where not enough undisturbed rotation was flown, or the lag is not known.
+        measured: None where the flight had too little undisturbed rotation, or the lag is unknown.
         configured: None where the configuration names none.
     """
 
@@ -24,11 +24,11 @@ class AxisDeadTime(NamedTuple):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether the two differ by more than 30 % of the configured one, and beyond doubt."""
+        """Whether they differ by more than 30 % of the configured one and by more than 8 ms."""
         if self.measured is None or self.configured is None:
             return False
         apart = abs(self.measured - self.configured)
-        return apart > max(_TOLERATED * self.configured, _DOUBT)
+        return apart > max(_TOLERATED * self.configured, _UNCERTAINTY)
 
 
 class SampleAge(NamedTuple):
@@ -43,12 +43,12 @@ class SampleAge(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DeadTimes:
-    """What a flight showed.
+    """Dead times measured in a flight.
 
     Attributes:
         axes: by name: roll, pitch, yaw.
         sample_age: NaN where the vehicle's clock was never compared with ours.
-        lag_known: whether the configuration has the lag that a dead time is told apart from.
+        lag_known: whether the lag is configured: without it no dead time can be measured.
     """
 
     axes: dict[str, AxisDeadTime] = field(
@@ -58,7 +58,7 @@ class DeadTimes:
     lag_known: bool = False
 
     def warning(self) -> str | None:
-        """What is wrong and what to do about it, one sentence; None if nothing is."""
+        """What differs and what to do about it, one sentence; None if nothing does."""
         wrong = [
             f"{name} {1e3 * axis.measured:.0f} ms, not {1e3 * axis.configured:.0f}"
             for name, axis in self.axes.items()

@@ -1,4 +1,4 @@
-"""What flights learned of a vehicle, kept for its next flight: one small file for each vehicle."""
+"""Drag that flights learned, kept for the next flight: one small file per vehicle."""
 
 import json
 from math import isfinite
@@ -11,17 +11,17 @@ from companion.files.write_whole import write_whole
 
 _MOST_BYTES = 10_000
 _MOST_FILES = 1000
-"""Of vehicles in one directory; more are not looked at."""
+"""Most files of vehicles in a directory; with more, none is read."""
 _MOST_LINEAR, _MOST_QUADRATIC = 10.0, 1.0
 """As `guidance.drag_per_s` and `guidance.quadratic_drag_per_m` allow, 1/s and 1/m."""
 
 
 class Learned(NamedTuple):
-    """What is kept of a vehicle.
+    """Learned values of a vehicle.
 
     Attributes:
         drag: of the vehicle.
-        top_speed: up to which it was learned, m/s.
+        top_speed: largest speed at which it was learned, m/s.
         path: of the file.
     """
 
@@ -42,7 +42,7 @@ class LearnedFile:
         self.path = directory / f"learned-{uid}.json"
 
     def load(self) -> tuple[Learned | None, str | None]:
-        """What is kept, and what is to be told if that cannot be read. Never raises."""
+        """The learned values, and a warning if the file cannot be read. Never raises."""
         if not self.path.exists():
             return None, None
         try:
@@ -71,7 +71,7 @@ class LearnedFile:
 
 
 def newest(directory: Path) -> Learned | None:
-    """Of the vehicle that flew last; None where nothing of use is kept. Never raises."""
+    """Learned values of the vehicle that flew last; None where there are none. Never raises."""
     try:
         paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)
         return _parsed(paths[0]) if 0 < len(paths) <= _MOST_FILES else None

@@ -1,4 +1,4 @@
-"""What a person reads after a flight: a table of what was measured."""
+"""The tables of measurements that `companion fly` prints after a flight."""
 
 from math import isnan
 
@@ -11,7 +11,7 @@ from companion.recording.summary import PredictiveFigures, Summary
 
 
 def flight_table(summary: Summary) -> RenderableType:
-    """The table that `companion fly` ends with."""
+    """All tables and notes of a flight."""
     parts: list[RenderableType] = [_verdict(summary)]
     if len(summary.trace.response):
         parts.append(_response(summary))
@@ -65,7 +65,7 @@ def _response(summary: Summary) -> RenderableType:
 
 
 def _dead_times(summary: Summary) -> list[RenderableType]:
-    """How long the vehicle takes to answer, and a warning where it was told otherwise."""
+    """Measured and configured dead times, and a warning where they differ."""
     found = summary.dead_times
     if not found.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
@@ -76,7 +76,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
     age = found.sample_age
     if not isnan(age.p50):
         table.add_row(
-            "of it a sample's age (p50, p99)",
+            "of which sample age (p50, p99)",
             f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms",
             "",
         )
@@ -85,7 +85,9 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
 
 
 def _measured(axis: AxisDeadTime) -> str:
-    return "not enough rotation to tell" if axis.measured is None else _milliseconds(axis.measured)
+    return (
+        "not enough rotation to measure" if axis.measured is None else _milliseconds(axis.measured)
+    )
 
 
 def _milliseconds(value: float | None) -> str:
@@ -105,7 +107,7 @@ def _tracking(summary: Summary) -> RenderableType:
 
 
 def _predictive_words(figures: PredictiveFigures) -> Text:
-    """How predictive control fared."""
+    """Counts and times of predictive control."""
     told = figures.as_dict()
     words = f"predictive control: {figures.flown} answers flown"
     if figures.flown:

@@ -1,4 +1,4 @@
-"""How linear was it: the measured response to acceleration steps against linear models."""
+"""The measured response to acceleration steps, compared with linear models."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ from companion.recording.second_order import (
 )
 
 _TIME_CONSTANT = (0.02, 2.0)
-"""Between what it is searched, s."""
+"""Range in which it is searched, s."""
 _ASKED = 1e-3
-"""An axis on which less than this was asked for was not stepped."""
+"""Smallest target coefficient that counts as a step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +78,9 @@ def _distance(run: StepRun, model: Floats) -> float:
 
 
 def _from_line(step: StepRun) -> float:
-    """Largest distance from the straight line on which a step ought to run.
+    """Largest distance of a step from the straight line to its target.
 
-    It begins where the vehicle was when the target changed, which in wind is not level.
+    The line begins at the attitude when the target changed, which in wind is not level.
     """
     way = step.target[0] - step.measured[0]
     away = step.measured - step.measured[0]

@@ -1,4 +1,4 @@
-"""The steps of a flight, taken apart where it paused between them."""
+"""The steps of a flight, and the second-order model with a dead time that fits them best."""
 
 from dataclasses import dataclass
 from math import exp, log
@@ -24,7 +24,7 @@ class StepRun(NamedTuple):
     Attributes:
         time: (n,), vehicle time, s, rising.
         measured: (n, 2), coefficients north and east.
-        target: (n, 2), those asked for in answer to the sample of that row.
+        target: (n, 2), in force when the sample of that row was answered.
     """
 
     time: Floats
@@ -41,7 +41,7 @@ class StepRun(NamedTuple):
 
 
 def step_runs(rows: Floats) -> list[StepRun]:
-    """The runs in rows (N, 7) of `FlightTrace.response`, but those too short to tell anything."""
+    """The runs in rows (N, 7) of `FlightTrace.response`, without those too short to measure."""
     if len(rows) == 0:
         return []
     parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _GAP) + 1)
@@ -57,13 +57,13 @@ def step_runs(rows: Floats) -> list[StepRun]:
 
 
 _ENOUGH = 600
-"""About so many rows find the model."""
+"""About this many rows are used to find the model."""
 _LAG, _DAMPING, _DEAD_TIME = (0.02, 4.0), (0.2, 10.0), (0.0, 0.5)
-"""Between what 2ζ/ω (s), ζ and the dead time (s) are searched. At ζ = 10 it is first order."""
+"""Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
 _UNANSWERED = 0.03
-"""No vehicle answers sooner, s: until then it moves as it did before the first step."""
+"""Shortest dead time of a vehicle, s: until then it moves as before the first step."""
 _REST = Coefficients(0.0, 0.0)
 
 
@@ -128,7 +128,7 @@ def _fit(unknown: Floats) -> SecondOrderFit:
 
 
 def _start(run: StepRun) -> Floats:
-    """(2, 2), coefficients and their speed (1/s) as measured while nothing was answered yet."""
+    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     since = run.time - run.time[0]
     early = since <= _UNANSWERED
     columns = np.column_stack((np.ones(int(early.sum())), since[early]))

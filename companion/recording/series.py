@@ -1,7 +1,7 @@
-"""Rows of numbers noted in flight: the newest in memory, all of them on the disk.
+"""Rows of numbers recorded in flight: the newest in memory, all of them on the disk.
 
-Memory does not grow with the flight. A file is written by a thread of its own, in large pieces:
-the control loop only hands over what is full, and never waits for the disk.
+Memory does not grow with the flight. A thread of its own writes the files in large chunks: the
+control loop only hands over full chunks, and never waits for the disk.
 """
 
 import errno
@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 _CHUNK_ROWS = 1024
 _MOST_WAITING = 64
-"""Chunks that may wait for a slow disk; what comes then is lost, and counted."""
+"""Most chunks that wait for a slow disk; further ones are lost, and counted."""
 
 
 class SpooledFile:
-    """A nameless file of doubles, made when the first are written; it ends with its owner.
+    """A temporary file of doubles, made at the first write and deleted with its owner.
 
     Args:
         folder: where it is; None: where the system has its temporary files.
@@ -59,7 +59,7 @@ _Work = tuple[SpooledFile, bytes] | threading.Event | None
 
 
 class Spool:
-    """Writes chunks to their files, in a thread that begins with the first and ends with this.
+    """Writes chunks to their files, in a thread that starts with the first chunk.
 
     Args:
         folder: where the files are; None: where the system has its temporary files.
@@ -73,7 +73,7 @@ class Spool:
 
     @property
     def failure(self) -> str | None:
-        """Why something could not be written; from then on nothing is."""
+        """Why a chunk could not be written; nothing is written after that. None: no failure."""
         return self._failures[0] if self._failures else None
 
     def put(self, file: SpooledFile, chunk: bytes) -> bool:
@@ -89,7 +89,7 @@ class Spool:
         return True
 
     def flush(self) -> None:
-        """Wait until all that was put is written."""
+        """Wait until all chunks are written."""
         if self._begun:
             written = threading.Event()
             self._queue.put(written)
@@ -114,11 +114,11 @@ class Series:
     Args:
         columns: their names.
         spool: writes what is not kept in memory.
-        kept: so many of the newest rows are in memory in any case.
+        kept: number of newest rows that are always in memory.
 
     Attributes:
         columns: their names.
-        lost: rows that were not kept, for the disk was full or too slow.
+        lost: rows that were lost because the disk was full or too slow.
     """
 
     def __init__(self, columns: tuple[str, ...], spool: Spool, kept: int = 0) -> None:
@@ -132,19 +132,19 @@ class Series:
         self._put_count = 0
 
     def __len__(self) -> int:
-        """How many rows were ever noted."""
+        """Number of rows recorded so far."""
         return self._put_count + len(self._chunk) // len(self.columns)
 
     def add(self, row: list[float]) -> None:
-        """Note one row; its length is not checked."""
+        """Record one row; its length is not checked."""
         self._chunk.fromlist(row)
         if len(self._chunk) == self._full:
             self._put_away()
 
     def rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, columns), from row `since` of all that were noted on; lost ones are left out.
+        """(N, columns), the rows from number `since` on; lost rows are left out.
 
-        In flight only for as many of the newest as are in memory: else the disk is waited for.
+        In flight ask only for rows that are still in memory: others wait for the disk.
         """
         wanted = max(0, len(self) - since) * len(self.columns)
         parts: list[array[float]] = [self._chunk]

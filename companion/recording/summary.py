@@ -1,4 +1,4 @@
-"""The one record of a finished flight: what `--json` prints and what the log folder keeps."""
+"""Summary of a finished flight: printed by `--json` and kept in the log folder."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from companion.recording.trace import FlightTrace
 
 @dataclass(frozen=True, slots=True)
 class LoopCounts:
-    """What the control loop counted.
+    """Counts of the control loop.
 
     Attributes:
         samples: attitude samples received while control was switched on.
@@ -39,11 +39,11 @@ class LoopCounts:
 
 @dataclass(frozen=True, slots=True)
 class PredictiveFigures:
-    """What came of predictive control.
+    """Counts and times of predictive control.
 
     Attributes:
         flown: answers that were flown.
-        troubles: answers that were not, by why not.
+        troubles: answers that were not flown, by reason.
         seconds: that each flown answer took in the solver's process.
     """
 
@@ -69,12 +69,12 @@ class Summary:
         gain: its p, 1/s.
         counts: what the control loop counted.
         link: frames received, lost, damaged and so on, by name.
-        trace: rows to measure from.
+        trace: recorded rows.
         events: what happened, each with its time in s.
         log: the flight's folder.
-        dead_times: how long the vehicle took to answer.
-        predictive: what came of predictive control; None where it did not fly.
-        realtime: what was asked of the operating system: "granted", or why not.
+        dead_times: measured and configured.
+        predictive: counts of predictive control; None where it did not fly.
+        realtime: each real-time request to the operating system: "granted", or the reason why not.
     """
 
     result: str

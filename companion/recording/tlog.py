@@ -22,7 +22,7 @@ class TlogWriter:
 
     Attributes:
         path: where it writes.
-        dropped: frames that were not written, for too many were waiting or the disk was full.
+        dropped: frames that were not written because too many waited or the disk was full.
         failure: why writing ended early (a full disk, say), or None.
 
     Args:

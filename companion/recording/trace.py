@@ -1,4 +1,4 @@
-"""What control did, sample by sample, kept for the measurements after the flight."""
+"""Record of control, sample by sample, for the measurements after the flight."""
 
 from pathlib import Path
 
@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from companion.attitude import BodyRates, Quaternion, Target
 from companion.recording.series import Series, Spool
 
-_LOOKED_AT = 10_240
-"""So many of the newest rates are looked at in flight: 10 s at 1000 Hz."""
+_KEPT_RATES = 10_240
+"""Number of newest rates that are read in flight: 10 s at 1000 Hz."""
 
 _RESPONSE = ("vehicle_time_s", "q_w", "q_x", "q_y", "q_z", "target_north", "target_east")
 _TRACKING = (
@@ -39,7 +39,7 @@ class FlightTrace:
         tracking: (vehicle time s, reference north, east, down, measured north, east, down).
         rates: (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
             rad/s, thrust 0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while
-            the autopilot obeys us, for all that its heartbeats tell.
+            offboard control is active by its heartbeats.
         latencies_ns: sample in → setpoint out inside this process, ns.
     """
 
@@ -47,11 +47,11 @@ class FlightTrace:
         self._spool = Spool(folder)
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
-        self.rates = Series(_RATES, self._spool, kept=_LOOKED_AT)
+        self.rates = Series(_RATES, self._spool, kept=_KEPT_RATES)
         self.latencies_ns = Series(("latency_ns",), self._spool)
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
-        """Note an attitude sample that was answered during a step."""
+        """Record an attitude sample that was answered during a step."""
         self.response.add([vehicle_time, *q, target.north, target.east])
 
     def add_tracking(
@@ -60,7 +60,7 @@ class FlightTrace:
         reference: tuple[float, float, float],
         measured: tuple[float, float, float],
     ) -> None:
-        """Note where the vehicle ought to be and where it is (NED, m)."""
+        """Record reference and measured position (NED, m)."""
         self.tracking.add([vehicle_time, *reference, *measured])
 
     def add_rates(
@@ -72,11 +72,11 @@ class FlightTrace:
         measured: BodyRates,
         age: float,
     ) -> None:
-        """Note what was answered to a sample, the rates it told, and its age (NaN: unknown)."""
+        """Record the answer to a sample, its measured rates, and its age (NaN: unknown)."""
         self.rates.add([vehicle_time, received, *commanded, thrust, *measured, age])
 
     def add_latency(self, nanoseconds: int) -> None:
-        """Note how long one answer took."""
+        """Record the latency of one answer."""
         self.latencies_ns.add([nanoseconds])
 
     def save(self, folder: Path) -> None:
@@ -94,8 +94,8 @@ class FlightTrace:
                 header = ",".join(series.columns)
                 np.savetxt(folder / name, series.rows(), "%.9g", ",", header=header, comments="")
 
-    def mismatch_warning(self) -> str | None:
-        """What the user is told if rows were lost."""
+    def lost_rows_warning(self) -> str | None:
+        """Warning for the user if rows were lost; None if none were."""
         lost = sum(each.lost for each in (self.response, self.tracking, self.rates))
         if lost == 0:
             return None

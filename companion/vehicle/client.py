@@ -1,4 +1,4 @@
-"""What is asked of the vehicle, and what it answers: messages, commands, parameters, rates."""
+"""Requests to the vehicle: messages, commands, parameters, message rates."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -20,7 +20,7 @@ from companion.vehicle.streams import StreamRate, measure, set_rates
 
 
 class VehicleClient:
-    """The side of a link that asks and listens.
+    """The part of a link that sends requests and subscribes to messages.
 
     Attributes:
         settings: Where the vehicle is and who we are.
@@ -29,8 +29,8 @@ class VehicleClient:
 
     Args:
         settings: As above.
-        outbox: Takes what is to be sent.
-        router: Brings what was heard.
+        outbox: Sends the requests.
+        router: Brings the messages received.
         stats: As above.
         clock: Event-loop time, s.
         vehicle_clock: Tells how old a position is.
@@ -116,10 +116,10 @@ class VehicleClient:
         """Read a parameter of the autopilot.
 
         Raises:
-            NotConnected: It was not heard yet, so its manners are not known.
-            UnansweredParameter: It never answered; some say nothing of names that they have not.
+            NotConnected: No heartbeat yet, so its parameter encoding is unknown.
+            UnansweredParameter: It never answered; some do not answer for unknown names.
             UnknownParameter: It says that it has none of that name.
-            ParameterRefused: It has, and does not tell.
+            ParameterRefused: It has it, and refuses to send it.
             LinkLost: The connection dropped meanwhile.
         """
         return await self._parameters.read(name, timeout_s, retries)
@@ -130,7 +130,7 @@ class VehicleClient:
         """Write a parameter, in its own type, and return what the autopilot then holds.
 
         Raises:
-            NotConnected: It was not heard yet, so its manners are not known.
+            NotConnected: No heartbeat yet, so its parameter encoding is unknown.
             UnknownParameter: It has none of that name.
             ParameterRefused: It cannot hold that value, or keeps another.
             LinkLost: The connection dropped meanwhile.

@@ -195,7 +195,7 @@ class VehicleClock:
         return None
 
     def _ends_lateness(self, stamp: Stamp, quickest: float) -> bool:
-        """Whether the link is quicker again: TIMESYNC told that even the quickest sample was late.
+        """Whether the link is quicker again: by TIMESYNC even the quickest sample was late.
 
         Samples then seem ahead by at most as much as the link was late. What TIMESYNC says after
         the last sample that fitted does not count: the clock may have jumped before it.

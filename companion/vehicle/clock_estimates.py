@@ -14,8 +14,8 @@ differ by less than 0.0002, a simulator that is slower than real time by 0.006 (
 _UNSURE = 0.005
 """By how much a measured rate may be wrong, or change while it is measured."""
 _NO_DRIFT = 0.005
-"""Offsets that rise by more than the drift and this, s, from one note to the next: the samples had
-come late until then. From a backlog of 68 ms at the start (measured on PX4) a rate of 1.4 % would
+"""If the offset rises by more than the drift and this, s, from one note to the next, samples came
+late until then. From a backlog of 68 ms at the start (measured on PX4) a rate of 1.4 % would
 be measured, and samples would seem up to 79 ms old for 40 s."""
 _PERIOD = 1.0
 _LEAST, _MOST = 5, 20
@@ -49,13 +49,13 @@ class ClockRate:
         self._noted: deque[tuple[float, float]] = deque(maxlen=_MOST + 1)
 
     def _restart(self) -> None:
-        """Measure the rate anew: what was noted so far is of late samples."""
+        """Restart the measurement: the noted offsets are of late samples."""
         self._noted.clear()
         self.rate, self._unsure = 0.0, MOST_DRIFT
         self.slowest = -MOST_DRIFT
 
     def spread(self, seconds: float) -> float:
-        """How far apart the slowest and the quickest clock are after so many seconds, s."""
+        """How far apart the slowest and the fastest possible clock are after `seconds`, s."""
         return 2.0 * self._unsure * seconds
 
     def note(self, now: float, offset: float) -> None:
@@ -96,7 +96,7 @@ class _Compared(NamedTuple):
 
 
 class TelemetryDelay:
-    """The delay of the quickest sample, from the best exchange of late.
+    """The delay of the quickest sample, from the best recent exchange.
 
     An exchange's error is half its round trip. It grows with its age, since what the samples tell
     of the clock's rate may be a queue that grows.
@@ -116,7 +116,7 @@ class TelemetryDelay:
         self._odd: _Compared | None = None
 
     def compare(self, now: float, half: float, delay: float) -> float | None:
-        """Take an exchange, unless no lateness explains it.
+        """Take an exchange, unless no delay of the samples explains it.
 
         Args:
             now: s on our clock.

@@ -1,4 +1,4 @@
-"""Keeps one transport open between the endpoint and the two boxes."""
+"""Keeps one transport open between the endpoint, the inbox and the outbox."""
 
 import asyncio
 import logging
@@ -19,13 +19,13 @@ _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
-    Nothing survives a drop: the old transport is closed with what it had not sent yet, a frame
-    cut in two is forgotten, and `dropped` ends whatever waited for an answer.
+    Nothing survives a drop: unsent frames are discarded, an incomplete frame is forgotten, and
+    `dropped` ends all waiting for answers.
 
     Args:
-        endpoint: Where to.
+        endpoint: Where the vehicle is.
         inbox: Takes what arrives.
-        outbox: Sends over the transport that is open, or drops what it is given.
+        outbox: Sends over the open transport, or drops frames.
         stats: Counts the reconnects.
         dropped: Called with the reason of each drop.
         opener: Opens the transport.
@@ -54,7 +54,7 @@ class Connection:
         """Open the transport.
 
         Raises:
-            EndpointError: With the reason and how to mend it.
+            EndpointError: With the reason and what to do.
         """
         # Before the transport is there: its first bytes may come before we run again.
         self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))

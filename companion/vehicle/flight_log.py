@@ -1,4 +1,4 @@
-"""What a recorded flight tells of how the vehicle answers, all of it in vehicle time."""
+"""Setpoints, rates and thrust of a recorded flight, in vehicle time, from a `.tlog`."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -19,9 +19,9 @@ _WHAT_COUNTS = IGNORE_ATTITUDE | 0b1100111
 """Of a type mask: quaternion, three rates, throttle, and the body thrust that may replace it."""
 _STANDARD_GRAVITY = 9.80665
 _RECENT = 500
-"""A setpoint that echoes the stamp of a sample echoes one of the latest so many."""
+"""Number of newest samples whose stamp a setpoint may echo."""
 _ONE_CLOCK = 1.0
-"""An accelerometer's stamp that is further than this from the attitude's is of another clock, s."""
+"""An accelerometer stamp further than this from the attitude's is of another clock, s."""
 _NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",
@@ -53,7 +53,7 @@ def read_flight_log(path: Path) -> FlightLog:
 
     A setpoint that carries the stamp of a recent sample answers that sample, as ours do; any other
     is taken to answer the latest sample recorded before it. It counts where the heartbeats before
-    and after it say that the vehicle is armed and obeys rates, in the words of its family.
+    and after it say that the vehicle is armed and obeys rates.
 
     Raises:
         LogError: the file cannot be read, is not a `.tlog`, or holds no heartbeat of an autopilot
@@ -69,7 +69,7 @@ def read_flight_log(path: Path) -> FlightLog:
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
             "armed, in the mode that obeys it"
         )
-    # Both kinds tell the same rates; together they would count twice.
+    # Both messages carry the same rates; together they would count twice.
     return FlightLog(
         reader.offboard_active,
         max(reader.quaternion, reader.euler, key=len),
@@ -84,8 +84,8 @@ class _Reader:
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
         offboard_active: rows of setpoints.
-        quaternion: rows of rates told by ATTITUDE_QUATERNION.
-        euler: those told by ATTITUDE.
+        quaternion: rows of rates from ATTITUDE_QUATERNION.
+        euler: rows of rates from ATTITUDE.
         specific_thrust: rows of the accelerometer.
     """
 
@@ -94,7 +94,7 @@ class _Reader:
     quaternion: list[Row] = field(default_factory=list)
     euler: list[Row] = field(default_factory=list)
     specific_thrust: list[Row] = field(default_factory=list)
-    _family: Autopilot | None = None
+    _autopilot: Autopilot | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)
     _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -111,12 +111,12 @@ class _Reader:
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         if self.vehicle is None and heartbeat.autopilot in _AUTOPILOTS:
-            self.vehicle, self._family = source, _AUTOPILOTS[heartbeat.autopilot]
-        if source != self.vehicle or self._family is None:
+            self.vehicle, self._autopilot = source, _AUTOPILOTS[heartbeat.autopilot]
+        if source != self.vehicle or self._autopilot is None:
             return
-        mode = self._family.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
+        mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
         armed = bool(heartbeat.base_mode & _ARMED)
-        obeying = armed and Role.OFFBOARD in self._family.roles(mode)
+        obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
         if obeying and self._obeying:
             self.offboard_active.extend(self._unconfirmed)
         self._unconfirmed.clear()

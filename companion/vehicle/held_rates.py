@@ -1,15 +1,15 @@
-"""How long the vehicle holds each of our setpoints: what the rate of our answers really is."""
+"""The effective rate of our setpoints, from how long the vehicle holds each of them."""
 
 _UNEVEN = 2.0
-"""A setpoint is held for half an interval on average; where intervals are so uneven that it is held
-for as long as at half the rate, the rate counts as lower."""
+"""Uneven intervals hold setpoints longer on average than even ones. If they hold them longer than
+even intervals of half the rate would, the rate counts as lower."""
 
 
 class HeldRates:
-    """Sums over the intervals between answers, without gaps.
+    """Sums over the intervals between consecutive answers.
 
     Attributes:
-        intervals: How many.
+        intervals: Their number.
         seconds: Their sum.
         squares: Sum of their squares, s².
     """
@@ -32,8 +32,8 @@ class HeldRates:
     def rate_since(self, before: "HeldRates") -> float | None:
         """Answers a second since `before`, Hz, or None where nothing was answered in a row.
 
-        Samples that come in bursts are no better than the pauses between them: intervals g count
-        as a rate of Σg/Σg² at most, twice over.
+        Samples in bursts are worth no more than the pauses between them: for intervals g the rate
+        is at most 2·Σg/Σg².
         """
         intervals = self.intervals - before.intervals
         seconds, squares = self.seconds - before.seconds, self.squares - before.squares

@@ -1,4 +1,4 @@
-"""One vehicle, one connection: everything the rest of the program says and hears goes here."""
+"""The link to one vehicle: everything the program sends and receives passes here."""
 
 import asyncio
 import logging
@@ -39,21 +39,21 @@ _LOG = logging.getLogger(__name__)
 class Link(VehicleClient):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
-    It sends a heartbeat, keeps the clocks compared and opens a dropped connection again. It never
-    repeats a setpoint: each one leaves because `send_setpoint` was called.
+    It sends heartbeats and clock requests, and reopens a dropped connection. It never repeats a
+    setpoint: each one is sent by one call of `send_setpoint`.
 
     Args:
         settings: Where the vehicle is and who we are.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
         opener: Opens the transport.
-        notice: Told, once each, of what keeps the two sides from understanding each other; by
-            default the log.
+        notice: Told once of each reason why the two sides do not understand each other; by default
+            the log.
 
     Attributes:
         stats: Counters.
         state: What is known of the vehicle.
         clock: The vehicle's: how old a sample is, and whether the clock jumped or restarted.
-        timesync: Round trip.
+        timesync: Round trip and jitter.
 
     Raises:
         EndpointError: The endpoint's notation is wrong.
@@ -124,8 +124,8 @@ class Link(VehicleClient):
         """Wait for the autopilot's heartbeat; return the newest at once if there was one.
 
         Raises:
-            LinkTimeout: None came; the message says what did come.
-            UnsupportedAutopilot: It is none that we can fly.
+            LinkTimeout: None came; the message says what came instead.
+            UnsupportedAutopilot: We cannot fly it.
         """
         with Pending[None](self._registry) as heard:
             unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
@@ -151,7 +151,7 @@ class Link(VehicleClient):
 
     @property
     def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample inside the read callback; what it raises is reported."""
+        """Called with each attitude sample inside the read callback; exceptions are reported."""
         return self._inbox.on_attitude
 
     @on_attitude.setter
@@ -160,7 +160,7 @@ class Link(VehicleClient):
 
     @property
     def on_foreign(self) -> Callable[[Frame], None] | None:
-        """Called with each frame of others than the autopilot; nothing else is done with them."""
+        """Called with each frame that is not the autopilot's; those are used for nothing else."""
         return self._inbox.on_foreign
 
     @on_foreign.setter
@@ -179,7 +179,7 @@ class Link(VehicleClient):
     def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send body rates and thrust, once and now. It never blocks.
 
-        In lockstep a setpoint that answers the open step closes it, and so leaves last.
+        In lockstep a setpoint that answers the open step closes it, and is sent last.
 
         Args:
             time_boot_ms: The stamp of the sample it answers, ms.
@@ -187,7 +187,7 @@ class Link(VehicleClient):
             thrust: Collective thrust, 0..1.
 
         Returns:
-            Whether it left; false if the connection is down or the kernel does not take it.
+            Whether it was sent; false if the connection is down or the kernel does not accept it.
 
         Raises:
             InvalidSetpoint: Not finite or out of range (`NonFiniteSetpoint`); nothing was sent.
@@ -209,7 +209,7 @@ class Link(VehicleClient):
         self._tasks.append(task)
 
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
-        # A vehicle that waits to be spoken to (udpout, TCP) hears us by this.
+        # A vehicle that waits for our first message (udpout, TCP) gets this one.
         send_heartbeat(self.settings, self._outbox)
         try:
             async with asyncio.timeout(self.settings.first_beacon_timeout_s):

@@ -25,9 +25,9 @@ class ModeState:
     Attributes:
         heartbeat: See `Heartbeat`.
         current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
-        heartbeat_is_newest: Whether HEARTBEAT told the mode last; its arming is then as new.
+        heartbeat_is_newest: Whether HEARTBEAT was the last of the two; its arming is then as new.
         armings: How often the vehicle was seen to become armed.
-        autopilot: How to command it, once its first heartbeat was heard.
+        autopilot: How to command it, known from its first heartbeat.
         unsupported: The error to raise if we cannot fly it.
     """
 

@@ -19,7 +19,7 @@ from companion.vehicle.clock_estimates import LIFETIME
 _MAV_AUTOPILOT_INVALID = 8
 _MAV_STATE_ACTIVE = 4
 _MAVLINK_VERSION = 3
-_QUICK_REQUESTS, _QUICK_PERIOD_S = 10, 0.1  # a good clock offset within the first second
+_QUICK_REQUESTS, _QUICK_PERIOD_S = 10, 0.1  # for a good clock offset within the first second
 _PERIOD_S = 1.0
 _WINDOW = 16
 _NS = 1e-9
@@ -40,7 +40,7 @@ def send_heartbeat(settings: LinkSettings, outbox: Outbox) -> None:
 
 
 async def send_heartbeats(settings: LinkSettings, outbox: Outbox) -> None:
-    """Send heartbeats until cancelled. They keep nothing alive but our presence."""
+    """Send heartbeats until cancelled. No setpoint depends on them."""
     while True:
         send_heartbeat(settings, outbox)
         await asyncio.sleep(1.0 / settings.heartbeat_rate_hz)
@@ -75,12 +75,12 @@ class TimeSync:
 
     @property
     def round_trip_s(self) -> float | None:
-        """The shortest round trip of late, s; `None` where none was answered of late."""
+        """The shortest recent round trip, s; `None` if none was answered recently."""
         return min(self._round_trips(), default=None)
 
     @property
     def jitter_s(self) -> float | None:
-        """By how much the round trips of late differ, s; `None` where none was answered."""
+        """How far recent round trips differ, s; `None` if none was answered."""
         trips = self._round_trips()
         return max(trips) - min(trips) if trips else None
 
@@ -91,7 +91,7 @@ class TimeSync:
         self._outbox.message(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
 
     def reset(self) -> None:
-        """Forget all, after a reconnect: the vehicle may have started anew."""
+        """Forget all, after a reconnect: the vehicle may have restarted."""
         self._asked.clear()
         self._exchanges.clear()
 
@@ -99,7 +99,7 @@ class TimeSync:
         now = self._now_ns()
         if message.tc1 == 0:
             self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
-        elif message.ts1 in self._asked:  # anything else answers another station
+        elif message.ts1 in self._asked:  # else it answers another station
             self._asked.remove(message.ts1)
             self._exchanges.append(_Exchange((now - message.ts1) * _NS, now * _NS))
             self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
@@ -144,7 +144,7 @@ def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
 
 
 def _refused(start: str, stats: LinkStats) -> str | None:
-    """What came instead and was refused, `None` if nothing was."""
+    """What came instead and was refused; `None`: nothing."""
     if stats.unclaimed:
         return (
             f"{start}, but {stats.unclaimed} other frames with its ids; no sender is taken for the "

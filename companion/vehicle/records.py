@@ -1,4 +1,4 @@
-"""The records that the vehicle's telemetry becomes; each stamped with its time of arrival."""
+"""Records of the vehicle's telemetry, each with its time of arrival."""
 
 from typing import NamedTuple
 
@@ -8,11 +8,11 @@ from companion.vehicle.clock_jumps import Misfit
 Vector = tuple[float, float, float]
 
 _LASTS = 5.0
-"""What is told once a second or more often, and was not for so long, s, is not known any more."""
+"""Telemetry that comes at 1 Hz or faster counts as unknown after this time without it, s."""
 
 
 def outdated(received: float, now: float) -> bool:
-    """Whether a status that came at `received` does not count any more; both in s of our clock."""
+    """Whether a status from `received` is too old at `now` to count; both in s of our clock."""
     return now - received > _LASTS
 
 
@@ -55,7 +55,7 @@ class Heartbeat(NamedTuple):
         received: Event-loop time, s.
         autopilot: MAV_AUTOPILOT.
         vehicle_type: MAV_TYPE.
-        mode: The mode's name in the words of its family.
+        mode: The autopilot's name for the mode.
         custom_mode: The same as a number.
         armed: Motors may turn.
         system_status: MAV_STATE: 3 standby, 4 active, 5 critical (failsafe).
@@ -75,8 +75,8 @@ class CurrentMode(NamedTuple):
 
     Attributes:
         received: Event-loop time, s.
-        mode: The mode's name in the words of its family.
-        intended: The mode that its user asked for last; differs where a failsafe acts.
+        mode: The autopilot's name for the mode.
+        intended: The mode that the user commanded last; differs while a failsafe acts.
     """
 
     received: float
@@ -141,7 +141,7 @@ class Battery(NamedTuple):
 
 
 class AttitudeTargetThrust(NamedTuple):
-    """ATTITUDE_TARGET: what the autopilot's attitude and rate control are told, by whomever.
+    """ATTITUDE_TARGET: the setpoint of the autopilot's attitude and rate control, from any source.
 
     Attributes:
         received: Event-loop time, s.
@@ -170,7 +170,7 @@ class Gps(NamedTuple):
     Attributes:
         received: Event-loop time, s.
         fix_type: GPS_FIX_TYPE; 3 or more is a 3D fix.
-        satellites: Number in use, `None` if not known.
+        satellites: Number in use; `None`: unknown.
         altitude_m: Above mean sea level, m.
     """
 
@@ -181,7 +181,7 @@ class Gps(NamedTuple):
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
-    """What is wrong, at `now` in s of our clock, with a GPS that had a 3D fix before."""
+    """What is wrong at `now`, s of our clock, with a GPS that had a 3D fix; `None`: nothing."""
     if gps is None or outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None

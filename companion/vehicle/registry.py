@@ -1,4 +1,4 @@
-"""The families that this program flies."""
+"""The autopilots that this program flies."""
 
 from collections.abc import Callable
 
@@ -22,11 +22,11 @@ MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
 
 
 def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
-    """The family of a heartbeat's `autopilot` (`mav_autopilot` here) and `type`.
+    """The autopilot of a heartbeat, by its `autopilot` and `type` fields.
 
     Raises:
-        UnsupportedAutopilot: None of ours, or no multirotor: the same mode numbers mean something
-            else to a plane.
+        UnsupportedAutopilot: We do not fly it, or it is no multirotor: on a plane the same mode
+            numbers mean something else.
     """
     if vehicle_type not in MULTIROTORS:
         raise UnsupportedAutopilot(
@@ -42,7 +42,7 @@ def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
 
 
 def read_events(router: Router, texts: TextAssembler, clock: Callable[[], float]) -> None:
-    """Turn the events that PX4 sends where it sends no STATUSTEXT into texts.
+    """Turn PX4's events into texts; on some links it sends them instead of STATUSTEXT.
 
     Args:
         router: brings EVENT.

@@ -1,4 +1,4 @@
-"""Asking for message rates, and counting what really comes."""
+"""Requests message rates, and counts what really comes."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -16,11 +16,11 @@ _TIMEOUT_S = 1.0
 _RETRIES = 3
 _DENIED = 2
 _HALVINGS = 3
-_ROUNDING = 1e-6  # 1e6 / 333.333… is not to lose a whole step
+_ROUNDING = 1e-6  # so that 1e6 / 333.333… does not lose a whole step
 
 
 class StreamRate(NamedTuple):
-    """What was asked for and what came, in Hz.
+    """A message's rate as requested, granted and counted, Hz.
 
     Attributes:
         asked: Requested rate; 0 asked the autopilot to stop sending it.
@@ -45,8 +45,8 @@ async def set_rates(
 ) -> dict[str, StreamRate]:
     """Request an interval for each message, then count for `window_s` seconds.
 
-    A rate that is denied is halved until it is granted: ArduPilot denies what is above its loop
-    rate, and keeps the rate it had.
+    A denied rate is halved until it is granted: ArduPilot denies rates above its loop rate, and
+    keeps the rate it had.
 
     Args:
         commands: Sends the requests.

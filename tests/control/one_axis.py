@@ -1,4 +1,4 @@
-"""The loop that guidance closes, on one axis: our own code around a vehicle of four lines.
+"""The closed position loop on one axis: our own code around a simple simulated vehicle.
 
 The vehicle rolls as it is told after a dead time and a lag, and is pulled east by its tilt. What
 the program believes of it is the configuration's; what it is may differ.
@@ -20,11 +20,11 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 
 DT = 0.004
 _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
-"""Steps between commands, between positions, and how late these come: 50 Hz, 12 ms."""
+"""Steps between commands, between positions, and delay of positions: 50 Hz, 50 Hz, 12 ms."""
 
 
 class Airframe(NamedTuple):
-    """What the vehicle really is: s, s, 1/s; `strength` multiplies what its tilt gives."""
+    """The true vehicle: s, s, 1/s; `strength` multiplies the acceleration by tilt."""
 
     lag: float
     dead_time: float
@@ -79,6 +79,6 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
 
 
 def settled(places: np.ndarray, off: float) -> bool:
-    """Whether it has come to rest, but for a tenth: nothing swings on, nothing grows."""
+    """Whether the last quarter stays within a tenth of `off`: no oscillation, no divergence."""
     last = len(places) // 4
     return bool(np.isfinite(places).all() and np.abs(places[-last:]).max() < 0.1 * off)

@@ -1,4 +1,4 @@
-"""The way of one sample: what is answered, what is not, and why."""
+"""The path of one sample: which samples are answered, which are not, and why."""
 
 import math
 from time import perf_counter_ns
@@ -23,7 +23,7 @@ LIMITS = Limits(0.6, 1.5, 1.0)
 
 
 class Bench:
-    """A loop with its setpoints caught, and samples every 4 ms."""
+    """A control loop that collects its setpoints, and samples every 4 ms."""
 
     def __init__(self, planner=None, send=None):
         self.sent, self.clock = [], VehicleClock()
@@ -55,7 +55,7 @@ class Bench:
         self.loop.command = GuidanceCommand(TARGET, 0.0, self.time)._replace(**changes)
 
     def sample(self, vehicle_time=None, q=LEVEL, late=0.0, lead=0):
-        """One sample; `vehicle_time` is ours less 7 s unless told otherwise."""
+        """One sample; `vehicle_time` defaults to our time minus 7 s."""
         stamp = self.time - 7.0 if vehicle_time is None else vehicle_time
         stamp_ms, received = round(stamp * 1000), self.time + late
         reading = self.clock.take(stamp_ms, received)
@@ -91,7 +91,7 @@ def test_every_fresh_sample_gets_one_answer_with_its_own_stamp():
 
 
 def test_a_process_that_is_stopped_while_it_answers_does_not_send():
-    """Measured on ArduPilot: stopped for 3 s, thawed, and one setpoint left 1 ms later."""
+    """Measured on ArduPilot: stopped for 3 s, continued, and one setpoint left 1 ms later."""
     planner, away = make_planner("first-order", limits=LIMITS), 0.0
 
     def rates(*arguments):
@@ -162,7 +162,7 @@ def test_a_sample_that_was_long_under_way_is_not_answered():
     ],
 )
 def test_an_unusable_attitude_is_refused_and_counted(q, rates):
-    """Whether the planner was to answer it or guidance asks for rates."""
+    """With the planner and with body rates from guidance."""
     bench = Bench()
     for _ in range(3):
         bench.time += 0.004
@@ -193,7 +193,7 @@ def test_idle_sends_neither_rates_nor_thrust():
 
 @pytest.mark.parametrize("what", ["offboard_active", "taking_over"])
 def test_after_a_gap_it_waits_for_the_mode(what):
-    """The autopilot may obey us from the moment it is asked to, before it says that it does."""
+    """The autopilot may obey us before it reports the mode."""
     bench = Bench()
     setattr(bench.loop, what, True)
     bench.run(10)
@@ -312,7 +312,7 @@ ASKED = BodyRates(0.3, -0.4, 0.5)
 
 
 class CountingPlanner:
-    """Asks for nothing, and counts how often it was asked and told to begin anew."""
+    """Returns zero rates; counts its calls and resets."""
 
     def __init__(self):
         self.resets = self.asked = 0
@@ -388,7 +388,7 @@ def test_the_step_after_a_gap_is_as_long_as_the_one_before_it():
 
 
 def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
-    """By the time of the sample itself, not by when it came: it came 10 ms late."""
+    """The sample's own time counts, not its arrival: it arrived 10 ms late."""
     asked = []
     planner = SimpleNamespace(
         rates=lambda q, target, dt, rates: asked.append(target.north) or BodyRates(0.0, 0.0, 0.0),
@@ -407,7 +407,7 @@ def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
 
 
 class NotingPlanner:
-    """What the loop passes on of ATTITUDE_TARGET: heading in rad, age in s."""
+    """Records each ATTITUDE_TARGET that the loop passes on: heading in rad, age in s."""
 
     def __init__(self):
         self.noted = []
@@ -443,7 +443,7 @@ def test_the_attitude_target_is_passed_on_once_with_its_age_at_the_sample():
 
 
 def test_after_a_jump_of_the_heading_the_target_is_told_without_it():
-    """What was told before the jump may be in either frame, and is passed over."""
+    """An ATTITUDE_TARGET from before the jump may be in either frame and is ignored."""
     bench = Bench(planner := NotingPlanner())
     told = None
     bench.loop.planner.attitude_target = lambda: told

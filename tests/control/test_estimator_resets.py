@@ -1,4 +1,4 @@
-"""Jumps of the estimate: found where nothing explains them, and not chased."""
+"""Estimator resets: unexplained jumps are found, and the vehicle does not follow them."""
 
 from math import atan2, cos, radians, sin
 

@@ -1,4 +1,4 @@
-"""On the ground or not: by more than the autopilot's flag."""
+"""Ground contact is judged by more than the autopilot's flag."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ from companion.vehicle.records import LocalPosition
 
 
 class Vehicle:
-    """What the vehicle tells, its clock set by hand."""
+    """Telemetry of a vehicle, with a clock set by hand."""
 
     def __init__(self):
         self.now = 10.0

@@ -1,4 +1,4 @@
-"""What guidance leaves with the control loop while a maneuver steers by rates."""
+"""The commands of the guidance loop while a maneuver commands body rates."""
 
 from math import cos, radians, sin
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ HERE = (3.0, 4.0, -5.0)
 
 
 class HoverSpy:
-    """Counts what it is told."""
+    """Counts its calls."""
 
     smallest, largest, largest_tilted = 2.0, 18.0, 18.0
 
@@ -37,12 +37,12 @@ class HoverSpy:
     def pause(self):
         self.paused += 1
 
-    def stand(self):
-        """The vehicle stands: there is nothing to learn."""
+    def on_ground(self):
+        """Ignore it."""
 
 
 class Bench:
-    """A guide that flies the doublets, its clock set by hand."""
+    """A guidance loop that flies the doublets, with a clock set by hand."""
 
     def __init__(self):
         self.now, self.clock = 10.0, VehicleClock()
@@ -69,7 +69,7 @@ class Bench:
         self.guidance_loop.follow(DOUBLETS)
 
     def fly(self, after, position=HERE, tilt=0.0):
-        """One step of guidance `after` s of the maneuver, there and so far rolled over."""
+        """One step of guidance, `after` s into the maneuver, at a position and roll angle (°)."""
         self.now = 10.0 + after
         self.state.position = LocalPosition(self.now, self.now, position, (0.0, 0.0, 0.0))
         half = 0.5 * radians(tilt)
@@ -115,7 +115,7 @@ def test_on_the_way_back_from_a_doublet_the_vehicle_is_not_off_its_course():
 
 
 def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
-    """A compass or GPS that settles before take-off tells where the vehicle really stands."""
+    """A compass or GPS that settles before take-off improves the estimate: no reset to hide."""
     bench = Bench()
     bench.loop.resets.turn, bench.loop.resets.shift = 0.5, (3.0, 0.0, 0.0)
     bench.ground.standing = True

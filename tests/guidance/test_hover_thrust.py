@@ -138,7 +138,7 @@ def test_after_a_lie_the_truth_is_learned():
 
 def test_nothing_is_learned_across_a_pause_a_gap_or_the_ground():
     thrust = HoverThrust(SETTINGS)
-    for interruption in (thrust.pause, thrust.stand):
+    for interruption in (thrust.pause, thrust.on_ground):
         thrust.observe(0.0, 0.0)
         thrust.sent(0.9, LEVEL)
         interruption()
@@ -215,7 +215,7 @@ def test_the_battery_is_made_up_for_at_once():
     assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
     assert thrust.learned == 0.5
     assert thrust.largest == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
-    thrust.stand()
+    thrust.on_ground()
     assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
 
 

@@ -148,20 +148,20 @@ def test_half_the_gain_is_refused():
 
 def test_a_dead_time_past_what_is_searched_is_refused():
     found = fit_rate_response(*fly(Doublets((0.5,), 1.0), 0.03, 0.6))
-    assert "dead time stands at the edge" in found.reason()
+    assert "dead time is at the edge" in found.reason()
 
 
 def test_a_response_that_comes_before_its_command_is_refused():
     times, commanded, _, rates = fly(QUICK, 0.03, 0.0)
     found = fit_rate_response(times, commanded, times - 0.05, rates)
-    assert "dead time stands at the edge" in found.reason()
+    assert "dead time is at the edge" in found.reason()
 
 
 def test_too_few_samples_and_too_much_doubt_are_refused():
     found = fit_rate_response(*fly(QUICK, 0.03, 0.04))
     few = replace(found, fit=replace(found.fit, excited=19))
     doubtful = replace(found, fit=replace(found.fit, lag_error=0.0081))
-    assert few.reason() == "too little excitation: 19 samples tell of the response, 20 are needed"
+    assert few.reason() == "too little excitation: 19 samples show the response, 20 are needed"
     assert doubtful.reason() == "lag and dead time are uncertain by 8.1 ms"
 
 

@@ -67,8 +67,8 @@ def test_the_reasons_of_unanswered_samples_stand_below_it():
 def test_dead_times_stand_beside_what_was_configured():
     lines = table(FlightTrace())
     assert cells(lines, "roll") == ["42 ms", "40 ms"]
-    assert cells(lines, "yaw") == ["not enough rotation to tell", "102 ms"]
-    assert cells(lines, "of it a sample's age (p50, p99)")[0] == "2.1, 4.8 ms"
+    assert cells(lines, "yaw") == ["not enough rotation to measure", "102 ms"]
+    assert cells(lines, "of which sample age (p50, p99)")[0] == "2.1, 4.8 ms"
     assert "not as configured" not in " ".join(lines)
 
 

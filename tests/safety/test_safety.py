@@ -1,4 +1,4 @@
-"""The safety ladder: every monitor by its own breach, how long it must last, and what follows."""
+"""The safety ladder: each monitor's breach, how long it must last, and the action."""
 
 from math import cos, inf, radians, sin
 from types import SimpleNamespace
@@ -124,7 +124,7 @@ BREACHES = [
 
 
 class Climb:
-    """A ladder, looked at every 20 ms, that keeps what it tells."""
+    """A ladder, stepped every 20 ms, that keeps its messages."""
 
     def __init__(self, config=CONFIG, table=None):
         self.told = []
@@ -133,7 +133,7 @@ class Climb:
         self.ladder.note = self.told.append
 
     def see(self, snapshot, seconds):
-        """The first verdict within so long, and after how many seconds it came."""
+        """The first verdict within `seconds`, and the time until it came, s."""
         for step in range(round(seconds / 0.02) + 1):
             verdict = self.ladder.step(snapshot._replace(now=self.now))
             self.now += 0.02
@@ -143,7 +143,7 @@ class Climb:
 
 
 def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
-    """A look comes every 20 ms, and one that is late by less than 10 ms is none."""
+    """`listen` is called every 20 ms; a call that is less than 10 ms late is no stall."""
     state = SimpleNamespace(reset_counter=None, positions=0)
     link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
     resets = SimpleNamespace(on_counter=lambda *_: None)

@@ -2,8 +2,8 @@
 
 A header names the columns: Agilicious' `t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,…,a_lin_x,…` or
 `t,x,y,z,yaw,vx,vy,vz,ax,ay,az` and their like; in s, m and rad, quaternions w first. Time and
-position must be there; velocity, acceleration beside velocity, and yaw or else a quaternion are
-used if they are; what else stands there is not.
+position are required. Velocity, acceleration (with velocity), and yaw or else a quaternion are used
+if present; other columns are ignored.
 """
 
 import csv
@@ -47,7 +47,7 @@ _MOST_BYTES = 20_000_000
 """Of a file: `_MOST` samples of twenty columns with all their digits."""
 
 _LEAST_STEP, _LONGEST_STEP = 1e-4, 10.0
-"""Between two samples, s. Nearer ones differ by rounding; farther ones tell nothing of the way."""
+"""Shortest and longest time between two samples, s."""
 
 _SHORTEST = 0.1
 """The whole file, s."""
@@ -63,7 +63,7 @@ _RANGES = {
 """Largest number of each quantity, and its unit."""
 
 _LENGTH_ERROR = 0.1
-"""Of a quaternion, which is rounded in a file."""
+"""Largest error of a quaternion's length: files round it."""
 
 _SHOWN = 60
 """Characters of the file in a message."""
@@ -179,12 +179,12 @@ def _numbers(
 
 
 def _shown(text: str) -> str:
-    """As much of what stands in the file as a sentence can hold."""
+    """Text of the file, shortened for a message."""
     return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
 
 
 def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
-    """See that time rises, by steps that mean something."""
+    """Check that time increases by steps within their range."""
     steps = np.diff(times)
     wrong = np.flatnonzero(~((steps >= 0.999 * _LEAST_STEP) & (steps <= _LONGEST_STEP)))
     if wrong.size:
@@ -202,7 +202,7 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
 def _require_range(
     group: str, values: Floats, names: tuple[str, ...], lines: Sequence[int], name: str
 ) -> None:
-    """See that a quantity is one that a vehicle can have."""
+    """Check that a quantity is within its range."""
     most, unit = _RANGES[group]
     outside = np.argwhere(~(np.abs(values) <= most))
     if outside.size:

@@ -1,4 +1,4 @@
-"""Curves in space, over a phase that knows no time, with three exact derivatives.
+"""Curves in space over a phase, with three exact derivatives.
 
 Each begins at (0, 0, 0). Angles are radians, lengths metres, the frame is NED.
 """
@@ -20,12 +20,12 @@ class CurvePoint(NamedTuple):
 
 
 class Looks(NamedTuple):
-    """Where to look at a curve so that nothing is missed between two looks.
+    """Phases at which to check a curve, so that no extreme between two of them is missed.
 
     Attributes:
-        step: phase between two looks; None where `phases` lists them.
-        period: after this phase it repeats itself, but for a steady rise; None: it does not.
-        phases: of the looks, ascending.
+        step: phase between two checks; None where `phases` lists them.
+        period: phase after which it repeats, apart from a steady rise; None: it does not.
+        phases: of the checks, ascending.
     """
 
     step: float | None
@@ -34,20 +34,20 @@ class Looks(NamedTuple):
 
 
 PATH_STEP = 0.25
-"""Largest way between two looks, m."""
+"""Longest path between two checks, m."""
 
 MOST_LOOKS = 80_000
-"""Looks at one trajectory, about a second of work."""
+"""Most checks of one trajectory, about a second of work."""
 
 _LOOKS_A_LAP = 720
 """An extreme of the k-th harmonic is then missed by 0.001 k² % at most."""
 
 
 def require_looks(needed: float) -> None:
-    """See that a trajectory can be judged with a bounded number of looks.
+    """Check that a trajectory can be checked with a bounded number of samples.
 
     Raises:
-        TrajectoryError: it cannot.
+        TrajectoryError: it takes more than MOST_LOOKS.
     """
     if not needed <= MOST_LOOKS:
         raise TrajectoryError(
@@ -68,12 +68,12 @@ class Curve(Protocol):
         ...
 
     def looks(self) -> Looks:
-        """How finely it is to be looked at."""
+        """The phases at which to check it."""
         ...
 
 
 class Figure(Curve, Protocol):
-    """A curve of which is known how far it goes per phase."""
+    """A curve with a known largest speed per phase."""
 
     @property
     def steepest(self) -> float:
@@ -92,7 +92,7 @@ class Straight:
     direction: Vector
 
     def looks(self) -> Looks:
-        """The phase is the way."""
+        """Checks at equal distances."""
         return Looks(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
@@ -116,11 +116,11 @@ class Helix:
 
     @property
     def steepest(self) -> float:
-        """The same everywhere."""
+        """Length of the first derivative, m per rad; constant."""
         return hypot(self.radius, self.rise / tau)
 
     def looks(self) -> Looks:
-        """The same in each lap."""
+        """Checks of one lap; all laps are alike."""
         return _looks_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -142,11 +142,11 @@ class GeronoEight:
 
     @property
     def steepest(self) -> float:
-        """In the middle."""
+        """Largest length of the first derivative, m per rad: in the middle."""
         return sqrt(2.0) * self.half_width
 
     def looks(self) -> Looks:
-        """The same in each lap."""
+        """Checks of one lap; all laps are alike."""
         return _looks_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -171,11 +171,11 @@ class BernoulliEight:
 
     @property
     def steepest(self) -> float:
-        """At the tips; in the middle it is 1/√2 of this."""
+        """Largest length of the first derivative, m per rad: at the tips."""
         return self.half_width
 
     def looks(self) -> Looks:
-        """The same in each lap."""
+        """Checks of one lap; all laps are alike."""
         return _looks_of(self)
 
     def at(self, phase: float) -> CurvePoint:
@@ -202,11 +202,11 @@ class Turned:
 
     @property
     def steepest(self) -> float:
-        """That of the figure."""
+        """`steepest` of the figure."""
         return self.figure.steepest
 
     def looks(self) -> Looks:
-        """Those of the figure."""
+        """Checks of the figure."""
         return self.figure.looks()
 
     def at(self, phase: float) -> CurvePoint:
@@ -220,7 +220,7 @@ _Jet = tuple[float, float, float, float]
 
 
 def _quotient(above: _Jet, below: _Jet) -> _Jet:
-    """Of a quotient q = above/below, by Leibniz' rule for above = q·below."""
+    """Derivatives of a quotient q = above/below, by Leibniz' rule for above = q·below."""
     d0, d1, d2, d3 = below
     q0 = above[0] / d0
     q1 = (above[1] - q0 * d1) / d0

@@ -1,4 +1,4 @@
-"""What a trajectory demands of the vehicle: tilt, rates, thrust, speeds, room."""
+"""What a trajectory demands of the vehicle: tilt, rates and thrust."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Motion:
     heading_rate: Floats
 
     def slowed(self, factor: float) -> "Motion":
-        """Of the trajectory stretched in time by `factor`."""
+        """Motion of the trajectory stretched in time by `factor`."""
         return Motion(
             self.times * factor,
             self.position,
@@ -36,10 +36,10 @@ class Motion:
 
 
 def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
-    """The motion at some times, or at those at which all of it can be judged.
+    """The motion at some times, or at the check times.
 
     Raises:
-        TrajectoryError: it is too long to be judged.
+        TrajectoryError: it is too long to be checked.
         FloatingPointError: it is not a finite number somewhere; see `computable`.
     """
     times = trajectory.check_times() if times is None else times
@@ -57,7 +57,7 @@ def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Mot
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What the rotors must do for a motion, each (m,).
+    """Demand of a motion on the rotors, each (m,).
 
     The rotors have to give f = a + d − g, d the deceleration by drag; the body's vertical axis
     points along it, and turns with the part of ḟ = jerk + ḋ that is across f. Differential
@@ -76,7 +76,7 @@ class Demand:
 
 
 def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
-    """What a motion takes.
+    """The demand of a motion.
 
     Args:
         motion: in still air.
@@ -89,7 +89,7 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     growth = motion.jerk + np.stack(drag.growth(velocity, acceleration), axis=1)
     thrust = np.linalg.norm(force, axis=1)
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), -force[:, 2])
-    # Without thrust there is no axis that could turn, and the thrust itself is what is wrong.
+    # Without thrust there is no axis that could turn; the thrust limit then refuses the motion.
     across = np.linalg.norm(np.cross(force, growth), axis=1)
     tilt_rate = np.divide(across, thrust**2, out=np.zeros_like(across), where=thrust > 0.0)
     return Demand(tilt, tilt_rate, thrust)

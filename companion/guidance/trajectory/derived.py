@@ -1,4 +1,4 @@
-"""The same way flown more slowly."""
+"""Trajectories made from others: flown more slowly, or after a turn on the spot."""
 
 from dataclasses import dataclass
 from math import remainder, tau
@@ -13,7 +13,7 @@ class Slowed:
 
     Attributes:
         trajectory: as it was.
-        factor: it lasts so many times as long.
+        factor: by which its duration grows.
     """
 
     trajectory: Trajectory
@@ -21,7 +21,7 @@ class Slowed:
 
     @property
     def name(self) -> str:
-        """That of the trajectory."""
+        """Name of the trajectory."""
         return self.trajectory.name
 
     @property
@@ -31,11 +31,11 @@ class Slowed:
 
     @property
     def holds_heading(self) -> bool:
-        """As the trajectory does."""
+        """Whether the trajectory keeps the heading at its start."""
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
-        """Those of the trajectory, stretched."""
+        """Check times of the trajectory, stretched, s."""
         return [self.factor * time for time in self.trajectory.check_times()]
 
     def at(self, time: float) -> Sample:
@@ -77,21 +77,21 @@ class TurnedFirst:
 
     @property
     def name(self) -> str:
-        """That of the trajectory."""
+        """Name of the trajectory."""
         return self.trajectory.name
 
     @property
     def duration(self) -> float:
-        """With the turn, s."""
+        """Duration with the turn, s."""
         return self.turn.duration + self.trajectory.duration
 
     @property
     def holds_heading(self) -> bool:
-        """It does not."""
+        """False: it turns to the heading of the trajectory."""
         return False
 
     def check_times(self) -> list[float]:
-        """Those of the trajectory; the turn keeps its own limit and stays where it is."""
+        """Check times of the trajectory, s; the turn is on the spot and within its limit."""
         return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
 
     def at(self, time: float) -> Sample:

@@ -13,7 +13,7 @@ from companion.guidance.trajectory.derived import Slowed
 from companion.guidance.trajectory.sample import Trajectory, TrajectoryError, computable
 
 _ROUNDING = 1e-9
-"""Share of a limit by which it may be missed: the fastest place may be meant to lie on it."""
+"""Share of a limit by which it may be exceeded: the fastest place may lie exactly on it."""
 
 _SLOWEST = 64.0
 """The largest factor tried."""
@@ -24,7 +24,7 @@ _PRECISION = 1e-3
 _DEGREES = 180.0 / pi
 
 SLOWER = "fly it more slowly (--slow-down finds how much), or change the limit"
-"""The remedy for what breaks a limit by its motion."""
+"""What to do where the motion breaks a limit."""
 
 
 class Violation(NamedTuple):
@@ -36,7 +36,7 @@ class Violation(NamedTuple):
         time: when it is broken most, s.
         text: all of this in words.
         remedy: what to do about it, as the end of a sentence.
-        slowing_helps: whether it is kept if the way is flown slowly enough.
+        slowing_helps: whether the limit is kept if the trajectory is flown slowly enough.
     """
 
     limit: str
@@ -52,7 +52,7 @@ class Violation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """What the vehicle may be asked for; `None` is no limit. Lengths count from the start.
+    """Limits of a trajectory; `None` is no limit. Lengths count from the start.
 
     Attributes:
         max_tilt: of the thrust from the vertical, rad.
@@ -63,7 +63,7 @@ class Envelope:
         max_climb: upward speed, m/s.
         max_descent: downward speed, m/s.
         max_speed: m/s.
-        fence: judges where it goes, and where it would stop.
+        fence: checks the positions, and where the vehicle would stop.
         drag: against still air.
         gravity: m/s².
     """
@@ -90,7 +90,7 @@ class _Need(NamedTuple):
         needed: (m,), in the unit of `allowed`.
         shown_in: how many units shown make one of these.
         what: the shown unit and the quantity.
-        least: whether too little of it is what breaks the limit.
+        least: whether the limit is a lower one.
     """
 
     limit: str
@@ -102,7 +102,7 @@ class _Need(NamedTuple):
 
 
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
-    """All limits that a trajectory breaks, in the order of time; none if it can be flown."""
+    """All limits that a trajectory breaks, in order of time; empty if it can be flown."""
     with computable():
         return _broken(sampled(trajectory), envelope)
 

@@ -16,8 +16,8 @@ from companion.guidance.trajectory.time_laws import STEEPEST, Cruise, LimitedJer
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LARGEST_RAMP = 0.5
-"""Of the time that the whole way takes at the steady rate. A ramp then takes a quarter of the way
-at most, and the fastest place of a single lap of any figure here lies between the two."""
+"""Longest ramp, as a share of the time for all laps at the steady rate. A ramp then covers a
+quarter of the path at most, and the fastest place of each figure lies between the ramps."""
 
 _RAMP_ACCELERATION = 1.0
 """Mean acceleration on a ramp of `steady_circle`, m/s²."""
@@ -27,7 +27,7 @@ _REST = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Hover:
-    """Stay where it begins.
+    """Stay at the start.
 
     Attributes:
         duration: s.
@@ -38,7 +38,7 @@ class Hover:
 
     @property
     def holds_heading(self) -> bool:
-        """It does."""
+        """True: the heading at the start is kept."""
         return True
 
     def check_times(self) -> list[float]:
@@ -46,7 +46,7 @@ class Hover:
         return [0.0, self.duration]
 
     def at(self, time: float) -> Sample:
-        """At rest."""
+        """The sample at rest at the start."""
         return Sample(_REST, _REST, _REST, _REST, 0.0, 0.0)
 
 
@@ -79,13 +79,12 @@ def line(
 
 @dataclass(frozen=True, slots=True)
 class Laps:
-    """How a figure is gone round: from rest to rest, at a steady pace between.
+    """Laps of a figure: from rest to rest, at a steady rate between the ramps.
 
     Attributes:
         speed: at the fastest place, m/s.
-        laps: how often round, gathering and losing speed included.
-        acceleration: largest along the path while speed is gathered or lost, m/s². Too few laps
-            for it take more.
+        laps: how often round, with the ramps.
+        acceleration: largest along the path on a ramp, m/s²; exceeded where the laps are too few.
         direction: in which the figure lies from the start, clockwise from north, rad.
         along: face along the path, instead of holding the heading.
     """
@@ -135,7 +134,7 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
 def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
     """A lemniscate of Gerono, `half_width` metres to both sides along `laps.direction`.
 
-    Its phase runs steadily, as is usual in the literature: it is fastest in the middle.
+    The rate of its phase is steady, as is usual in the literature: it is fastest in the middle.
 
     Raises:
         TrajectoryError: as `circle`, or the laps are not whole.
@@ -144,7 +143,7 @@ def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
 
 
 def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Bernoulli, likewise; with a steady phase it is fastest at the tips.
+    """A lemniscate of Bernoulli; with a steady rate of its phase it is fastest at the tips.
 
     Raises:
         TrajectoryError: as `gerono_eight`.

@@ -25,16 +25,16 @@ from companion.guidance.trajectory.timed_curve import (
 )
 
 _AT_REST = 0.1
-"""Samples that begin or end slower than this are meant to be at rest there, m/s."""
+"""Samples that begin or end slower than this count as at rest there, m/s."""
 
 _LOOKS = 16
-"""At each piece of the spline: it is smooth over two of them, a period of the cutoff."""
+"""Checks of each piece of the spline; two pieces are one period of the cutoff."""
 
 _MOST_PIECES = 4500
 """Pieces of the spline, two for each period of the cutoff; it is fitted within a second."""
 
 _LARGEST_RAMP = 0.5
-"""Of the duration may be taken by gathering speed, and by losing it."""
+"""Longest ramp, as a share of the duration."""
 
 
 class _Quantity(NamedTuple):
@@ -99,12 +99,12 @@ class HeadingFrom(Enum):
 
 
 class SampleOptions(NamedTuple):
-    """How samples are understood.
+    """How to interpret the samples.
 
     Attributes:
         frame: in which they are given.
-        heading: where it comes from.
-        cutoff: what is quicker than this is taken for noise or rounding, Hz.
+        heading: source of the heading.
+        cutoff: faster changes count as noise or rounding, Hz.
         acceleration: largest along the path while speed is gathered or lost where the samples do
             not begin or end at rest, m/s².
     """
@@ -145,7 +145,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
 
 def _require_short(table: Table, cutoff: float) -> None:
-    """See that fitting it takes bounded work."""
+    """Check that fitting it takes bounded work."""
     lasts = float(table.times[-1])
     require_duration(lasts)
     if lasts * 2.0 * cutoff > _MOST_PIECES:
@@ -161,7 +161,7 @@ def _speed(spline: SepticSpline, time: float) -> float:
 
 
 def _check(spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]) -> None:
-    """That what the file calls velocity and acceleration are that."""
+    """Check that velocity and acceleration are the derivatives of the position."""
     motion = spline.along(times)
     for order, (known, quantity) in enumerate(zip(derivatives, _DERIVATIVES, strict=False), 1):
         missed = np.linalg.norm(motion[:, :, order] - known, axis=1)

@@ -1,4 +1,4 @@
-"""The words of the trajectory room. World NED, SI units, radians; plain floats."""
+"""Types, bounds and errors of trajectories. World NED, SI units, radians; plain floats."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -11,24 +11,24 @@ Vector = tuple[float, float, float]
 
 
 LONGEST = 3600.0
-"""A trajectory lasts no longer than this, s."""
+"""Longest trajectory, s."""
 
 FARTHEST = 10_000.0
-"""No place that a file names lies farther from the beginning along any axis, m."""
+"""Largest distance from the beginning along an axis in a file, m."""
 
 FASTEST = 100.0
-"""No file asks for more along any axis, m/s."""
+"""Largest speed along an axis in a file, m/s."""
 
 LEAST_WAY = 1e-3
-"""Places nearer to each other than this are the same, m."""
+"""Places nearer to each other than this count as one, m."""
 
 
 class TrajectoryError(ValueError):
-    """What was asked for cannot be flown or made; the message is complete and for the user."""
+    """A trajectory cannot be made or flown; the message is complete and meant for the user."""
 
 
 class Sample(NamedTuple):
-    """Where the vehicle ought to be at one instant, relative to where the trajectory begins.
+    """Where the vehicle should be at one instant, relative to where the trajectory begins.
 
     Attributes:
         position: m; (0, 0, 0) is where it begins.
@@ -49,7 +49,7 @@ class Sample(NamedTuple):
 
 
 class Trajectory(Protocol):
-    """What can be followed: it begins and ends at rest, and can be asked at any time."""
+    """A trajectory begins and ends at rest, and is defined at any time."""
 
     @property
     def name(self) -> str:
@@ -63,7 +63,7 @@ class Trajectory(Protocol):
 
     @property
     def holds_heading(self) -> bool:
-        """Whether it keeps the heading it finds; `heading` of its samples is 0 then."""
+        """Whether it keeps the heading at its start; `heading` of its samples is then 0."""
         ...
 
     def at(self, time: float) -> Sample:
@@ -71,19 +71,19 @@ class Trajectory(Protocol):
         ...
 
     def check_times(self) -> Sequence[float]:
-        """When to look at it to judge all of it, s: see `guidance.trajectory.check_times`.
+        """Times at which to check it against limits, s: see `timed_curve.check_times`.
 
         Raises:
-            TrajectoryError: it is too long to be judged.
+            TrajectoryError: it is too long to be checked.
         """
         ...
 
 
 @contextmanager
 def computable() -> Iterator[None]:
-    """Turn what overflows, or determines nothing, into an error for the user.
+    """Turn numerical errors into an error for the user.
 
-    The ranges of files exclude what is known to; this is for what nobody thought of.
+    The ranges of values in files exclude the known causes; this catches the others.
 
     Raises:
         TrajectoryError: an overflow, a division by zero, equations without a solution.

@@ -10,16 +10,16 @@ from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
 
 _HEADING_CUTOFF = 2.0
-"""Where the heading along a spline is smoothed, Hz: nothing follows a quicker one."""
+"""Cutoff frequency of the heading along a spline, Hz: no vehicle follows a faster one."""
 
 HEADING_LOOKS = 1.0 / (32.0 * _HEADING_CUTOFF)
-"""Between two looks at such a heading, s."""
+"""Longest time between two checks of such a heading, s."""
 
 _HEADING_STEP = 0.01
-"""How finely the direction of flight is looked at, s."""
+"""Sample period of the direction of flight, s."""
 
 _SLOW = 0.1
-"""Below this share of the largest horizontal speed the direction of flight means nothing."""
+"""Below this share of the largest horizontal speed the direction of flight is not used."""
 
 _STANDING = 0.01
 """Nor below this speed, m/s."""

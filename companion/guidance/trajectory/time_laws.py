@@ -1,4 +1,4 @@
-"""Time laws: how far along a curve, and how fast, at which time."""
+"""Time laws: progress along a curve over time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
 
     Attributes:
         begin, end: s.
-        steady: whether the rate is constant in it.
+        steady: whether its rate is constant.
     """
 
     begin: float
@@ -88,7 +88,7 @@ def cosine_ramp(rate: float, duration: float, time: float) -> Progress:
 class Cruise:
     """A steady rate with a ramp at each end.
 
-    With both ramps 0 the rate is there at once, which is for curves that rest at their ends.
+    With both ramps 0 the rate is steady from the start, for curves that rest at their ends.
 
     Attributes:
         length: of the whole phase.
@@ -107,7 +107,7 @@ class Cruise:
 
     @property
     def duration(self) -> float:
-        """The way at the steady rate, and half of each ramp more, s."""
+        """Time at the steady rate, plus half of each ramp, s."""
         return self.length / self.rate + 0.5 * (self.gathering + self.losing)
 
     def pieces(self) -> list[Piece]:
@@ -139,14 +139,14 @@ _CRUISING = 3
 
 
 class LimitedJerk:
-    """Rest to rest by seven pieces of constant jerk: the fastest within the three limits.
+    """From rest to rest in seven pieces of constant jerk: the fastest within the three limits.
 
     Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008),
     section 3.4, double S with equal limits in both directions.
     """
 
     def __init__(self, length: float, speed: float, acceleration: float, jerk: float) -> None:
-        """Plan it.
+        """Compute the pieces.
 
         Args:
             length: how far, m.
@@ -176,7 +176,7 @@ class LimitedJerk:
         """How long it lasts, s."""
 
     def pieces(self) -> list[Piece]:
-        """The seven of constant jerk."""
+        """The seven pieces of constant jerk."""
         begins = [start for start, _, _ in self._pieces]
         spans = zip(begins, [*begins[1:], self.duration], strict=True)
         return [Piece(begin, end, k == _CRUISING) for k, (begin, end) in enumerate(spans)]

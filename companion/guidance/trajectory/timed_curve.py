@@ -1,4 +1,4 @@
-"""When to look at a trajectory so that no broken limit is missed, at a cost that is bounded.
+"""A curve with a time law along it, and the times at which to check it against limits.
 
 Where the time law is steady, a figure is gone round the same way in each lap: the first lap and the
 last one tell of all (a helix rises steadily, so it is highest and lowest in them). The ramps are
@@ -20,14 +20,14 @@ from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw
 
 _LOOKS_A_PIECE = 256
-"""At least, in each smooth part of a time law whose rate changes."""
+"""Fewest check times in each smooth part of a time law whose rate changes."""
 
 _TABLE = 2048
-"""Places of the table that finds the time of a phase; it need not be exact."""
+"""Rows of the table that finds the time of a phase; it need not be exact."""
 
 
 def check_times(looks: Looks, law: TimeLaw, longest: float = LONGEST) -> list[float]:
-    """The times at which to look at a curve that is run through by a time law, ascending, s.
+    """Times at which to check a curve with a time law, ascending, s.
 
     Raises:
         TrajectoryError: it lasts longer than `longest` seconds, or takes more than MOST_LOOKS.
@@ -47,7 +47,7 @@ def check_times(looks: Looks, law: TimeLaw, longest: float = LONGEST) -> list[fl
 
 
 def require_duration(seconds: float, longest: float = LONGEST) -> None:
-    """See that a trajectory does not last too long.
+    """Check that a trajectory does not last too long.
 
     Raises:
         TrajectoryError: it does.
@@ -102,27 +102,27 @@ class Heading(Protocol):
 
 
 class HeldHeading:
-    """The heading that was there at the start."""
+    """Keeps the heading at the start."""
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
-        """0, always."""
+        """0: the heading does not change."""
         return 0.0, 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class TangentHeading:
-    """Along the curve; for curves whose first derivative is never vertical or zero.
+    """Faces along the curve, whose first derivative must never be vertical or zero.
 
     Attributes:
-        middle: the heading never strays further than π from it, so that it does not jump, rad.
-        winding: `middle` turns by so much per unit of phase, rad.
+        middle: the heading stays within π of it, so that it does not jump, rad.
+        winding: change of `middle` per unit of phase, rad.
     """
 
     middle: float
     winding: float = 0.0
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
-        """Of the tangent."""
+        """Heading of the tangent, and its derivative by the phase."""
         (north, east, _), (north2, east2, _) = point.first, point.second
         turn = (north * east2 - east * north2) / (north * north + east * east)
         middle = self.middle + self.winding * phase
@@ -135,9 +135,9 @@ class TimedCurve:
 
     Attributes:
         name: what the user calls it.
-        curve: where.
-        law: when.
-        heading: facing where.
+        curve: the path.
+        law: progress along the path over time.
+        heading: along the path.
         longest: it is refused if it lasts longer than this, s.
     """
 
@@ -154,14 +154,14 @@ class TimedCurve:
 
     @property
     def holds_heading(self) -> bool:
-        """Whether it keeps the heading it finds."""
+        """Whether it keeps the heading at its start."""
         return isinstance(self.heading, HeldHeading)
 
     def check_times(self) -> list[float]:
-        """When to look at it to judge all of it, s.
+        """Times at which to check it against limits, s.
 
         Raises:
-            TrajectoryError: it is too long to be judged.
+            TrajectoryError: it is too long to be checked.
         """
         return check_times(self.curve.looks(), self.law, self.longest)
 

@@ -23,7 +23,7 @@ from companion.guidance.trajectory.timed_curve import (
 )
 
 _LOOKS = 200
-"""In each segment, for its largest speed and acceleration."""
+"""Samples of each segment, to find its largest speed and acceleration."""
 
 
 def waypoints(

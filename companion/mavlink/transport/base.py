@@ -1,4 +1,4 @@
-"""What the link asks of a transport: bytes in, whole frames out, and no queue in between."""
+"""The Protocol of a transport: bytes in, whole frames out, and no queue in between."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -23,9 +23,9 @@ class Receiver(Protocol):
         """
 
     def may_answer(self, who: str) -> bool:
-        """After a claim of `who` that failed: whether it is to be sent what we send all the same.
+        """Whether `who`, whose claim failed, still receives what we send.
 
-        Its frames are still refused; but it may prove by an answer that it is no recording.
+        Its frames are refused, but its answer may prove that it is no recording.
         """
 
     def claim_lapsed(self) -> bool:

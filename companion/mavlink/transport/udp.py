@@ -22,7 +22,7 @@ _SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux; the module nam
 _STAMP = struct.Struct("@qq")  # s and ns since 1970
 _STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
 _OLDEST_NS = 1_000_000_000  # a stamp that seems older means that the computer's clock was set
-_BURST = 32  # datagrams read before other work of the loop has its turn
+_BURST = 32  # datagrams read before the loop does other work
 _PEER_SILENCE_S = 2.0  # then a vehicle at another address may take the place of a silent one
 
 
@@ -55,8 +55,8 @@ class UdpTransport:
     afresh, so that a vehicle which comes back from another port is heard. Refusals by ICMP
     (vehicle not up yet) are no reason to stop.
 
-    A datagram counts as received when the kernel took it from the network, not when we came to read
-    it: latency is then honest where this process woke up late.
+    A datagram counts as received when the kernel took it from the network, not when we read it:
+    latency then includes a late wake-up of this process.
 
     Attributes:
         local: The (host, port) the socket is bound to.
@@ -149,7 +149,7 @@ class UdpTransport:
             self._release()
             try:
                 self._socket = self._open()
-            except EndpointError as error:  # somebody took the port in between: try again
+            except EndpointError as error:  # another program took the port in between: try again
                 _LOG.warning("%s", error)
 
     def _release(self) -> None:

@@ -63,9 +63,9 @@ class ArduPilot:
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
             **FLIGHT_RATES,
-            # The mode is told at 1 Hz by itself; a pilot who takes over should not wait for that.
+            # By itself it comes at 1 Hz; we must see sooner that a pilot takes over.
             "HEARTBEAT": 10.0,
-            "ATTITUDE_TARGET": 50.0,  # it turns by up to 1 rad/s, as we foresee it but for a little
+            "ATTITUDE_TARGET": 50.0,  # it turns at up to 1 rad/s, and we predict it between
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
             "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
@@ -80,7 +80,7 @@ class ArduPilot:
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of a heartbeat's mode; GUIDED is told apart by what it obeys."""
+        """Name of a heartbeat's mode; GUIDED that obeys rates has its own name."""
         name = _NAMES.get(custom_mode, f"mode {custom_mode}")
         by_rates = name == "GUIDED" and base_mode & _ARMED and not base_mode & _GUIDED
         return _BY_RATES if by_rates else name

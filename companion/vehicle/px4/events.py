@@ -179,7 +179,7 @@ class EventReader:
             payload[: _EVENT.size].ljust(_EVENT.size, b"\0")
         )
         if sequence == self._last_sequence:
-            return  # sent again for somebody who had missed it
+            return  # a repetition
         self._last_sequence = sequence
         severity = levels & 0x0F
         if number == _REPORT_BEGINS:

@@ -83,7 +83,7 @@ def _failure_tilt(value: float, values: Values, settings: CompanionSettings) -> 
 
 
 def _signing(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """The reverse needs no rule: a vehicle that does not sign is not heard where we do."""
+    """The reverse needs no rule: if we sign, frames of a vehicle that does not are refused."""
     if not value or settings.signs:
         return None
     return Problem(

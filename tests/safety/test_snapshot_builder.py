@@ -1,0 +1,210 @@
+"""What the monitors are shown: every value is that of its source, since control began."""
+
+from math import inf
+from types import SimpleNamespace
+
+import pytest
+
+from companion.control.loop_record import LoopRecord, Unanswered
+from companion.guidance.fence import Place
+from companion.safety.snapshot import Autopilot, Health, Motion, Resets
+from companion.safety.snapshot_builder import SnapshotBuilder
+
+Q = (0.6, 0.0, 0.8, 0.0)
+
+
+class Flight:
+    """A link, a control loop and guidance with a value of its own everywhere."""
+
+    def __init__(self, **options):
+        self.counted = []
+        self.state = SimpleNamespace(
+            armed=True,
+            landed=False,
+            failsafe=True,
+            battery="battery",
+            gps="gps",
+            estimator=SimpleNamespace(flags=0x33F),
+            position=SimpleNamespace(received=9.75),
+            global_position=SimpleNamespace(latitude_deg=47.0, longitude_deg=8.0, received=9.0),
+            height=12.5,
+            reset_counter=3,
+            positions=0,
+            gps_was_good=True,
+        )
+        self.clock = SimpleNamespace(timeline=2, last_change="it jumped")
+        self.stats = SimpleNamespace(frames=0, lost=0)
+        link = SimpleNamespace(
+            state=self.state,
+            clock=self.clock,
+            stats=self.stats,
+            timesync=SimpleNamespace(round_trip_s=0.04),
+        )
+        self.resets = SimpleNamespace(
+            newest=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
+            times=[],
+            shift=(1.0, 2.0, 3.0),
+            turn=3.0,
+            largest_tilt=0.7,
+            on_counter=lambda *seen: self.counted.append(seen),
+        )
+        self.record = LoopRecord(thrust=0.45)
+        command = SimpleNamespace(made_at=9.5, idle=False)
+        self.loop = SimpleNamespace(resets=self.resets, record=self.record, command=command)
+        self.course = SimpleNamespace(position_ned=(5.0, -6.0, -7.0), velocity=(1.0, 2.0, 0.5))
+        self.guidance = SimpleNamespace(
+            motion=Motions(self.course.position_ned, self.course.velocity),
+            off_course=0.9,
+            fresh_position=lambda: "fresh",
+        )
+        self.builder = SnapshotBuilder(
+            link, self.loop, self.guidance, **{"real_time": True, **options}
+        )
+
+    def listen(self, *times):
+        for now in times:
+            self.builder.listen(now)
+
+    def snapshot(self, now=10.0):
+        return self.builder.snapshot(now)
+
+
+class Motions(tuple):
+    """A position and a velocity, as `MotionEstimate.motion` names them."""
+
+    def __new__(cls, position, velocity):
+        return super().__new__(cls, (position, velocity))
+
+    position_ned = property(lambda self: self[0])
+
+
+@pytest.fixture
+def flight():
+    flight = Flight()
+    flight.builder.begin(10.0)
+    flight.listen(10.0)
+    return flight
+
+
+def test_the_autopilots_words_are_passed_on(flight):
+    state = flight.state
+    told = flight.snapshot()
+    assert told.now == 10.0
+    assert told.autopilot == Autopilot(True, False, True, "battery", "gps", state.estimator)
+    assert (told.had_gps, told.good_flags) == (True, 0x33F)
+    flight.state.estimator = None
+    assert flight.snapshot().good_flags == 0x33F
+    flight.builder.begin(11.0)
+    flight.listen(11.0)
+    assert flight.snapshot(11.0).good_flags == 0
+
+
+def test_motion_is_seen_from_where_control_began(flight):
+    flight.guidance.motion = Motions((7.0, -9.0, -3.0), (1.0, 2.0, 0.5))
+    assert flight.snapshot().motion == Motion(
+        q=Q,
+        body_rates=(0.1, 0.2, 0.3),
+        offset=(2.0, -3.0, 4.0),
+        velocity=(1.0, 2.0, 0.5),
+        height=12.5,
+        off_course=0.9,
+        thrust=0.45,
+        origin=Place(47.0, 8.0),
+    )
+
+
+@pytest.mark.parametrize("command", [None, SimpleNamespace(made_at=9.5, idle=True)])
+def test_what_is_not_known_is_none(command):
+    flight = Flight()
+    flight.guidance.motion = None
+    flight.state.global_position.received = 8.99
+    flight.builder.begin(10.0)
+    flight.listen(10.0)
+    flight.resets.newest = flight.state.position = None
+    flight.loop.command = command
+    flight.guidance.fresh_position = lambda: None
+    told = flight.snapshot()
+    assert told.motion == Motion(height=12.5, off_course=0.9)
+    assert told.control.commanded == (-inf if command is None else 9.5)
+    assert (told.control.placed, told.control.position_fresh) == (-inf, False)
+    flight.guidance.motion = Motions((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    assert flight.snapshot().motion[2:4] == (None, (4.0, 5.0, 6.0))
+    flight.state.global_position = None
+    flight.builder.begin(10.0)
+    flight.listen(10.0)
+    assert flight.snapshot().motion.origin is None
+
+
+def test_every_stage_of_a_samples_way_has_its_time(flight):
+    flight.record.last_answer, flight.record.last_sample = 9.9, 9.95
+    flight.record.reason = Unanswered.LATE
+    flight.stats.frames = 1
+    flight.listen(10.02)
+    flight.listen(10.04)
+    flight.listen(10.24)  # late by 0.17 s
+    told = flight.snapshot(10.3).control
+    assert told[:6] == (9.9, 9.95, Unanswered.LATE, 9.5, 9.75, 10.02)
+    assert (told.position_fresh, told.clock_change) == (True, None)
+    assert told.stood_still == pytest.approx(0.17)
+    flight.clock.timeline = 3
+    assert flight.snapshot().control.clock_change == "it jumped"
+    assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]
+
+
+def run_for(flight, seconds):
+    """50 looks a second; of ten frames four are lost, every fourth answer is late."""
+    for step in range(1, round(50 * seconds) + 1):
+        flight.stats.frames, flight.stats.lost = 6 * step, 4 * step
+        flight.record.setpoints, flight.record.missed_deadlines = 4 * step, step
+        flight.record.held.add(0.005)
+        flight.state.positions = step // 5
+        flight.listen(10.0 + 0.02 * step)
+    return flight.snapshot(10.0 + seconds)
+
+
+def test_shares_and_rates_are_those_of_the_last_second(flight):
+    told = run_for(flight, 3.0).health
+    assert told.lost == pytest.approx(0.4)
+    assert told.missed == pytest.approx(0.25)
+    assert told.answer_rate == pytest.approx(200.0)
+    assert told.position_rate == pytest.approx(10.0, rel=0.03)
+    assert (told.starved, told.round_trip, told.gaps) == (0.0, 0.04, 0)
+    flight.listen(13.28)  # 0.25 s too late, and the second looked at began at 12.26 s
+    starved = flight.snapshot(13.28).health.starved
+    assert starved == pytest.approx(0.25 / 1.02)
+    assert len(flight.builder._counted) <= 52
+
+
+def test_shares_are_not_known_before_most_of_a_second_is_seen(flight):
+    assert run_for(flight, 0.88).health == Health(round_trip=0.04)
+    assert run_for(flight, 0.92).health.lost is not None
+    flight.builder.begin(11.0)
+    flight.listen(11.0)
+    assert flight.snapshot(11.0).health == Health(round_trip=0.04)
+
+
+def test_deadlines_do_not_count_in_lockstep():
+    flight = Flight(real_time=False)
+    flight.builder.begin(10.0)
+    flight.listen(10.0)
+    assert run_for(flight, 1.0).health.missed is None
+
+
+def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(flight):
+    flight.record.gaps.extend([9.0, 10.0, 11.0, 12.0])
+    flight.resets.times.extend([9.0, 10.0, 11.0, 30.0])
+    assert flight.snapshot(14.0).health.gaps == 2
+    assert flight.snapshot(16.5).health.gaps == 1
+    assert flight.snapshot(17.0).health.gaps == 0
+    assert flight.snapshot(31.0).resets.recent == 2
+    assert flight.snapshot(41.5).resets.recent == 1
+
+
+def test_resets_are_summed_from_where_control_began(flight):
+    assert flight.snapshot().resets == Resets(0, 0.0, 0.0, 0.0)
+    flight.resets.shift, flight.resets.turn = (1.0, 5.0, 7.0), -3.0
+    flight.resets.largest_tilt = 0.2
+    found = flight.snapshot().resets
+    assert found.shift == pytest.approx(5.0)
+    assert found.turn == pytest.approx(2.0 * 3.141592653589793 - 6.0)
+    assert found.tilt == 0.2
