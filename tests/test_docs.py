@@ -79,7 +79,10 @@ def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str |
     try:
         command_line._parser().parse_args([*arguments, "--help"] if only_named else arguments)
     except SystemExit as ended:
-        return capsys.readouterr().err if ended.code else None
+        said = capsys.readouterr().err
+        if "arguments are required: --config" in said:  # an option named in the text
+            return complaint([*arguments, "--config", "my.yaml"], capsys)
+        return said if ended.code else None
     return None
 
 
