@@ -3,7 +3,7 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all matrix lint real soak fuzz mutants bench clean
+.PHONY: demo test test-all matrix lint real soak fuzz mutants bench docs clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -57,5 +57,12 @@ mutants: $(VENV)/.mutants  ## do the tests notice a change of the code? ROOM=att
 bench: $(VENV)/.test  ## latency of our link against a bare echo and MAVSDK
 	$(BIN)/companion bench link
 
+$(VENV)/.docs: $(VENV)/.fly
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.docs  ## the pages of docs/ as a site in site/; a broken link is an error
+	$(BIN)/zensical build --strict --clean
+
 clean:
-	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

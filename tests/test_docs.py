@@ -3,6 +3,7 @@
 import ast
 import re
 import shlex
+import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
 from functools import cache
@@ -74,11 +75,14 @@ def command_lines(text: str) -> Iterator[list[str]]:
 
 def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str | None:
     """What the parser says against these arguments; without options they only name a command."""
-    only_named = all(re.fullmatch(r"[a-z-]+", word) for word in arguments)
+    only_named = all(re.fullmatch(r"[a-z][a-z0-9-]*", word) for word in arguments)
     try:
         command_line._parser().parse_args([*arguments, "--help"] if only_named else arguments)
     except SystemExit as ended:
-        return capsys.readouterr().err if ended.code else None
+        said = capsys.readouterr().err
+        if "arguments are required: --config" in said:  # an option named in the text
+            return complaint([*arguments, "--config", "my.yaml"], capsys)
+        return said if ended.code else None
     return None
 
 
@@ -129,6 +133,14 @@ def test_every_page_is_in_the_index() -> None:
     listed = {link.partition("#")[0] for link in LINK.findall(INDEX.read_text("utf-8"))}
     pages = {page.name for page in PAGES if page not in (README, INDEX)}
     assert pages <= listed, f"docs/index.md does not list {sorted(pages - listed)}"
+
+
+def test_the_site_has_every_page_in_the_order_of_the_index() -> None:
+    site = tomllib.loads((ROOT / "zensical.toml").read_text("utf-8"))["project"]
+    first, *sections = site["nav"]
+    pages = [page for section in sections for group in section.values() for page in group]
+    assert list(first.values()) == ["index.md"]
+    assert pages == LINK.findall(INDEX.read_text("utf-8"))
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Whether the fence holds if our program ends in flight: the last rates are weighed against it."""
+"""Offboard loss: whether the vehicle stays inside the fence if our setpoints stop in flight."""
 
 from collections.abc import Iterator
 from math import exp, hypot
@@ -17,11 +17,11 @@ from companion.vehicle.parameter_checks import LONGEST_HELD, shortest_hold
 from companion.vehicle.parameter_rules import CheckResult
 
 _PERIOD = 0.05
-"""The maneuvers are looked at this often, s,"""
+"""Time between the points of the maneuvers that are checked, s."""
 _MOST = 1500
-"""but at most this many times."""
+"""Largest number of these points."""
 _AHEAD = 0.02
-"""The rate of change of the thrust is taken over this, s."""
+"""Time over which the rate of change of the thrust is taken, s."""
 _START = Pose((0.0, 0.0, 0.0), 0.0)
 
 
@@ -29,9 +29,9 @@ class Worst(NamedTuple):
     """The largest reach over the maneuvers.
 
     Attributes:
-        away, up, down: From where the setpoints ended, m.
+        away, up, down: Distance from where the setpoints stopped, m.
         breach: The first breach of the fence, as the end of a sentence; `None`: none.
-        time: When the setpoints would have to end for it, s after control begins.
+        time: When the setpoints would have to stop for it, s after control begins.
     """
 
     away: float = 0.0
@@ -42,7 +42,7 @@ class Worst(NamedTuple):
 
 
 def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """How far the vehicle is carried if our setpoints end at the worst moment of the flight."""
+    """How far the vehicle is carried if our setpoints stop at the worst moment of the flight."""
     failsafe, maneuvers = evidence.autopilot.offboard_loss_failsafe, evidence.maneuvers
     held = evidence.survey.values.get(failsafe.parameter)
     if maneuvers is None or held is None or not 0.0 <= held <= LONGEST_HELD:
@@ -101,7 +101,7 @@ def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, bra
 
 
 def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str | None:
-    """What is wrong with where it can come to, as the end of a sentence."""
+    """The breach of the fence within its reach, as the end of a sentence; `None`: none."""
     north, east = offset[0] + there.place[0], offset[1] + there.place[1]
     distance = hypot(north, east)
     outward = 1.0 + there.spread / distance if distance > 0.0 else 1.0
@@ -123,7 +123,7 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
 def _flown(
     config: Config, maneuvers: ManeuverSequence, drag: Drag
 ) -> Iterator[tuple[float, Flown]]:
-    """What is flown over the maneuvers; open-loop steps are answered as the attitude law does."""
+    """The flown states over the maneuvers; open-loop steps follow the attitude law."""
     gain = config.planner.gain_per_s
     period = max(_PERIOD, maneuvers.duration / _MOST)
     velocity: Vector = (0.0, 0.0, 0.0)

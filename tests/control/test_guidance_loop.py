@@ -37,7 +37,7 @@ class HoverSpy:
     def pause(self):
         self.paused += 1
 
-    def stand(self):
+    def on_ground(self):
         """Ignore it."""
 
 

@@ -1,7 +1,7 @@
 """ArduCopter's parameters that matter to a flight by body rates.
 
-Sources: ArduCopter's parameter reference; "measured": ArduCopter 4.7 in simulation, 2025. Version
-4.7 renamed some; where their unit or sense changed with the name they have a rule each.
+Sources: the parameter reference; ArduCopter 4.7 in simulation, 2025 ("measured"). Version 4.7
+renamed some; a new name with another unit or sense has its own rule.
 """
 
 from companion.vehicle.parameter_checks import (
@@ -25,8 +25,6 @@ from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, 
 _REFERENCE = "ArduCopter parameter reference"
 _MEASURED = "measured on ArduCopter 4.7, 2025"
 _STOPS_MOTORS = "the motors stop in the air"
-_THRUST_AS_THRUST = 8
-_CENTI = 0.01
 
 
 def _angle_boost(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
@@ -71,11 +69,8 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
 def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     if value >= settings.attitude_rate_hz:
         return None
-    return Problem(
-        INEFFECTIVE,
-        f"no message is sent more often, so that link.attitude_rate_hz "
-        f"{settings.attitude_rate_hz:g} is denied; ask for less",
-    )
+    asked = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
+    return Problem(INEFFECTIVE, f"no message is sent more often, so {asked} is denied; lower it")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
@@ -85,7 +80,7 @@ def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None
 
 
 def _any_value(_: float, __: Values, ___: CompanionSettings) -> None:
-    """Read because another rule needs it; without ArduPilot's fence there is still ours."""
+    """Read for `_fence` only: without ArduPilot's fence there is still ours."""
 
 
 def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Problem | None:
@@ -95,8 +90,8 @@ def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Pro
         return None
     return Problem(
         INEFFECTIVE,
-        "ArduPilot does nothing about an empty battery; nobody lands should our program have ended",
-        1.0,
+        "ArduPilot does nothing about an empty battery; nobody lands should our program end",
+        set_to=1.0,
     )
 
 
@@ -106,8 +101,8 @@ def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
         ParameterRule((f"ATC_ACC_{axis}_MAX",), meaning, acceleration_limit(1.0, name), _MEASURED),
         ParameterRule(
             (f"ATC_ACCEL_{axis}_MAX",),
-            f"{meaning}, in hundredths of a degree (before 4.7)",
-            acceleration_limit(_CENTI, name),
+            f"{meaning}, centidegrees (before 4.7)",
+            acceleration_limit(0.01, name),
             _REFERENCE,
         ),
     )
@@ -119,8 +114,8 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "whether our thrust is a thrust or a climb rate",
         bit_set(
             UNSAFE,
-            _THRUST_AS_THRUST,
-            "our thrust would be obeyed as a climb rate (bit 3, value 8, makes it a thrust)",
+            8,
+            "our thrust would be obeyed as a climb rate (bit 3, value 8, sets thrust)",
         ),
         f"{_REFERENCE}; {_MEASURED}",
         vital=True,
@@ -133,11 +128,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         vital=True,
     ),
     ParameterRule(
-        ("GUID_TIMEOUT",),
-        "for how long the last rates are held",
-        rates_held,
-        _MEASURED,
-        vital=True,
+        ("GUID_TIMEOUT",), "for how long the last rates are held", rates_held, _MEASURED, vital=True
     ),
     ParameterRule(
         ("ATC_RATE_FF_ENAB",),
@@ -237,17 +228,9 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         _REFERENCE,
         universal=True,
     ),
+    ParameterRule(("FENCE_ACTION",), "what ArduPilot does at its own geofence", _fence, _REFERENCE),
     ParameterRule(
-        ("FENCE_ACTION",),
-        "what ArduPilot does at its own geofence",
-        _fence,
-        _REFERENCE,
-    ),
-    ParameterRule(
-        ("FENCE_ENABLE",),
-        "whether ArduPilot has a geofence of its own",
-        _any_value,
-        _REFERENCE,
+        ("FENCE_ENABLE",), "whether ArduPilot has a geofence of its own", _any_value, _REFERENCE
     ),
     ParameterRule(
         ("BATT_FS_LOW_ACT",),
@@ -258,7 +241,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("BATT_FS_CRT_ACT",),
-        "what ArduPilot does about a battery that is nearly empty",
+        "what ArduPilot does about a nearly empty battery",
         _battery_failsafe,
         _REFERENCE,
         universal=True,

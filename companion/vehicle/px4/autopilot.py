@@ -50,8 +50,8 @@ _MODES = {
     "STABILIZED": _custom_mode(7),
 }
 _DESCEND = "AUTO.DESCEND"
-"""Its failsafe's landing without a position; cannot be commanded. It takes over from AUTO.LAND 4.8 s
-after GPS is lost (measured)."""
+"""Its failsafe's landing without a position; cannot be commanded. It takes over from AUTO.LAND
+4.8 s after GPS is lost (measured)."""
 _NAMES = {number: name for name, number in _MODES.items()} | {_custom_mode(_AUTO, 20): _DESCEND}
 _ROLES = {
     "AUTO.TAKEOFF": frozenset({Role.TAKEOFF, Role.READY}),
