@@ -67,7 +67,7 @@ def main() -> int:
         _mutmut(folder, "run", "--max-children", str(options.children), *chosen)
         mutants = [mutant for mutant in _mutants(folder) if mutant.status != "not checked"]
         _find_changes(folder, mutants)
-        score = print_room(room, mutants, accepted.get("accepted", []))
+        score = print_room(room, mutants, accepted)
         good &= score >= WANTED
     return 0 if good else 1
 
