@@ -40,7 +40,7 @@ class Solution(NamedTuple):
 
 
 def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
-    """Weights of the columns (m, c) that come nearest to what was measured, and the rest.
+    """Least-squares weights of the columns (m, c) for `measured`, and the residual.
 
     Args:
         columns: (m, c).

@@ -60,7 +60,7 @@ class LawPlanner:
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates in rad/s that answer attitude `q`.
+        """Body rates to command at attitude `q`, rad/s.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.

@@ -20,7 +20,7 @@ _MOMENT = 1e-4
 def rates_along(
     north: float, east: float, speed_north: float, speed_east: float
 ) -> tuple[float, float, float]:
-    """Body rates (rad/s) that move these coefficients at this speed (1/s) at heading 0, kept still.
+    """Body rates (rad/s) that change the coefficients at this rate (1/s), heading held at 0.
 
     `kinematics.into_body` turns the first two to another heading; the third does not depend on it.
     """

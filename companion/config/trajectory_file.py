@@ -77,7 +77,7 @@ class LineShape(Section):
 
 
 class _Rounds(Section):
-    """What all figures have that are gone round in laps."""
+    """Keys of all figures that are flown in laps."""
 
     laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """How often round, gathering and losing speed included."""

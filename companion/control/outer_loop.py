@@ -95,7 +95,7 @@ def hold_delay(config: Config) -> float:
 
 
 def _feedback_delay(config: Config) -> float:
-    """Delay of the attitude plus half a period of guidance, for which feedback is held, s."""
+    """Delay of the attitude plus half a guidance period, the mean hold of the feedback, s."""
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 

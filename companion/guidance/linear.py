@@ -85,7 +85,7 @@ class LinearGuidance:
 
     @property
     def acts_after(self) -> float:
-        """Mean time from a command to the effect of its feedback, s."""
+        """Mean delay from computing a command until the vehicle responds to its feedback, s."""
         return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(

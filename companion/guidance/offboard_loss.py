@@ -23,7 +23,7 @@ _LEVELLING = 3.0
 _CLIMB_BRAKING = 4.0
 """The autopilot ends a climb or a fall with this, m/s² (PX4: MPC_ACC_UP_MAX)."""
 _LEAST_DRAG = 0.2
-"""Drag that any multirotor has, 1/s (measured: 0.25 and more); it alone ends a drift."""
+"""Least drag of any multirotor, 1/s (measured: 0.25 and more). Only drag stops a level drift."""
 
 
 class Flown(NamedTuple):
@@ -174,7 +174,7 @@ def _plus(a: Vector, b: Vector, factor: float) -> Vector:
 
 
 def _slowed(velocity: Vector, drag: Drag, span: float) -> Vector:
-    """Drag acts along the ground only: what it takes from a fall is not counted on."""
+    """Apply drag to the horizontal velocity only: a fall is assumed undamped, to be safe."""
     north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
     return velocity[0] - north * span, velocity[1] - east * span, velocity[2]
 

@@ -26,7 +26,7 @@ _REFUSAL_TIME = 1.0
 """Time constant of the mean of refusals, s."""
 
 _LASTING = 0.2
-"""Mean of refusals to one side that counts as lasting: about 0.25 s of refusals only."""
+"""Filtered mean of refusals (+1 too high, −1 too low) that counts as lasting: about 0.25 s."""
 
 
 class ThrustFilter:

@@ -100,7 +100,7 @@ def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
 
 
 def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
-    """(n,), at each age (n,) the sum of the jumps (n,) so far, each decayed since its own age.
+    """(n,) sum of all jumps up to each age, each decayed exponentially since it occurred.
 
     As running sums, in as long parts as exponentials allow.
     """

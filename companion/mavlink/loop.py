@@ -23,8 +23,8 @@ Ready = list[tuple[selectors.SelectorKey, int]]
 class HotSelector(selectors.DefaultSelector):
     """A selector that serves some file descriptors on the spot.
 
-    It waits for the hot descriptors, and for the one descriptor of the selector that has all the
-    others. So hot descriptors skip asyncio's bookkeeping.
+    It polls the hot descriptors and one nested selector that holds all other descriptors. So
+    hot descriptors skip asyncio's bookkeeping.
     """
 
     def __init__(self) -> None:

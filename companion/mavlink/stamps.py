@@ -162,7 +162,7 @@ class StampJudge:
         return newest
 
     def _oldest(self, stream: Stream, ahead: bool, date: int) -> int:
-        """The stamp than which the next must be newer."""
+        """Lower bound: the next stamp must be newer than this."""
         heard = self._heard.get((stream, ahead))
         if heard is not None:
             return heard

@@ -33,7 +33,7 @@ _TOLERANCE = 0.02
 
 
 class Trouble(Enum):
-    """Why there is no answer to fly."""
+    """Why the solver gave no usable answer."""
 
     DIED = "died"
     LATE = "late"

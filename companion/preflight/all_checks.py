@@ -47,7 +47,7 @@ ONCE: tuple[Check, ...] = (
 
 
 def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """Run all checks, and return safe findings too; `again`: without those that run `ONCE`."""
+    """Run all checks and return every finding, safe ones too; `again` skips those marked `ONCE`."""
     return [
         finding
         for check in CHECKS

@@ -1,4 +1,4 @@
-"""Builds the snapshots from the newest telemetry, our counters, and shares over one second."""
+"""Builds the snapshots: newest telemetry, our counters, and shares of the last second."""
 
 from collections import deque
 from math import dist, inf

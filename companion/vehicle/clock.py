@@ -155,7 +155,7 @@ class VehicleClock:
             self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
     def look(self, now: float) -> None:
-        """Let old exchanges expire and tell once whether ages are known; called once a second."""
+        """Drop expired TIMESYNC exchanges, each second; report once if ages are not known."""
         self.delay.expire(now)
         if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._told_unknown:
             return
@@ -230,7 +230,7 @@ class VehicleClock:
         self._misfits.stamps.clear()
 
     def _change(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
-        """Go on with a clock that has moved by `by` s; vehicle times go on without it."""
+        """Accept that the vehicle's clock jumped by `by` s; our vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= by
         self.delay.retract(self._received - self.delay.seconds - TOGETHER)

@@ -65,7 +65,7 @@ class MisfitRun:
         self.stamps: list[Stamp] = []
 
     def continued_by(self, stamp: Stamp) -> bool:
-        """Whether a further misfit may be of the same clock as those before."""
+        """Whether a further misfit agrees with the earlier ones, as of one shifted clock."""
         if not self.stamps:
             return True
         last = self.stamps[-1]

@@ -52,7 +52,7 @@ class CheckResult(Enum):
     INEFFECTIVE = "ineffective"
     """The flight does not do what is asked of it, or a protection does nothing."""
     NOT_READY = "not_ready"
-    """The vehicle is not ready to be armed yet, and this follows from it."""
+    """The finding only follows from a vehicle that is not ready to arm yet."""
     NOT_CONNECTED = "not_connected"
     """Nobody answers, so nothing was checked."""
 

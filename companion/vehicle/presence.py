@@ -144,7 +144,7 @@ def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
 
 
 def _refused(start: str, stats: LinkStats) -> str | None:
-    """What came instead and was refused; `None`: nothing."""
+    """Which messages arrived and were refused while no heartbeat was accepted; None: none."""
     if stats.unclaimed:
         return (
             f"{start}, but {stats.unclaimed} other frames with its ids; no sender is taken for the "

@@ -41,7 +41,7 @@ _FEWEST = 4
 """Samples; fewer do not determine a smooth curve."""
 
 _MOST = 50_000
-"""Samples; they are read within half a second."""
+"""Largest number of samples of a table; reading them takes half a second."""
 
 _MOST_BYTES = 20_000_000
 """Of a file: `_MOST` samples of twenty columns with all their digits."""

@@ -76,7 +76,7 @@ class Demand:
 
 
 def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
-    """The demand of a motion.
+    """Thrust, tilt and rates that a motion needs.
 
     Args:
         motion: in still air.

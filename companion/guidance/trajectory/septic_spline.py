@@ -84,7 +84,7 @@ class SepticSpline:
 
 
 def _horner(c: Any, u: Any) -> tuple[Any, Any, Any, Any]:
-    """Of c₀ + c₁u + … c₇u⁷, and its first three derivatives; of floats, or of arrays."""
+    """Value and first three derivatives of c₀ + c₁u + … + c₇u⁷; for floats and arrays."""
     c0, c1, c2, c3, c4, c5, c6, c7 = c
     return (
         ((((((c7 * u + c6) * u + c5) * u + c4) * u + c3) * u + c2) * u + c1) * u + c0,
