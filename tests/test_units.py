@@ -31,6 +31,12 @@ def test_the_keys_are_read_in_si_units():
     assert safety.max_reset_angle == pytest.approx(math.radians(safety.max_reset_deg))
 
 
+@pytest.mark.parametrize("percent", range(101))
+def test_a_percentage_is_the_share_that_the_vehicle_reports(percent):
+    limits = Config.model_validate({"limits": {"min_battery_percent": percent}}).limits
+    assert limits.min_battery == percent / 100.0  # as SYS_STATUS is read: no ulp between them
+
+
 def test_what_is_not_known_of_an_axis_stays_unknown():
     known = Config.model_validate({"vehicle": {"lag_ms": 40.0, "dead_time_ms": 20.0}}).vehicle
     roll, pitch = known.axes["roll"], known.axes["pitch"]

@@ -27,10 +27,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     by_default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if by_default:  # not where a shell ignores it, nor where a test has its own
         signal.signal(signal.SIGINT, _leave)
-    run = _loaded(arguments)
     try:
-        if by_default:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            run = _loaded(arguments)
+        finally:
+            if by_default:
+                signal.signal(signal.SIGINT, signal.default_int_handler)
         return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")

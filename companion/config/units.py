@@ -1,11 +1,18 @@
 """The one place where the units of the YAML keys become SI units."""
 
-from math import pi
+from collections.abc import Callable
+from math import pi, radians
 from typing import Any, Self, overload
 
 MS = 1e-3
 DEG = pi / 180.0
-_FACTORS = {"_deg": DEG, "_deg_s": DEG, "_deg_s2": DEG, "_ms": MS, "_percent": 0.01}
+_CONVERSIONS: dict[str, Callable[[float], float]] = {
+    "_deg": radians,
+    "_deg_s": radians,
+    "_deg_s2": radians,
+    "_ms": lambda value: MS * value,
+    "_percent": lambda value: value / 100.0,  # as the vehicle's own percent is converted
+}
 """By the end of a key: to rad, rad/s, rad/s², s and a share."""
 
 
@@ -22,8 +29,8 @@ class Si(property):
     """
 
     def __init__(self, key: str) -> None:
-        factor = next(factor for end, factor in _FACTORS.items() if key.endswith(end))
-        super().__init__(lambda section: factor * getattr(section, key))
+        convert = next(each for end, each in _CONVERSIONS.items() if key.endswith(end))
+        super().__init__(lambda section: convert(getattr(section, key)))
 
     @overload
     def __get__(self, section: None, owner: type, /) -> Self: ...

@@ -1,6 +1,7 @@
 """Writing a file whole or not at all: whoever reads it, at any time, reads the old or the new."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -31,9 +32,10 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have the file's new name on the disk, too."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    """Have the file's new name on the disk, too, where the file system can do that."""
+    with suppress(OSError):  # some network file systems refuse; the file itself is whole
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

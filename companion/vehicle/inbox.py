@@ -165,7 +165,10 @@ class Inbox:
         if self._tap is not None:
             self._tap(now, frame.raw)
         if frame.message_id == ATTITUDE_QUATERNION:
-            self._take_sample(frame.payload, now, received_ns)
+            try:
+                self._take_sample(frame.payload, now, received_ns)
+            except Exception as error:  # the frame still counts, and subscribers still get it
+                self._router.report(error)
         self._counter.count(frame.message_id, frame.sequence)
         self._router.route(frame.message_id, frame.payload)
 

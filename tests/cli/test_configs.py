@@ -1,5 +1,6 @@
 """The shipped configurations: complete, correct, and described by the shipped schema."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -146,3 +147,11 @@ def test_set_changes_keys_and_the_last_one_wins():
     changes = assigned(["limits.max_tilt_deg=20", "limits.max_tilt_deg=21", "flight.arm=true"])
     config = changed(Config(), changes, "--set")
     assert (config.limits.max_tilt_deg, config.flight.arm) == (21.0, True)
+
+
+def test_help_leaves_the_keyboard_interrupt_as_it_was():
+    before = signal.getsignal(signal.SIGINT)
+    for arguments in (["--help"], ["no-such-command"]):
+        with pytest.raises(SystemExit):
+            main(arguments)
+    assert signal.getsignal(signal.SIGINT) is before

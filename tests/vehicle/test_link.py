@@ -32,6 +32,23 @@ from tests.mavlink.fakes import (
 LEVEL = BodyRates(0.0, 0.0, 0.0)
 
 
+def test_an_error_while_a_sample_is_made_keeps_the_frame_and_those_after_it(run):
+    """An event of the vehicle's clock is told within the sample's way, and its taker may fail."""
+
+    async def scene():
+        async with linked() as (link, vehicle):
+            errors, heard = [], []
+            link.on_error = errors.append
+            link.subscribe("ATTITUDE_QUATERNION", heard.append)
+            taken, link.clock.take = link.clock.take, lambda *_: 1 / 0
+            vehicle.send(attitude(4, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            await until(lambda: heard)
+            link.clock.take = taken
+            assert [type(error) for error in errors] == [ZeroDivisionError]
+
+    run(scene())
+
+
 def test_a_sample_is_answered_by_one_setpoint(run):
     async def scene():
         async with linked() as (link, vehicle):
