@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_OK
+from companion.cli.tool_options import STARTS
 from companion.config import Config
 from companion.config.files import json_schema, load, shipped
 from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
@@ -13,9 +14,6 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
 from companion.flight.maneuvers import configured_maneuvers
 from companion.mavlink.transport.endpoint import parse_endpoint
-
-STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
-"""What `init` begins with, by the name the user gives."""
 
 
 def show(options: argparse.Namespace) -> int:
@@ -28,7 +26,7 @@ def show(options: argparse.Namespace) -> int:
         text = as_yaml(differences(load(options.diff)))
     else:
         config = load(options.file) if options.file else Config()
-        text = as_yaml(iter(_found(config, options.get) if options.get else keys(config)))
+        text = as_yaml(_found(config, options.get) if options.get else keys(config))
     sys.stdout.write(text)
     return EXIT_OK
 
@@ -39,9 +37,10 @@ def _found(config: Config, name: str) -> list[Key]:
     Raises:
         ConfigError: there is none.
     """
-    found = [key for key in keys(config) if name in (key.section, f"{key.section}.{key.name}")]
+    known = list(keys(config))
+    found = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
     if not found:
-        near = [f"{key.section}.{key.name}" for key in keys(config) if name in key.name]
+        near = [f"{key.section}.{key.name}" for key in known if name in key.name]
         hint = f"did you mean {', '.join(near)}?" if near else "`companion config` prints them all"
         raise ConfigError(f"--get: there is no key `{name}`; {hint}")
     return found

@@ -9,7 +9,8 @@ from typing import TypeAlias
 from companion.study import registry
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-_STARTS = "px4", "ardupilot", "mock"
+STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
+"""The shipped file that `init` begins with, by the name the user gives."""
 
 
 def add_benches(commands: Commands) -> None:
@@ -85,7 +86,7 @@ def add_config(commands: Commands) -> None:
     show.set_defaults(run="config.show")
 
     start = commands.add_parser("init", help="write a commented starting configuration")
-    start.add_argument("name", choices=_STARTS, help="for which vehicle")
+    start.add_argument("name", choices=list(STARTS), help="for which vehicle")
     start.add_argument(
         "--out",
         type=Path,

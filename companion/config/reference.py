@@ -4,7 +4,7 @@ All of it comes from the sections themselves, so a key is described in one place
 """
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -84,7 +84,7 @@ def keys(config: Config) -> Iterator[Key]:
                 defaults[section][name],
                 next((unit for end, unit in _UNITS.items() if name.endswith(end)), ""),
                 _allowed(schema[name]),
-                " ".join((field.description or "").split()),
+                _one_line(field.description or ""),
             )
 
 
@@ -93,7 +93,7 @@ def differences(config: Config) -> Iterator[Key]:
     return (key for key in keys(config) if key.value != key.default)
 
 
-def as_yaml(described: Iterator[Key]) -> str:
+def as_yaml(described: Iterable[Key]) -> str:
     """Keys as commented YAML, which a configuration may consist of."""
     models, lines, section = sections(), list[str](), ""
     for key in described:
@@ -109,7 +109,7 @@ def as_yaml(described: Iterator[Key]) -> str:
     return "\n".join(lines).strip() + "\n"
 
 
-def as_markdown(described: Iterator[Key]) -> str:
+def as_markdown(described: Iterable[Key]) -> str:
     """Keys as tables, one a section."""
     models, lines, section = sections(), list[str](), ""
     for key in described:

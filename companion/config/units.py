@@ -1,24 +1,35 @@
 """The one place where the units of the YAML keys become SI units."""
 
 from collections.abc import Callable
-from math import pi, radians
+from math import radians
 from typing import Any, Self, overload
 
-MS = 1e-3
-DEG = pi / 180.0
-_CONVERSIONS: dict[str, Callable[[float], float]] = {
+Conversion = Callable[[float], float]
+
+
+def seconds(milliseconds: float) -> float:
+    """Milliseconds in s."""
+    return 1e-3 * milliseconds
+
+
+def share(percent: float) -> float:
+    """Percent as a share, by the division with which the vehicle's own percent is converted."""
+    return percent / 100.0
+
+
+_CONVERSIONS: dict[str, Conversion] = {
     "_deg": radians,
     "_deg_s": radians,
     "_deg_s2": radians,
-    "_ms": lambda value: MS * value,
-    "_percent": lambda value: value / 100.0,  # as the vehicle's own percent is converted
+    "_ms": seconds,
+    "_percent": share,
 }
 """By the end of a key: to rad, rad/s, rad/s², s and a share."""
 
 
-def scaled(value: float | None, unit: float) -> float | None:
+def converted(value: float | None, convert: Conversion) -> float | None:
     """A value that may be null, in SI units."""
-    return None if value is None else unit * value
+    return None if value is None else convert(value)
 
 
 class Si(property):

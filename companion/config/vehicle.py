@@ -1,11 +1,12 @@
 """The vehicle: how its rate loop answers, and which thrust it hovers at."""
 
+from math import radians
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, StrictBool
 
 from companion.config.limits import Share
-from companion.config.units import DEG, MS, scaled
+from companion.config.units import converted, seconds
 from companion.files.yaml_file import Section
 
 Milliseconds = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -24,17 +25,17 @@ class AxisKeys(NamedTuple):
     @property
     def lag(self) -> float | None:
         """Time constant, s."""
-        return scaled(self.lag_ms, MS)
+        return converted(self.lag_ms, seconds)
 
     @property
     def dead_time(self) -> float | None:
         """Dead time, s."""
-        return scaled(self.dead_time_ms, MS)
+        return converted(self.dead_time_ms, seconds)
 
     @property
     def acceleration_limit(self) -> float | None:
         """Slew limit of the rate, rad/s²."""
-        return scaled(self.acceleration_limit_deg_s2, DEG)
+        return converted(self.acceleration_limit_deg_s2, radians)
 
     def but(self, *keys: float | None) -> "AxisKeys":
         """These, but for the `keys` that are not None; an axis with a lag has its own damping."""
@@ -98,18 +99,18 @@ class VehicleConfig(Section):
     def response(self) -> dict[str, float]:
         """The options of `make_planner`, in SI units; keys that are null are left out."""
         options = {
-            "lag": scaled(self.lag_ms, MS),
-            "dead_time": scaled(self.dead_time_ms, MS),
-            "acceleration": scaled(self.acceleration_limit_deg_s2, DEG),
+            "lag": converted(self.lag_ms, seconds),
+            "dead_time": converted(self.dead_time_ms, seconds),
+            "acceleration": converted(self.acceleration_limit_deg_s2, radians),
             "damping": self.damping,
-            "pitch_lag": scaled(self.pitch_lag_ms, MS),
-            "pitch_dead_time": scaled(self.pitch_dead_time_ms, MS),
-            "pitch_acceleration": scaled(self.pitch_acceleration_limit_deg_s2, DEG),
+            "pitch_lag": converted(self.pitch_lag_ms, seconds),
+            "pitch_dead_time": converted(self.pitch_dead_time_ms, seconds),
+            "pitch_acceleration": converted(self.pitch_acceleration_limit_deg_s2, radians),
             "pitch_damping": self.pitch_damping,
-            "yaw_lag": scaled(self.yaw_lag_ms, MS),
-            "yaw_dead_time": scaled(self.yaw_dead_time_ms, MS),
-            "yaw_acceleration": scaled(self.yaw_acceleration_limit_deg_s2, DEG),
-            "frame_lead": scaled(self.yaw_frame_lead_ms, MS),
+            "yaw_lag": converted(self.yaw_lag_ms, seconds),
+            "yaw_dead_time": converted(self.yaw_dead_time_ms, seconds),
+            "yaw_acceleration": converted(self.yaw_acceleration_limit_deg_s2, radians),
+            "frame_lead": converted(self.yaw_frame_lead_ms, seconds),
         }
         return {name: value for name, value in options.items() if value is not None}
 
@@ -141,4 +142,4 @@ class ThrustConfig(Section):
     @property
     def lag(self) -> float:
         """Time constant of the rotors' thrust, s; 0 where it is not known."""
-        return scaled(self.lag_ms, MS) or 0.0
+        return converted(self.lag_ms, seconds) or 0.0

@@ -155,7 +155,7 @@ class VehicleClock:
             self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
     def look(self, now: float) -> None:
-        """Drop expired TIMESYNC exchanges, each second; report once if ages are not known."""
+        """Drop expired TIMESYNC exchanges; report when ages become unknown, or known again."""
         self.delay.expire(now)
         if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._told_unknown:
             return

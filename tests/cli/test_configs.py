@@ -7,8 +7,8 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from companion.cli.config import STARTS
 from companion.cli.main import main
+from companion.cli.tool_options import STARTS
 from companion.config import Config
 from companion.config.files import assigned, changed, json_schema, load
 from companion.config.flight import CircleConfig
