@@ -16,10 +16,10 @@ from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
+from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
-from companion.guidance import ManeuverSequence
 from companion.guidance.follow import Follow
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
@@ -130,9 +130,9 @@ def assemble(
     observer: Observer,
     ask_landing: AskLanding,
     folder: Path,
-    maneuvers: ManeuverSequence,
+    plan: Plan,
 ) -> Assembled:
-    """Assemble a flight of `maneuvers` over an open link; its records are written to `folder`."""
+    """Assemble a flight by `plan` over an open link; its records are written to `folder`."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
     loop, guidance_loop, ground = _control(config, link, trace, clock)
@@ -141,14 +141,14 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = PreflightChecks(config, link, same_vehicle, unbegun(maneuvers))
+    preflight = PreflightChecks(config, link, same_vehicle, unbegun(plan.maneuvers))
     context = FlightContext(
         config,
         link,
         loop,
         guidance_loop,
         snapshot_builder,
-        maneuvers,
+        plan.maneuvers,
         ground,
         preflight,
         same_vehicle,
@@ -157,7 +157,7 @@ def assemble(
     rate_requester = RateRequester(link, config.link)
     watch = Watch(context, ladder, rate_requester, clock)
     loop.ask_mode = watch.ask_mode
-    flight = Flight(context, watch, observer, ask_landing)
+    flight = Flight(context, plan, watch, observer, ask_landing)
     ladder.note = context.note = preflight.note = flight.note
     link.clock.on_event = rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None

@@ -10,8 +10,8 @@ from companion.config import Config
 from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.flight import AskLanding
-from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Observer, StateLogger
+from companion.flight.plan import ConfiguredPlan, Plan
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
@@ -28,6 +28,7 @@ class Session:
         folder: an existing folder for this flight's files.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
+        plan: of the flight; None: as configured.
     """
 
     def __init__(
@@ -36,11 +37,13 @@ class Session:
         folder: Path,
         observer: Observer,
         ask_landing: AskLanding,
+        plan: Plan | None = None,
     ) -> None:
         self._config = config
         self._folder = folder
         self._observer = observer
         self._ask_landing = ask_landing
+        self._plan = plan
         self._assembled: Assembled | None = None
         self._flying: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
@@ -76,7 +79,7 @@ class Session:
         flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
         (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
-        maneuvers = configured_maneuvers(self._config)
+        plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 
@@ -94,7 +97,7 @@ class Session:
                     self._observer,
                     self._ask_landing,
                     self._folder,
-                    maneuvers,
+                    plan,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
