@@ -160,9 +160,12 @@ class ControlLoop:
         # Checked here, because rates from guidance bypass the planner and thrust does not check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
-        return self._rates(sample, command, period), self._hover_thrust.normalised(
-            command.acceleration_down, sample.q, sample.body_rates
+        thrust = (
+            self._hover_thrust.normalised(command.acceleration_down, sample.q, sample.body_rates)
+            if command.thrust is None
+            else self._hover_thrust.within_limits(command.thrust)
         )
+        return self._rates(sample, command, period), thrust
 
     def _rates(self, sample: AttitudeSample, command: GuidanceCommand, period: float) -> BodyRates:
         """The planner's answer, or the body rates from guidance within the same limits."""
