@@ -90,13 +90,6 @@ def test_the_configuration_is_written_and_mistakes_are_named(
     assert "fence_radius_m: 3" in capsys.readouterr().out
 
 
-def test_the_csv_path_is_flown(folder: Path) -> None:
-    result, tracking = output(folder, "fly_csv.py").splitlines()
-    assert result.startswith("result: ok, recorded in flights/")
-    assert numbers(tracking)[0] < 0.1
-    assert len((folder / "heart.csv").read_text().splitlines()) == 402
-
-
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which a flight of doublets was recorded, by the example that identifies."""
