@@ -10,6 +10,7 @@ from companion.api.program import Program, ended_by
 from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
+from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
@@ -54,18 +55,23 @@ async def connect(
     if arm is not None:
         own["flight"]["arm"] = arm
     told = changed(changed(told, changes or {}, "changes"), own, "connect")
+    async with flying(told, folder or flight_folder(told.recording.directory), observer) as vehicle:
+        yield vehicle
+
+
+@asynccontextmanager
+async def flying(
+    config: Config,
+    folder: Path | None,
+    observer: Observer | None = None,
+    environment: Environment = THIS_COMPUTER,
+) -> AsyncGenerator[Vehicle, None]:
+    """As `connect`, with a configuration as it is; without a folder nothing is recorded."""
     program = Program()
-    session = Session(
-        told,
-        folder or flight_folder(told.recording.directory),
-        observer or Silent(),
-        _decline,
-        program,
-    )
+    session = Session(config, folder, observer or Silent(), _decline, program, environment)
     flight = asyncio.create_task(_fly(session, program))
     try:
-        context = await program.connected
-        vehicle = Vehicle(program, context)
+        vehicle = Vehicle(program, await program.connected)
         try:
             yield vehicle
         except BaseException as error:

@@ -1,4 +1,4 @@
-"""Programs that fly by `companion.connect`, against the mock vehicle in lockstep."""
+"""Programs that fly by `companion.connect`, against the mock vehicle in memory."""
 
 import asyncio
 from math import dist, hypot, pi
@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 import companion
-from companion.config import Config, trajectory_file
-from companion.files import bounded_yaml
-from companion.files.yaml_file import ConfigError, parse
+from companion.config import trajectory_file
+from companion.files.yaml_file import ConfigError
 from companion.guidance import Pose
 from companion.guidance.follow import HeldFigure
-from companion.mavlink import lockstep
-from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, merged, mock_vehicle
+from companion.testing import MockVehicle, connect, run
+from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QUICK_PARAMETERS, merged
 from tests.flight.test_tracking import FAST
 
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
@@ -35,29 +34,26 @@ class Told:
         self.events.append(text)
 
 
-def flown(program, mock, folder, **changes):
-    """Run `program(vehicle)` in lockstep; returns the summary and what was told."""
+def flown(program, mock, folder=None, **changes):
+    """Run `program(vehicle)` on the mock's clock; returns the summary and what was told."""
     told = Told()
-    link = {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": True}
-    text = bounded_yaml.dump(
-        merged(
-            merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {})), {"link": link, **changes}
-        )
-    )
-    folder.mkdir(exist_ok=True)
+    usual = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
 
     async def main():
-        async with companion.connect(
-            parse(text, "test", Config), folder=folder, observer=told
-        ) as vehicle:
+        async with connect(merged(usual, changes), mock, folder, told) as vehicle:
             await program(vehicle)
         return vehicle.summary
 
-    return lockstep.run(main()), told.events
+    return run(mock, main()), told.events
+
+
+def mock_vehicle(autopilot="px4"):
+    """A mock that takes off and lands quickly."""
+    return MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
 
 
 @BOTH
-def test_it_takes_off_flies_to_places_and_lands(tmp_path, autopilot):
+def test_it_takes_off_flies_to_places_and_lands(autopilot):
     at = []
 
     async def program(vehicle):
@@ -71,16 +67,16 @@ def test_it_takes_off_flies_to_places_and_lands(tmp_path, autopilot):
         at.append(abs(vehicle.state.heading - 0.5 * pi))
         await vehicle.land()
 
-    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
-        summary, _ = flown(program, mock, tmp_path / "log")
-        state = mock.state()
+    mock = mock_vehicle(autopilot)
+    summary, _ = flown(program, mock)
+    state = mock.state()
     assert summary.result == "ok"
     assert (state["armed"], state["crashed"]) == (False, False)
     assert max(at) < 0.1, at
 
 
 @BOTH
-def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(tmp_path, autopilot):
+def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(autopilot):
     errors = []
 
     async def program(vehicle):
@@ -95,13 +91,13 @@ def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(tmp_path
         errors.append(np.abs(there - vehicle.state.position_ned).max())
         await vehicle.land()
 
-    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
-        summary, _ = flown(program, mock, tmp_path / "log")
+    mock = mock_vehicle(autopilot)
+    summary, _ = flown(program, mock)
     assert summary.result == "ok"
     assert errors[0] < 0.15
 
 
-@pytest.mark.parametrize(("period", "with_jerk"), [(0.02, False), (0.1, True)])
+@pytest.mark.parametrize(("period", "with_jerk"), [(0.02, False), (0.04, True)])
 def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
     tmp_path, period, with_jerk
 ):
@@ -129,8 +125,8 @@ def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
 
     error = {}
     for program in (built_in, streamed):
-        with mock_vehicle(tmp_path) as mock:
-            summary, _ = flown(program, mock, tmp_path / program.__name__, **quick)
+        mock = mock_vehicle()
+        summary, _ = flown(program, mock, **quick)
         assert summary.result == "ok"
         error[program.__name__] = summary.tracking()["position_rms_m"]
     assert error["built_in"] < 0.1
@@ -180,11 +176,11 @@ def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(
         async with vehicle.control() as control:
             await fault(control)
 
-    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
-        with pytest.raises(error):
-            flown(program, mock, tmp_path / "log")
-        state = mock.until(lambda state: hypot(*state["velocity"][:2]) < 0.3)
-    events = (tmp_path / "log" / "summary.json").read_text()
+    mock = mock_vehicle(autopilot)
+    with pytest.raises(error):
+        flown(program, mock, tmp_path)
+    state = mock.until(lambda state: hypot(*state["velocity"][:2]) < 0.3)
+    events = (tmp_path / "summary.json").read_text()
     assert reason in events
     assert state["mode"] in ("LOITER", "BRAKE")
     assert (state["armed"], state["crashed"]) == (True, False)
@@ -196,15 +192,15 @@ def test_a_pilot_who_takes_over_ends_the_program_at_once(tmp_path):
     async def program(vehicle):
         await vehicle.take_off()
         async with vehicle.control() as control:
-            mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+            mock.take_over("POSCTL")
             async for _ in control.states(seconds=20.0):
                 control.accelerate((0.0, 0.0, 0.0))
                 seen.append(1)
 
-    with mock_vehicle(tmp_path) as mock:
-        with pytest.raises(companion.FlightEnded, match="took over: mode POSCTL"):
-            flown(program, mock, tmp_path / "log")
-        assert mock.state()["mode"] == "POSCTL"
+    mock = mock_vehicle()
+    with pytest.raises(companion.FlightEnded, match="took over: mode POSCTL"):
+        flown(program, mock, tmp_path)
+    assert mock.state()["mode"] == "POSCTL"
     assert len(seen) < 500
 
 
@@ -220,8 +216,8 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
         assert dist(here, vehicle.state.position_ned) < 0.1
         await vehicle.land()
 
-    with mock_vehicle(tmp_path) as mock:
-        summary, _ = flown(program, mock, tmp_path / "log")
+    mock = mock_vehicle()
+    summary, _ = flown(program, mock)
     assert summary.result == "ok"
 
 
@@ -229,9 +225,9 @@ def test_a_program_that_ends_in_the_air_hands_back(tmp_path):
     async def program(vehicle):
         await vehicle.take_off()
 
-    with mock_vehicle(tmp_path) as mock:
-        summary, told = flown(program, mock, tmp_path / "log")
-        state = mock.state()
+    mock = mock_vehicle()
+    summary, told = flown(program, mock)
+    state = mock.state()
     assert summary.result == "ok"
     assert state["mode"] == "LOITER"
     assert "phase hand back" in told
@@ -242,7 +238,7 @@ def test_before_take_off_nothing_flies(tmp_path):
         with pytest.raises(companion.FlightEnded, match="take off first"):
             await vehicle.hold(1.0)
 
-    with mock_vehicle(tmp_path) as mock:
-        summary, _ = flown(program, mock, tmp_path / "log")
-        assert mock.state()["armed"] is False
+    mock = mock_vehicle()
+    summary, _ = flown(program, mock)
+    assert mock.state()["armed"] is False
     assert summary.result == "ok"
