@@ -15,10 +15,11 @@ Nothing sleeps, no socket is opened, and equal inputs give equal flights to the 
 
 `MockVehicle` tells the true state and what setpoints it received, takes faults, and gives the
 pilot's sticks and another station's commands. `fly` takes a configuration and flies it; `run` runs
-any coroutine on the vehicle's clock, with links opened by `open_wire`.
+any coroutine on the vehicle's clock, with links opened by `open_wire`. A program of your own flies
+inside `run` by `connect`, which gives it the same `Vehicle` as `companion.connect`.
 """
 
-from companion.testing.flying import environment, fly, run, session
+from companion.testing.flying import connect, environment, fly, run, session
 from companion.testing.vehicle import MockVehicle, ReceivedSetpoint
 from companion.testing.virtual_loop import VirtualEventLoop
 from companion.testing.wire import open_wire
@@ -29,6 +30,7 @@ __all__ = [
     "ReceivedSetpoint",
     "Truth",
     "VirtualEventLoop",
+    "connect",
     "environment",
     "fly",
     "open_wire",
