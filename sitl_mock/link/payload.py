@@ -72,9 +72,7 @@ def _arguments(kind: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
     texts = [kind.fieldnames.index(name) for name in _texts(kind)]
 
     def arguments(values: tuple[Any, ...]) -> Iterable[Any]:
-        picked = [
-            list(values[pick]) if isinstance(pick, slice) else values[pick] for pick in picks
-        ]
+        picked = [list(values[pick]) if isinstance(pick, slice) else values[pick] for pick in picks]
         for index in texts:
             picked[index] = picked[index].rstrip(b"\0")
         return picked
@@ -85,5 +83,7 @@ def _arguments(kind: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
 def _texts(kind: Any) -> set[str]:
     """Return the names of the text fields of a message class."""
     return {
-        name for name, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True) if type_ == "char"
+        name
+        for name, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+        if type_ == "char"
     }

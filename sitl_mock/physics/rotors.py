@@ -43,12 +43,15 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
         roll *= scale
         pitch *= scale
         demand = room
-    throttle = min(throttle, 1.0 - demand)
+    if throttle > 1.0 - demand:
+        throttle = 1.0 - demand
     # One diagonal has pitch - roll and +yaw, the other pitch + roll and -yaw.
     counter, clockwise = abs(pitch - roll), abs(pitch + roll)
     if yaw < 0.0:
         counter, clockwise = clockwise, counter
-    room = min(1.0 - throttle - counter, throttle - clockwise)
+    room = 1.0 - throttle - counter
+    if room > throttle - clockwise:
+        room = throttle - clockwise
     yaw_saturated = abs(yaw) > room
     if yaw_saturated:
         room = max(room, 0.0)
