@@ -1,7 +1,7 @@
 """Payloads of pymavlink's message classes: message to bytes and back.
 
-Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take three
-times as long, because they find out at every frame what depends on the message class only.
+Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take
+three times as long, because they find out at every frame what depends on the class only.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,7 +16,7 @@ Message = Any
 
 def pack(message: Message) -> bytes:
     """Return the payload of a message, with its trailing zeros."""
-    kind = type(message)
+    kind: Any = type(message)
     payload: bytes = kind.unpacker.pack(*_wire_values(kind)(message))
     return payload
 
