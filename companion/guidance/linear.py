@@ -1,19 +1,22 @@
 """Linear guidance: a reference followed without lag through the known linear inner response."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
 from companion.drag import Drag
 from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
-from companion.guidance.reference import GRAVITY, Horizontal, Reference, VehicleMotion, limited
+from companion.guidance.reference import (
+    GRAVITY,
+    Horizontal,
+    Reference,
+    ReferenceAt,
+    VehicleMotion,
+    limited,
+)
 from companion.guidance.thrust import height_first
-
-ReferenceAt = Callable[[float], Reference]
-"""The reference over time, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +74,24 @@ class LinearCommand(NamedTuple):
     target: Target
     later: Target
     down: float
+
+
+class Guidance(Protocol):
+    """Turns a reference into a target and a vertical acceleration, once in each period."""
+
+    @property
+    def acts_after(self) -> float:
+        """Mean delay from computing a command until the vehicle responds to its feedback, s.
+
+        `GuidanceInput.acts` is predicted by it.
+        """
+        ...
+
+    def command(
+        self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
+    ) -> LinearCommand:
+        """One step; see `LinearGuidance.command`."""
+        ...
 
 
 class LinearGuidance:
