@@ -50,7 +50,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows = '        Monitor("tilt", tilt,'
     assert rows in table.read_text("utf-8")
     row = block("companion/safety/table.py").strip().replace("sinking(3.0)", "sinking(0.2)")
-    table.write_text(table.read_text("utf-8").replace(rows, f"        {row}\n{rows}", 1), "utf-8")
+    table.write_text(table.read_text("utf-8").replace(rows, f"        {row},\n{rows}", 1), "utf-8")
     return tree
 
 
