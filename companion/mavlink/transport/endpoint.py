@@ -168,11 +168,8 @@ def _remedy(text: str) -> str:
     text = text.strip()
     if device := _DEVICE.fullmatch(text):
         name, baud = device[1], device[2]
-        place = (
-            name
-            if name.startswith("COM")
-            else f"/dev/{name.removeprefix('/').removeprefix('dev/')}"
-        )
+        unix = name.removeprefix("/").removeprefix("dev/")
+        place = name if name.startswith("COM") else f"/dev/{unix}"
         if baud:
             return f"write serial://{place}:{baud}"
         return (
