@@ -15,8 +15,8 @@ class LinkConfig(Section):
     """direct: our own connection. mavsdk: MAVSDK holds the connection and carries our frames (extra
     `mavsdk`)."""
     endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
-    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD. udpin and tcpin
-    also take ?peer=HOST[:PORT], to hear no other. udp://:PORT of other programs is taken as
+    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD. udpin and
+    tcpin also take ?peer=HOST[:PORT], to hear no other. udp://:PORT of other programs is taken as
     udpin://0.0.0.0:PORT."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
     """System id of the autopilot; every other system is ignored."""

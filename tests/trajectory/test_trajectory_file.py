@@ -182,7 +182,8 @@ def test_a_csv_file_lies_beside_its_yaml_or_stands_alone(tmp_path):
 def test_a_fault_is_told_in_a_sentence_that_names_the_file(tmp_path, text, sentence):
     with pytest.raises(ConfigError) as caught:
         _load(tmp_path, text)
-    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}: ")
+    line = ", line 1" if sentence.startswith("`") else ""
+    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}{line}: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
 
