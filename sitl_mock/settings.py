@@ -92,6 +92,10 @@ def _mock_section(document: object, path: Path) -> dict[str, Any]:
         section = {}
     if not isinstance(section, dict):
         raise ConfigError(f"{path}: the `mock` section must be a mapping of keys to values")
+    signing = section.get("signing")
+    if isinstance(signing, dict) and isinstance(signing.get("passphrase_file"), str):
+        file = path.parent / signing["passphrase_file"]
+        section = {**section, "signing": {**signing, "passphrase_file": str(file)}}
     lockstep = section.get("lockstep")
     if lockstep is None:
         return {**section, "lockstep": {}}

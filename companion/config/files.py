@@ -15,7 +15,11 @@ from companion.files.yaml_faults import shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
-FILES_READ = (("flight", "trajectory"), ("link", "signing_key_file"))
+FILES_READ: tuple[tuple[str, ...], ...] = (
+    ("flight", "trajectory"),
+    ("link", "signing_key_file"),
+    ("mock", "signing", "passphrase_file"),
+)
 """Keys that name a file to read: relative to the file that names it, as an include is."""
 _DEEPEST = 4
 """Largest depth of nested includes."""
@@ -40,11 +44,11 @@ def load(path: Path) -> Config:
 def _read(path: Path) -> Contents:
     """A file, its paths resolved against its own folder."""
     contents = yaml_file.read(path, Config)
-    for section, key in FILES_READ:
-        values = contents.keys.get(section)
-        if not isinstance(values, dict):
-            continue
-        name = values.get(key)
+    for *sections, key in FILES_READ:
+        values: Any = contents.keys
+        for section in sections:
+            values = values.get(section) if isinstance(values, dict) else None
+        name = values.get(key) if isinstance(values, dict) else None
         if isinstance(name, str) and yaml_file.is_path(name):
             values[key] = str(path.parent / name)
     return contents

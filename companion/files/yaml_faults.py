@@ -138,7 +138,7 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
     name = str(location[-1])
     beside = list(_model_at(location, model).model_fields)
     everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
-    if not isinstance(value, dict):
+    if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in beside):
         same = [".".join((*place, key)) for key, place in everywhere if key == name]
         if same:
             return f"stands in the wrong place; write {_either(same)}"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.files import bounded_yaml
+from companion.flight import flown_config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.flight import AskLanding
 from companion.flight.maneuvers import configured_maneuvers
@@ -67,16 +67,17 @@ class Session:
     async def fly(self) -> Summary:
         """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
 
+        `companion fly --config FOLDER/config.yaml` flies the same again, from any working folder.
+
         Raises:
             ConfigError: a maneuver cannot be flown; nothing was sent.
             LinkError: the link could not be opened; nothing was sent.
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
-        flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
-        (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
         maneuvers = configured_maneuvers(self._config)
+        flown_config.record(self._config, self._folder)
         loop = asyncio.get_running_loop()
         epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
 

@@ -60,11 +60,12 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     path = [str(part) for part in detail["loc"]]
     where = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
-        elsewhere = [place for place in _places_of(path[-1], model) if place != where]
-        if elsewhere:
-            return f"{where} stands in the wrong place; write {' or '.join(elsewhere)}"
         owner = _model_at(model, path[:-1])
-        hint = suggestion(path[-1], owner.model_fields) if owner else ""
+        beside = owner.model_fields if owner else ()
+        elsewhere = [place for place in _places_of(path[-1], model) if place != where]
+        if elsewhere and not any(key.startswith(f"{path[-1]}_") for key in beside):
+            return f"{where} stands in the wrong place; write {' or '.join(elsewhere)}"
+        hint = suggestion(path[-1], beside) if owner else ""
         return f"unknown key {where}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
         return f"{where} must be a number: {_number_in(str(detail['input']))}"
