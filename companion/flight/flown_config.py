@@ -15,7 +15,7 @@ _TRAJECTORY = "trajectory"
 _TABLE = "table.csv"
 
 
-def record(config: Config, folder: Path) -> None:
+def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     """Write `config.yaml` to the folder of a flight, and copy the trajectory's file there.
 
     The keys of included files stand in it. Other files that it names stay where they are, a signing
@@ -24,6 +24,7 @@ def record(config: Config, folder: Path) -> None:
     Args:
         config: of the flight; its trajectory can be read.
         folder: of the flight.
+        follows: whether the maneuvers of the configuration are flown, its trajectory among them.
 
     Raises:
         OSError: a file cannot be read or written.
@@ -32,7 +33,7 @@ def record(config: Config, folder: Path) -> None:
     for place in FILES_READ:
         _make_absolute(data, place)
     path = config.flight.trajectory
-    if path is not None and "trajectory" in config.flight.maneuvers:
+    if follows and path is not None and "trajectory" in config.flight.maneuvers:
         data["flight"]["trajectory"] = f"{_TRAJECTORY}/{_copied(path, folder / _TRAJECTORY)}"
     (folder / _NAME).write_text(bounded_yaml.dump(data), encoding="utf-8")
 

@@ -72,7 +72,7 @@ class Table:
     unused: tuple[str, ...] = ()
 
 
-def read(path: Path) -> Table:
+def read_csv(path: Path) -> Table:
     """Read a file.
 
     Raises:
