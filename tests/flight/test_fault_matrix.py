@@ -106,7 +106,7 @@ class Begin(Silent):
     def phase(self, name, waits_for):
         if name == self.wanted:
             at = self.mock.state()["time"] + self.after
-            self.mock.ask({"fault": {**self.fault, "at_s": at}})
+            self.mock.inject({**self.fault, "at_s": at})
             self.wanted = None
 
 

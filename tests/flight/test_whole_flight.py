@@ -1,4 +1,4 @@
-"""The whole maneuver against the mock over a real socket, in lockstep."""
+"""The whole maneuver against the mock."""
 
 import pytest
 from pymavlink import mavutil
@@ -17,7 +17,7 @@ MANEUVERS = {
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory):
-    """The same maneuver flown twice by two fresh pairs of processes."""
+    """The same maneuver flown twice by two fresh vehicles."""
     summaries = []
     for number in range(2):
         folder = tmp_path_factory.mktemp(f"flight{number}")
