@@ -18,7 +18,7 @@ pilot's sticks and another station's commands. `fly` takes a configuration and f
 any coroutine on the vehicle's clock, with links opened by `open_wire`.
 """
 
-from companion.testing.flying import environment, fly, run, session
+from companion.testing.flying import UnseenError, environment, fly, run, session
 from companion.testing.vehicle import MockVehicle, ReceivedSetpoint
 from companion.testing.virtual_loop import VirtualEventLoop
 from companion.testing.wire import open_wire
@@ -28,6 +28,7 @@ __all__ = [
     "MockVehicle",
     "ReceivedSetpoint",
     "Truth",
+    "UnseenError",
     "VirtualEventLoop",
     "environment",
     "fly",

@@ -13,6 +13,9 @@ from companion.files.yaml_file import parse
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
+WIRE_S = 0.0005
+"""A datagram needs this long over UDP on a busy computer, s."""
+
 QUICK_MOCK = {"gcs_port": 0, "prearm_delay_s": 0.2}
 QUICK_PARAMETERS = {
     "px4": {
@@ -70,8 +73,12 @@ def quick_flight(autopilot, changes, **link):
 
 
 @contextmanager
-def mock_vehicle(folder=None, *, in_lockstep=True, autopilot="px4", delay_s=0.0, **settings):
-    """A mock vehicle in memory; `folder` is there because those of `sockets` need it."""
+def mock_vehicle(folder=None, *, in_lockstep=False, autopilot="px4", delay_s=WIRE_S, **settings):
+    """A mock vehicle in memory; `folder` is there because those of `sockets` need it.
+
+    Samples are answered as they come, as over UDP. In lockstep fly those flights whose test counts
+    on the moment of a telemetry message.
+    """
     known = quick_vehicle(autopilot, settings)
     stepping = {"enabled": in_lockstep, **known.pop("lockstep", {})}
     yield testing.MockVehicle(delay_s=delay_s, lockstep=stepping, **known)

@@ -228,7 +228,7 @@ def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monk
     def disarm_soon():
         asyncio.get_running_loop().call_later(0.5, mock.command, ARM, 0)
 
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle(tmp_path, in_lockstep=True) as mock:
         LostAnswer(monkeypatch, ARM, disarm_soon)
         summary = fly(mock, tmp_path / "log")
         assert not mock.state()["armed"]

@@ -26,7 +26,7 @@ def takeover(tmp_path, after, **settings):
         at = ceil(mock.state()["time"]) + 2.0 + after
         mock.inject({"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at})
 
-    with mock_vehicle(tmp_path, **settings) as mock:
+    with mock_vehicle(tmp_path, **settings, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result
@@ -50,7 +50,7 @@ def test_a_vehicle_that_disarms_in_flight_is_heard_at_once(tmp_path):
         at = mock.state()["time"]
         mock.command(400, 0, 21196)
 
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle(tmp_path, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", When("maneuvers", kill, after=1.0))
         state = mock.state()
     assert summary.result == "the vehicle disarmed in flight"

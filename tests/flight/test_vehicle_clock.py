@@ -14,7 +14,7 @@ WRAP_MS = 2**32
 
 def flown(folder, autopilot, begin):
     """A flight in whose maneuver the vehicle's stamps change; its summary and the true state."""
-    with mock_vehicle(autopilot=autopilot) as mock:
+    with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         relay = ClockRelay(mock)
         observer = When("maneuvers", lambda: begin(relay), after=1.0)
         summary = fly(mock, folder / "log", observer)
@@ -40,7 +40,7 @@ def test_a_clock_that_jumps_in_flight_is_handed_back(tmp_path, autopilot, shift_
 
 def wrapping(folder, autopilot, seconds):
     """A flight whose time since boot wraps so long after its begin."""
-    with mock_vehicle(autopilot=autopilot) as mock:
+    with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         ClockRelay(mock).shift_ms = WRAP_MS - round(1000 * seconds)
         return fly(mock, folder / "log"), mock.state()
 
@@ -74,7 +74,7 @@ def test_one_sample_stamped_far_ahead_is_dropped_named_and_flown_on(tmp_path, au
 
 
 def test_telemetry_that_is_late_from_the_start_is_refused_where_timesync_tells_it(tmp_path):
-    with mock_vehicle(in_lockstep=False) as mock:
+    with mock_vehicle() as mock:
         ClockRelay(mock).late_ms = 400
         summary = fly(mock, tmp_path / "log")
     assert "old when it arrives, longer than deadman.telemetry_stale_ms" in summary.result
