@@ -3,7 +3,7 @@
 import pytest
 
 from companion.demo import wire_like
-from tests.flight.fly import fly, mock_vehicle
+from tests.flight.sockets import fly, mock_vehicle
 
 WIRES = {"udp": None, "tcp": "tcp://127.0.0.1:1", "serial": "serial:///dev/any:921600"}
 

@@ -13,7 +13,8 @@ from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.vehicle import link
 from companion.vehicle.clock import VehicleClock
-from tests.flight.fly import decline, merged
+from tests.flight.fly import merged
+from tests.flight.sockets import decline
 from tests.hostile.autopilot import HostileAutopilot
 from tests.hostile.body import HOVER_THRUST
 
