@@ -37,7 +37,7 @@ def add_serve(commands: Commands) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="instead of the configuration's, such as serve.hold_s=2; as often as needed",
+        help="instead of the configuration's, such as link.target_system=2; as often as needed",
     )
     serve.add_argument("--json", action="store_true", help="end with the counters as one JSON line")
     serve.set_defaults(run="serve.serve")

@@ -71,6 +71,7 @@ class ControlLoop:
         trace: FlightTrace,
         limits: Limits,
         clock: Callable[[], float],
+        clock_ns: Callable[[], int] = perf_counter_ns,
     ) -> None:
         self.command: GuidanceCommand | None = None
         self.on = False
@@ -85,6 +86,7 @@ class ControlLoop:
         self._hover_thrust = hover_thrust
         self._send = send
         self._clock = clock
+        self._clock_ns = clock_ns
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
@@ -185,7 +187,7 @@ class ControlLoop:
         """Count and record a setpoint that has left."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
-        latency = perf_counter_ns() - sample.received_ns
+        latency = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
         if self.offboard_active:

@@ -21,7 +21,7 @@ class _Upload(NamedTuple):
     """A plan that is being uploaded, by whom, and its items so far."""
 
     mission_type: int
-    count: int
+    size: int
     client: tuple[int, int]
     items: list[Message]
 
@@ -76,7 +76,7 @@ class MissionProtocol:
             self._request_item(link, upload)
             return
         upload.items.append(message)
-        if len(upload.items) < upload.count:
+        if len(upload.items) < upload.size:
             self._request_item(link, upload)
             return
         self.plans[upload.mission_type], self._upload = upload.items, None
