@@ -31,7 +31,10 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
     try:
         found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=socket.SOCK_DGRAM)
     except OSError as error:
-        raise EndpointError(f"serve.clients: {where}: host unknown ({error.strerror})") from error
+        raise EndpointError(
+            f"serve.clients: {where}: host unknown ({error.strerror}); check the name or use its "
+            "IP address"
+        ) from error
     family, _, _, _, address = found[0]
     named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), socket.SOCK_DGRAM)
     opened = socket.socket(family, socket.SOCK_DGRAM)
