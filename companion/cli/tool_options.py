@@ -44,7 +44,7 @@ def add_serve(commands: Commands) -> None:
 
 
 def add_benches(commands: Commands) -> None:
-    """Add `bench link` and `bench planner`."""
+    """Add `bench link`, `bench planner` and `bench flight`."""
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
     link = benches.add_parser(
@@ -60,7 +60,12 @@ def add_benches(commands: Commands) -> None:
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument("--seconds", type=number(0.001, 3600.0), default=5.0, help="of measuring (5)")
     step.set_defaults(run="tools.bench_planner")
-    for each in (link, step):
+    flight = benches.add_parser("flight", help="whole flights in one process, times real time")
+    flight.add_argument(
+        "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
+    )
+    flight.set_defaults(run="tools.bench_flight")
+    for each in (link, step, flight):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
 
