@@ -41,6 +41,7 @@ class FlightTrace:
             rad/s, thrust 0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while
             offboard control is active by its heartbeats.
         latencies_ns: sample in → setpoint out inside this process, ns.
+        newest_latency_ns: the newest of them; 0 before the first.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -48,6 +49,7 @@ class FlightTrace:
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
         self.rates = Series(_RATES, self._spool, kept=_KEPT_RATES)
+        self.newest_latency_ns = 0
         self.latencies_ns = Series(("latency_ns",), self._spool)
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
@@ -77,6 +79,7 @@ class FlightTrace:
 
     def add_latency(self, nanoseconds: int) -> None:
         """Record the latency of one answer."""
+        self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
     def save(self, folder: Path) -> None:

@@ -98,6 +98,8 @@ class Autopilot(Protocol):
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to whole multiples of this.
         rates_along_target: Whether it takes body rates along the axes of ATTITUDE_TARGET, an
             attitude that turns before the body follows. Otherwise along the body's own axes.
+        body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
+            from the present yaw, not from north.
         offboard_loss_failsafe: What it does when setpoints stop.
         cannot_arm_in: Roles of the modes in which it cannot be armed once it stands disarmed.
         parameters: Rules for the parameters that matter to a flight by body rates.
@@ -113,6 +115,7 @@ class Autopilot(Protocol):
     wanted_rates: Mapping[str, float]
     interval_step_us: int
     rates_along_target: bool
+    body_yaw_is_relative: bool
     offboard_loss_failsafe: OffboardLossFailsafe
     cannot_arm_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]
