@@ -31,9 +31,9 @@ class ServeConfig(Section):
     """How long the vehicle is held for a client that has stopped, before it is handed back."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=30.0)] = 5.0
     """Largest horizontal speed towards a commanded position. Commanded velocities may be larger."""
-    max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 4.0
+    max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
     """Largest horizontal acceleration after a jump of the commanded position or velocity."""
-    max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 12.0
+    max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
     """Largest jerk of the same motion: how fast the vehicle tilts is this divided by gravity."""
 
     setpoint_timeout = Si("setpoint_timeout_ms")

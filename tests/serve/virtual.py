@@ -58,7 +58,13 @@ class MemoryClient(Client):
             await asyncio.sleep(0.05)
 
     def texts(self):
-        return [each.text for each in self.of("STATUSTEXT") if each.get_srcComponent() == 191]
+        """What our component said; the pieces of long texts joined."""
+        said = {}
+        for number, each in enumerate(self.of("STATUSTEXT")):
+            if each.get_srcComponent() == 191:
+                key = -number if each.id == 0 else each.id
+                said[key] = said.get(key, "") + each.text
+        return list(said.values())
 
     def local(
         self,
@@ -136,7 +142,7 @@ async def serving(vehicle, autopilot, notes=None, **serve) -> AsyncIterator[Serv
         load(CONFIGS / f"mock-{autopilot}.yaml"),
         {
             "link": {"lockstep": False},
-            "limits": {"max_tilt_deg": 45.0, "max_tilt_rate_deg_s": 200.0},
+            "limits": {"max_tilt_deg": 45.0},
             "serve": {"clients": (), **serve},
         },
         "the test",

@@ -11,6 +11,8 @@ from companion.serve.setpoints.request import AxisDemand, MotionRequest
 _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
 _VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
 _HEADING_CONTINUITY = Continuity(0.2, 1.0)
+_VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
+"""Largest, m/s² and m/s³: what the thrust spends on climbing, it lacks for steering."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Of a turn after a jump of the yaw, rad/s² and rad/s³: yaw responds slowly."""
 _STREAM = 0.25
@@ -47,7 +49,12 @@ class CommandedMotion:
 
     def __init__(self, limits: MotionLimits) -> None:
         each = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
-        down = AxisLimits(limits.descent, limits.climb, limits.acceleration, limits.jerk)
+        down = AxisLimits(
+            limits.descent,
+            limits.climb,
+            min(limits.acceleration, _VERTICAL_ACCELERATION),
+            min(limits.jerk, _VERTICAL_JERK),
+        )
         turn = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
         self._horizontal = Axes((each, each), _HORIZONTAL_CONTINUITY, limits.timeout)
         self._vertical = Axes((down,), _VERTICAL_CONTINUITY, limits.timeout)
