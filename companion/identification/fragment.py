@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
+from companion.files import bounded_yaml
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
@@ -40,7 +41,9 @@ class AxisValues(NamedTuple):
         return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
 
 
-def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
+def vehicle_fragment(
+    vehicle: IdentifiedVehicle, gravity: float, known: Known, flight: str = ""
+) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
     Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
@@ -55,6 +58,7 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
         vehicle: as identified.
         gravity: m/s², at which it hovers.
         known: of each axis, from the configuration in force; may lack axes and values.
+        flight: name of the flight; empty: it is not written.
 
     Raises:
         BadFitError: no response may be used, or one may not and nothing else is known of its axis;
@@ -67,7 +71,8 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     axes = {name: kept.get(name) or _found(each) for name, each in vehicle.axes.items()}
-    lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
+    mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
+    lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 

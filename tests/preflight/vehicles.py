@@ -32,6 +32,7 @@ def config_file(folder, mock, **changes):
     places = {
         "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep},
         "recording": {"directory": str(folder / "flights")},
+        "vehicle": {"identified": "a flight of the mock vehicle"},
     }
     path = folder / "my.yaml"
     path.write_text(bounded_yaml.dump(merged(merged(data, places), changes)))
