@@ -97,6 +97,13 @@ def test_the_csv_path_is_flown(folder: Path) -> None:
     assert len((folder / "heart.csv").read_text().splitlines()) == 402
 
 
+def test_the_own_guidance_comes_back(folder: Path) -> None:
+    back, landed = output(folder, "own_guidance.py").splitlines()
+    assert numbers(back)[-1] < 0.4
+    assert "landed: True" in landed
+    assert numbers(landed)[-1] > 2000
+
+
 def test_the_injected_fault_makes_the_vehicle_land(folder: Path) -> None:
     said = output(folder, "inject_fault.py")
     assert "safety: gps: GPS position lost → land" in said
