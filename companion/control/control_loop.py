@@ -182,7 +182,7 @@ class ControlLoop:
         """Count and record a setpoint that has left."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
-        latency = perf_counter_ns() - sample.received_ns
+        latency = record.latency_ns = perf_counter_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
         if self.offboard_active:

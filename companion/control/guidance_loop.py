@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from math import degrees, nan
+from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -177,7 +177,7 @@ class GuidanceLoop:
             )
         if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
-            self._record_tracking(measured_at, reference, inputs.now)
+            self.flown.record(self._trace, now, measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; returns the reference from which it was made."""
@@ -239,11 +239,3 @@ class GuidanceLoop:
         limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.hold_here()
-
-    def _record_tracking(
-        self, vehicle_time: float, reference: Reference, motion: VehicleMotion
-    ) -> None:
-        north, east, down = reference.position_ned
-        if not reference.position_is_meant:
-            north = east = nan  # only the height is a reference in open loop
-        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

@@ -2,18 +2,23 @@
 
 import asyncio
 import time
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
 from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.context import cancel
+from companion.flight.course import advice, course_of
 from companion.flight.flight import AskLanding
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.observer import Observer, StateLogger
+from companion.flight.observer import EventRecorder, Observer, StateLogger
+from companion.mavlink.texts import TextFrames
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
+from companion.safety.actions import internal
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
 
@@ -87,11 +92,12 @@ class Session:
             realtime.asked_for(realtime_wishes(self._config)) as grants,
             TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
         ):
+            recorder = EventRecorder(self._observer, loop.time, self._writer(tlog))
             async with open_link(self._config, tlog, self.note) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
-                    self._observer,
+                    recorder,
                     self._ask_landing,
                     self._folder,
                     maneuvers,
@@ -102,8 +108,21 @@ class Session:
                     result = await self._run(link, self._assembled)
                 finally:
                     self._assembled.close()
+            summary = self._summary(link, self._assembled, recorder, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
-        return self._finish(link, self._assembled, result, tlog.dropped, grants)
+        summary = replace(summary, link={**summary.link, "not_recorded": tlog.dropped})
+        self._save(summary, self._assembled)
+        return summary
+
+    def _writer(self, tlog: TlogWriter) -> Callable[[str], None]:
+        """Writes words into the `.tlog` as STATUSTEXT of ours, at the present time."""
+        clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
+
+        def write(words: str) -> None:
+            for frame in texts.frames(words):
+                tlog(clock(), frame)
+
+        return write
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
@@ -136,6 +155,7 @@ class Session:
         link.subscribe("CURRENT_MODE", on_current_mode)
         # In a task of its own, so that `leave` ends the flight but not the writing of the files.
         self._flying = asyncio.ensure_future(flight.run())
+        reporting = asyncio.create_task(self._report(assembled))
         try:
             return await self._flying
         except asyncio.CancelledError:
@@ -144,47 +164,65 @@ class Session:
         finally:
             link.on_attitude = None
             state_logger.log_changes()
+            await cancel(reporting)
 
-    def _finish(
+    @staticmethod
+    async def _report(assembled: Assembled) -> None:
+        """Record and show the state of the flight; a fault in it does not end the flight."""
+        try:
+            await assembled.reporter.run()
+        except Exception as error:
+            assembled.flight.note(internal(error))
+
+    def _summary(
         self,
         link: Link,
         assembled: Assembled,
+        recorder: EventRecorder,
         result: str,
-        tlog_dropped: int,
         grants: tuple[realtime.Grant, ...],
     ) -> Summary:
+        """The summary of a flight that is over, while its log is still open."""
         counts = {
             name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
         }
-        flight = assembled.flight
+        flight, context, trace = assembled.flight, assembled.context, assembled.trace
         dead_times = assembled.dead_time_watch.over_the_flight()
-        guidance_loop = assembled.context.guidance_loop
-        trace = assembled.trace
-        for mismatch_warning in (
-            guidance_loop.learning.mismatch_warning(),
-            guidance_loop.estimate.mismatch_warning(),
-            trace.lost_rows_warning(),
-        ):
-            if mismatch_warning is not None:
-                flight.note(mismatch_warning)
+        advised = advice(context, trace, dead_times)
+        for text in advised:  # shown with the figures, not here
+            flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
+            recorder.write(text)
         assembled.memory.save()
-        summary = Summary(
+        return Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
             planner=self._config.planner_name,
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
-            link={**counts, "not_recorded": tlog_dropped},
+            link=counts,
             trace=trace,
             events=flight.events,
             log=self._folder,
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
+            course=course_of(
+                self._config,
+                flight,
+                context,
+                recorder,
+                assembled.reporter,
+                assembled.ladder,
+                trace,
+                result,
+                advised,
+            ),
         )
+
+    def _save(self, summary: Summary, assembled: Assembled) -> None:
+        """Write `summary.json` and the CSV files; a failure is an event."""
         try:
             (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            trace.save(self._folder)
+            assembled.trace.save(self._folder)
         except OSError as error:
-            flight.note(f"{self._folder}: some files were not written: {error.strerror}")
-        return summary
+            assembled.flight.note(f"{self._folder}: some files were not written: {error.strerror}")

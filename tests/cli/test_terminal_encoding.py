@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from companion.cli.text_streams import ascii_for
 from companion.demo import free_port
+from companion.files.ascii_text import ascii_for
 from tests.cli.test_demo import quick_demo
 
 ASCII = {"PYTHONIOENCODING": "ascii"}

@@ -13,6 +13,7 @@ from unittest import mock
 
 from companion.config import Config
 from companion.flight.session import Session
+from companion.flight.status import FlightStatus
 from companion.vehicle.link import Link
 from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
@@ -55,6 +56,9 @@ class Outcome:
             self.channel.phase(name)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Nothing."""
+
+    def status(self, status: FlightStatus) -> None:
         """Nothing."""
 
     def event(self, time: float, text: str) -> None:
