@@ -101,6 +101,8 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     end = figures["early_end"]
     interrupted = figures["result"].startswith(_INTERRUPTED)
     remedy = "nothing is to be mended" if interrupted else what_to_do(end["monitor"], end["phase"])
+    if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
+        remedy = f"take the vehicle over or land it, for it is armed; then: {remedy}"
     return f"The flight ended early: {figures['result']}.", [
         f"  when: {_when(end)}",
         f"  vehicle now: {_vehicle(figures['at_the_end'])}",

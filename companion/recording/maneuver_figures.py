@@ -85,9 +85,9 @@ def measure_maneuvers(
         marks: of `FlightTrace.maneuvers`.
         began: when the flight began, s on our clock.
     """
-    ends = [mark.vehicle_time for mark in marks[1:]] + [inf]
+    ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
     measured = []
-    for mark, end in zip(marks, ends, strict=True):
+    for mark, end in zip(marks, ends, strict=False):  # without marks there is an end too many
         part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
         if mark.name is not None and len(part) > 1:
             measured.append(_measured(mark.name, mark.time - began, part))

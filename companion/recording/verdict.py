@@ -12,7 +12,7 @@ HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 STRAIGHTNESS = 0.03
 """Largest distance from a step's line, as a share of the step."""
-MODEL_DEVIATION = 0.15
+MODEL_DEVIATION = 0.20
 """Largest distance from the nearest second-order model, as a share of the step."""
 UNANSWERED = 0.01
 """Largest share of attitude samples without an answer."""

@@ -68,7 +68,7 @@ def test_no_character_is_written_as_one_that_would_break_json():
 def test_a_good_flight_is_good_on_any_terminal(tmp_path, environment):
     options = ("--config", quick_demo(tmp_path), "--lockstep", "--maneuvers", "steps")
     done = companion(tmp_path, environment, "demo", *options)
-    assert_said(done, 0, b"flight ok", b"sample in -> setpoint out", b"landing")
+    assert_said(done, 0, b"The flight was good", b"open loop", b"landing")
     assert b"Recorded in" in done.stdout  # to the very end
     if environment is not LATIN:
         assert done.stdout.isascii()
