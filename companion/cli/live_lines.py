@@ -3,7 +3,7 @@
 import codecs
 import os
 from collections.abc import Sequence
-from math import degrees
+from math import degrees, isinf
 from typing import IO
 
 from companion.files.ascii_text import ascii_for
@@ -34,10 +34,14 @@ def status_lines(status: FlightStatus) -> list[str]:
 
 def _doing(status: FlightStatus) -> str:
     if status.maneuver is not None:
-        return (
-            f"{status.maneuver}, {status.maneuver_elapsed:.0f} of {status.maneuver_duration:.0f} s"
-        )
-    return f"{status.detail or 'working'} ({status.elapsed:.0f} of at most {status.timeout:.0f} s)"
+        known = "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
+        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{known} s"
+    return f"{status.detail or 'working'} ({allowed_time(status.elapsed, status.timeout)})"
+
+
+def allowed_time(elapsed: float, timeout: float) -> str:
+    """How long a phase has lasted, and may last, s."""
+    return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 
 def _times(status: FlightStatus) -> str:

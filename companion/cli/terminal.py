@@ -10,7 +10,7 @@ from math import inf
 
 from rich.console import Console
 
-from companion.cli.live_lines import LiveLines, can_redraw, status_lines
+from companion.cli.live_lines import LiveLines, allowed_time, can_redraw, status_lines
 from companion.flight.status import FlightStatus
 
 _REPEAT = 5.0
@@ -101,7 +101,7 @@ class TerminalObserver:
         """Say now and then what the phase waits for, and since when; live lines show it anyway."""
         if self._live is None and elapsed - self._said >= _REPEAT:
             self._said = elapsed
-            text = f"{name}: {detail or 'working'} ({elapsed:.0f} of at most {timeout:.0f} s)"
+            text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.say(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:

@@ -16,6 +16,7 @@ class GuidanceCommand(NamedTuple):
         idle: zero rates and zero thrust, on the ground.
         is_step: whether this is an open-loop step whose response is measured.
         body_rates: sent within the limits instead of the planner's answer, rad/s; None: plan.
+        thrust: sent within the limits instead of the thrust for `acceleration_down`, 0..1, or None.
         turn: sum of the heading resets when the command was made, rad.
         later: the target `period` after `made_at`. The target moves there on a straight line and
             then stays. None: `target` stays.
@@ -28,6 +29,7 @@ class GuidanceCommand(NamedTuple):
     idle: bool = False
     is_step: bool = False
     body_rates: BodyRates | None = None
+    thrust: float | None = None
     turn: float = 0.0
     later: Target | None = None
     period: float = 0.0

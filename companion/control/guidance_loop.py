@@ -1,29 +1,30 @@
 """The guidance loop: a timer that makes a fresh command from the newest position."""
 
-import asyncio
 from collections.abc import Callable
 from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
 from companion.control.control_loop import ControlLoop
-from companion.control.flown_maneuver import FlownManeuver
+from companion.control.flown_source import FlownSource
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
+from companion.control.ticker import Ticker
+from companion.control.tracking_record import TrackingRecord
 from companion.guidance import (
     GRAVITY,
     GuidanceInput,
     HoverThrust,
     LinearCommand,
     LinearGuidance,
-    ManeuverSequence,
     Pose,
     Reference,
     VehicleMotion,
 )
+from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -36,20 +37,21 @@ class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate, while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, without a pose, it
-    damps the motion; `hold_here` holds a pose; `follow` flies maneuvers from it. If open-loop rates
-    tilt the vehicle too far, the maneuver ends and the vehicle holds where it is. Poses and
+    damps the motion; `hold_here` holds a pose; `follow` flies a source from it. If open-loop rates
+    tilt the vehicle too far, the source ends and the vehicle holds where it is. Poses and
     references are in the frame without estimator resets, so no reset moves the vehicle.
 
     Attributes:
-        flown: the held pose and the maneuvers flown from it.
-        given_up: why the maneuver was given up, or None.
-        bound_to_hold: whether no maneuver may be flown any more; set by `give_up`.
+        flown: the held pose and the source flown from it.
+        given_up: why the source was given up, or None.
+        bound_to_hold: whether no source may be flown any more; set by `give_up`.
         motion: of the vehicle at the last step, without resets, or None.
         off_course: distance from the reference at the last step, m; see
-            `FlownManeuver.tracking_error`.
+            `FlownSource.tracking_error`.
         predictive: flies trajectories instead of linear guidance, or None.
         estimate: of the motion.
         learning: of the hover thrust.
+        record: of how the reference is tracked.
     """
 
     def __init__(
@@ -68,7 +70,7 @@ class GuidanceLoop:
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
-        self.flown = FlownManeuver()
+        self.flown = FlownSource()
         self.given_up: str | None = None
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
@@ -80,13 +82,14 @@ class GuidanceLoop:
         self._guidance = guidance
         self._state = state
         self._ground = ground
-        self._trace = trace
+        self.record = TrackingRecord(trace, self.flown)
         self._max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
         self._clock = clock
         self._vehicle_clock = vehicle_clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._ticker = Ticker(period, clock)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Keep an attitude that is a unit quaternion and fits the vehicle's clock."""
@@ -119,31 +122,53 @@ class GuidanceLoop:
         position_ned = self._guidance_input(self._clock()).now.position_ned
         self.flown.pose = Pose(position_ned, self._heading())
 
+    def hold_reference(self) -> None:
+        """Hold the pose of the present reference, in which a maneuver has ended."""
+        now = self._clock()
+        reference = self.flown.reference(now, self.motion_now(), self._heading())(now)
+        self.stand_by()
+        self.flown.pose = Pose(reference.position_ned, reference.heading)
+
     def give_up(self) -> None:
-        """Hold here, and fly no maneuver any more."""
+        """Hold here, and fly no source any more."""
         self.bound_to_hold = True
         self.hold_here()
 
-    def follow(self, maneuvers: ManeuverSequence) -> None:
-        """Fly `maneuvers` from the held pose; after `give_up`, keep holding."""
+    def follow(self, source: Source) -> None:
+        """Fly `source` from the held pose; after `give_up`, keep holding."""
         if self.bound_to_hold:
             return
         if self.flown.pose is None:
             self.hold_here()
-        self.flown.begin(maneuvers, self._clock())
+        assert self.flown.pose is not None
+        self.flown.begin(source, self.flown.pose, self._clock())
 
     @property
     def finished(self) -> bool:
-        """Whether the maneuvers have ended."""
+        """Whether the source has no more to fly."""
         return self.flown.finished(self._clock())
 
     async def run(self) -> None:
         """Make commands until cancelled; missed steps are not made up for."""
-        due = self._clock()
         while True:
             self.step()
-            due = max(due + self._period, self._clock())
-            await asyncio.sleep(due - self._clock())
+            await self._ticker.tick()
+
+    def step_soon(self) -> None:
+        """Make the next command at once: the source has a new reference."""
+        self._ticker.soon()
+
+    def motion_now(self) -> VehicleMotion:
+        """The estimated motion now, in the frame without resets.
+
+        Raises:
+            RuntimeError: no position came yet.
+        """
+        return self._guidance_input(self._clock()).now
+
+    def attitude(self) -> Quaternion:
+        """The newest attitude, in the frame without resets."""
+        return self._loop.resets.attitude(self._q)
 
     def step(self) -> None:
         """Make one command, unless the position is stale."""
@@ -165,7 +190,7 @@ class GuidanceLoop:
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self._guidance_input(now)
         self.motion = inputs.now
-        self._give_up_if_tilted(now)
+        self._give_up_if_tilted(now, inputs.now)
         reference = self._write_command(now, inputs)
         self.off_course = self.flown.tracking_error(reference, inputs.now)
         if not standing:
@@ -177,11 +202,11 @@ class GuidanceLoop:
             )
         if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
-            self.flown.record(self._trace, now, measured_at, reference, inputs.now)
+            self.record.add(now, measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; returns the reference from which it was made."""
-        reference_at = self.flown.reference(inputs.now, self._heading())
+        reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
         linear = self._guidance.command(reference_at, now, inputs)
         target, later, down = self._predicted(now, linear, inputs)
@@ -192,8 +217,9 @@ class GuidanceLoop:
             target,
             down,
             now,
-            is_step=reference.coefficients is not None,
+            is_step=reference.coefficients is not None and reference.thrust is None,
             body_rates=reference.body_rates,
+            thrust=reference.thrust,
             turn=self._loop.resets.turn,
             later=later,
             period=self._period,
@@ -201,7 +227,7 @@ class GuidanceLoop:
         return reference
 
     def _heading(self) -> float:
-        return heading(self._loop.resets.attitude(self._q))
+        return heading(self.attitude())
 
     def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
         """The command of predictive control while it flies, else `linear`.
@@ -227,9 +253,9 @@ class GuidanceLoop:
             now, self._guidance.acts_after, self.learning.thrust_limits
         )
 
-    def _give_up_if_tilted(self, now: float) -> None:
+    def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
         """Hold here if open-loop rates have tilted the vehicle too far."""
-        name = self.flown.steers_by_rates(now)
+        name = self.flown.steers_by_rates(now, motion)
         if name is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])

@@ -1,24 +1,22 @@
 """What a flight that is over says of its course: phases, where it ended, what to set."""
 
-from companion.config import Config
+from collections.abc import Sequence
+
+from companion.flight.assembly import Assembled
 from companion.flight.context import FlightContext
-from companion.flight.flight import Flight
-from companion.flight.observer import EventRecorder
-from companion.flight.status import StatusReporter
 from companion.recording.course import Course, EarlyEnd
 from companion.recording.dead_time import DeadTimes
-from companion.recording.trace import FlightTrace, ManeuverMark
-from companion.safety import SafetyLadder
+from companion.recording.trace import ManeuverMark
 
 
-def advice(context: FlightContext, trace: FlightTrace, dead_times: DeadTimes) -> tuple[str, ...]:
+def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
     """What differs from the configuration and which key to set, one sentence each."""
-    guidance_loop = context.guidance_loop
+    guidance_loop = assembled.context.guidance_loop
     warnings = (
         guidance_loop.learning.mismatch_warning(),
         guidance_loop.estimate.mismatch_warning(),
         dead_times.warning(),
-        trace.lost_rows_warning(),
+        assembled.trace.lost_rows_warning(),
     )
     return tuple(warning for warning in warnings if warning is not None)
 
@@ -37,29 +35,38 @@ def _settings(context: FlightContext) -> dict[str, str]:
 
 
 def course_of(
-    config: Config,
-    flight: Flight,
-    context: FlightContext,
-    recorder: EventRecorder,
-    reporter: StatusReporter,
-    ladder: SafetyLadder,
-    trace: FlightTrace,
+    assembled: Assembled,
+    phases: Sequence[tuple[float, str]],
     result: str,
     advised: tuple[str, ...],
 ) -> Course:
-    """The course of a flight that is over; `advised` is its `advice`."""
-    state, began = context.link.state, flight.began
+    """The course of a flight that is over.
+
+    Args:
+        assembled: what has flown.
+        phases: when each began, s on our clock, and its name.
+        result: of the flight.
+        advised: its `advice`.
+    """
+    flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
+    state, began, config = context.link.state, flight.began, context.config
     end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     early_end = None
     if flight.failed_in is not None:
         time = next((at for at, text in flight.events if text == result), flight.events[-1][0])
         early_end = _early_end(
-            time, began, takeoff, flight.failed_in.name, trace.maneuvers, ladder.breaches, result
+            time,
+            began,
+            takeoff,
+            flight.failed_in.name,
+            assembled.trace.maneuvers,
+            assembled.ladder.breaches,
+            result,
         )
     return Course(
         began=began,
-        phases=tuple((at - began, name) for at, name in recorder.phases),
+        phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,
         early_end=early_end,
         armed=state.armed,
@@ -67,7 +74,7 @@ def course_of(
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
         deadline=config.deadman.deadline,
-        lockstep=config.link.lockstep,
+        lockstep=not reporter.real_time,
         advice=advised,
         settings=_settings(context),
     )

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -12,10 +13,12 @@ from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.context import cancel
 from companion.flight.course import advice, course_of
+from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import EventRecorder, Observer, StateLogger
+from companion.flight.plan import ConfiguredPlan, Plan
 from companion.mavlink.texts import TextFrames
+from companion.realtime import Wishes
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.safety.actions import internal
@@ -30,22 +33,28 @@ class Session:
 
     Args:
         config: of the flight.
-        folder: an existing folder for this flight's files.
+        folder: an existing folder for this flight's files; None: nothing is recorded.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
+        plan: of the flight; None: as configured.
+        environment: what the flight gets from the computer.
     """
 
     def __init__(
         self,
         config: Config,
-        folder: Path,
+        folder: Path | None,
         observer: Observer,
         ask_landing: AskLanding,
+        plan: Plan | None = None,
+        environment: Environment = THIS_COMPUTER,
     ) -> None:
         self._config = config
         self._folder = folder
         self._observer = observer
         self._ask_landing = ask_landing
+        self._plan = plan
+        self._environment = environment
         self._assembled: Assembled | None = None
         self._flying: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
@@ -78,29 +87,24 @@ class Session:
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
-        flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
-        (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
+        if self._folder is not None:
+            flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
+            (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
-        maneuvers = configured_maneuvers(self._config)
-        loop = asyncio.get_running_loop()
-        epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
-
-        def on_failure(text: str) -> None:  # called in the writing thread
-            loop.call_soon_threadsafe(self.note, text)
-
-        with (
-            realtime.asked_for(realtime_wishes(self._config)) as grants,
-            TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
-        ):
-            recorder = EventRecorder(self._observer, loop.time, self._writer(tlog))
-            async with open_link(self._config, tlog, self.note) as link:
+        plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
+        environment = self._environment
+        wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
+        with realtime.asked_for(wishes) as grants, self._tlog() as tlog:
+            recorder = EventRecorder(self._observer, *self._writer(tlog))
+            async with open_link(self._config, tlog, self.note, environment.open_transport) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
                     recorder,
                     self._ask_landing,
                     self._folder,
-                    maneuvers,
+                    plan,
+                    environment,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
@@ -110,19 +114,35 @@ class Session:
                     self._assembled.close()
             summary = self._summary(link, self._assembled, recorder, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
-        summary = replace(summary, link={**summary.link, "not_recorded": tlog.dropped})
-        self._save(summary, self._assembled)
+        dropped = 0 if tlog is None else tlog.dropped
+        summary = replace(summary, link={**summary.link, "not_recorded": dropped})
+        if self._folder is not None:
+            self._save(self._folder, summary)
         return summary
 
-    def _writer(self, tlog: TlogWriter) -> Callable[[str], None]:
-        """Writes words into the `.tlog` as STATUSTEXT of ours, at the present time."""
+    def _tlog(self) -> AbstractContextManager[TlogWriter | None]:
+        """What writes the frames of the flight, if they are recorded."""
+        if self._folder is None:
+            return nullcontext()
+        loop = asyncio.get_running_loop()
+        in_vehicle_time = self._config.link.lockstep or not self._environment.realtime
+        epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
+
+        def on_failure(text: str) -> None:  # called in the writing thread
+            loop.call_soon_threadsafe(self.note, text)
+
+        return TlogWriter(self._folder / "flight.tlog", epoch, on_failure)
+
+    def _writer(self, tlog: TlogWriter | None) -> tuple[Callable[[], float], Callable[[str], None]]:
+        """Our clock, and what writes words into the `.tlog` as STATUSTEXT of ours."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
-            for frame in texts.frames(words):
-                tlog(clock(), frame)
+            if tlog is not None:
+                for frame in texts.frames(words):
+                    tlog(clock(), frame)
 
-        return write
+        return clock, write
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
@@ -186,9 +206,9 @@ class Session:
         counts = {
             name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
         }
-        flight, context, trace = assembled.flight, assembled.context, assembled.trace
+        flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.over_the_flight()
-        advised = advice(context, trace, dead_times)
+        advised = advice(assembled, dead_times)
         for text in advised:  # shown with the figures, not here
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
@@ -206,23 +226,12 @@ class Session:
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            course=course_of(
-                self._config,
-                flight,
-                context,
-                recorder,
-                assembled.reporter,
-                assembled.ladder,
-                trace,
-                result,
-                advised,
-            ),
+            course=course_of(assembled, recorder.phases, result, advised),
         )
 
-    def _save(self, summary: Summary, assembled: Assembled) -> None:
-        """Write `summary.json` and the CSV files; a failure is an event."""
+    def _save(self, folder: Path, summary: Summary) -> None:
         try:
-            (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            assembled.trace.save(self._folder)
+            (folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
+            summary.trace.save(folder)
         except OSError as error:
-            assembled.flight.note(f"{self._folder}: some files were not written: {error.strerror}")
+            self.note(f"{folder}: some files were not written: {error.strerror}")

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
+from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
@@ -29,10 +30,10 @@ class FlightStatus(NamedTuple):
         phase: its name.
         detail: what the phase waits for.
         elapsed: time in this phase, s.
-        timeout: of this phase, s.
+        timeout: of this phase, s; may be infinite.
         maneuver: name of the maneuver that is flown.
         maneuver_elapsed: time in this maneuver, s.
-        maneuver_duration: of this maneuver, s.
+        maneuver_duration: of this maneuver, s; None: another program ends it.
         height: above home, m.
         speed: m/s.
         tilt: rad.
@@ -53,7 +54,7 @@ class FlightStatus(NamedTuple):
     timeout: float
     maneuver: str | None = None
     maneuver_elapsed: float = 0.0
-    maneuver_duration: float = 0.0
+    maneuver_duration: float | None = None
     height: float | None = None
     speed: float | None = None
     tilt: float | None = None
@@ -88,6 +89,7 @@ class StatusReporter:
     Attributes:
         takeoff: when the vehicle left the ground, s on our clock; None: it has not.
         battery_at_takeoff: share that was left then, or None.
+        real_time: see below.
 
     Args:
         context: of the flight.
@@ -97,6 +99,7 @@ class StatusReporter:
         phase: returns the running phase.
         show: takes the state; it must return at once.
         clock: ours, s.
+        real_time: whether latencies mean anything: not where the vehicle waits for us.
     """
 
     def __init__(
@@ -108,10 +111,13 @@ class StatusReporter:
         phase: Callable[[], PhaseNow],
         show: Callable[[FlightStatus], None],
         clock: Callable[[], float],
+        *,
+        real_time: bool,
     ) -> None:
         self.takeoff: float | None = None
         self.battery_at_takeoff: float | None = None
         self._context, self._ladder, self._trace = context, ladder, trace
+        self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
         self._counted: deque[tuple[float, int]] = deque()
 
@@ -148,8 +154,7 @@ class StatusReporter:
         """The state now."""
         now, context, phase = self._clock(), self._context, self._phase()
         record = context.loop.record
-        flown = context.guidance_loop.flown.part(now)
-        real_time = not context.config.link.lockstep
+        flown = flown_part(context.guidance_loop.flown, now)
         return FlightStatus(
             time=now - self._began,
             airborne=None if self.takeoff is None else now - self.takeoff,
@@ -157,16 +162,16 @@ class StatusReporter:
             detail=context.detail,
             elapsed=now - phase.entered,
             timeout=phase.timeout,
-            maneuver=None if flown is None else flown[0].name,
-            maneuver_elapsed=0.0 if flown is None else flown[1],
-            maneuver_duration=0.0 if flown is None else flown[0].duration,
+            maneuver=None if flown is None else flown.name,
+            maneuver_elapsed=0.0 if flown is None else flown.elapsed,
+            maneuver_duration=None if flown is None else flown.duration,
             height=context.link.state.height,
             speed=self._speed(),
             tilt=self._tilt(),
             error=self._error(),
             rate=self._rate(now, record),
-            latency=1e-9 * record.latency_ns if real_time and context.loop.on else None,
-            missed=record.missed_deadlines if real_time else None,
+            latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
+            missed=record.missed_deadlines if self.real_time else None,
             battery=context.link.state.battery,
             monitored=phase.monitored and context.loop.offboard_active,
             alarms=self._ladder.raised,

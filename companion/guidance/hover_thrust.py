@@ -102,7 +102,11 @@ class HoverThrust:
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)
         thrust = specific_thrust(acceleration_down, 1.0 if settings.tilt_compensated else cosine)
-        return min(max(self._signal(thrust), settings.lowest), settings.highest)
+        return self.within_limits(self._signal(thrust))
+
+    def within_limits(self, normalised: float) -> float:
+        """The nearest normalised thrust inside the bounds."""
+        return min(max(normalised, self._settings.lowest), self._settings.highest)
 
     def sent(self, normalised: float, q: Quaternion) -> None:
         """Note a thrust that the vehicle follows, and its attitude then."""

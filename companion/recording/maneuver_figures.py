@@ -102,6 +102,7 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     early = time < time[0] + beginning
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), np.abs(error[:, 2])
+    held = ~np.isnan(height)  # another program may command the thrust
     away = position[:, :2] - position[0, :2]
     return ManeuverFigures(
         name,
@@ -111,9 +112,11 @@ def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         beginning,
         level_rms=nan if open_loop else _rms(level[~early]),
         level_max=nan if open_loop else float(level[~early].max()),
-        height_rms=_rms(height[~early]),
-        height_max=float(height[~early].max()),
-        beginning_max=float(np.hypot(level, height)[early].max()) if early.any() else nan,
+        height_rms=_rms(height[~early & held]),
+        height_max=float(height[~early & held].max(initial=0.0)) if held.any() else nan,
+        beginning_max=float(np.nanmax(np.hypot(level, height)[early], initial=0.0))
+        if early.any()
+        else nan,
         drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
         speed=_speed(time, reference),
     )
@@ -129,4 +132,4 @@ def _speed(time: Floats, reference: Floats) -> float:
 
 
 def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.mean(values**2))) if len(values) else nan

@@ -67,12 +67,13 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 level <= limit,
                 "fly it slower; against wind and drag see guidance and `companion identify`",
             )
-        yield Check(
-            maneuver["name"],
-            f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
-            height <= HEIGHT_RMS,
-            "set thrust.hover_thrust to the thrust at which the vehicle hovers",
-        )
+        if height is not None:
+            yield Check(
+                maneuver["name"],
+                f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
+                height <= HEIGHT_RMS,
+                "set thrust.hover_thrust to the thrust at which the vehicle hovers",
+            )
 
 
 def _steps(figures: Figures) -> Iterator[Check]:
