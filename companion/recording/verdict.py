@@ -89,6 +89,8 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "run `companion identify` and fly planner.name: model-following with its times",
     )
     deviation = response["second_order"]["deviation_max"]
+    if deviation is None:
+        return
     yield Check(
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
