@@ -100,8 +100,12 @@ LAW_NAMES = tuple(_LAWS)
 PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
+PlannerFactory = Callable[[Constants], Planner]
+"""A class of planners; unlike a law it may have a memory."""
+
+
 def make_planner(
-    name: str | Law,
+    name: str | Law | type[Planner],
     gain: float = 5.0,
     yaw_gain: float = 2.0,
     limits: Limits = Limits(),  # noqa: B008  (frozen)
@@ -110,7 +114,8 @@ def make_planner(
     """Make a planner by its name, or of a law of your own.
 
     Args:
-        name: one of `PLANNER_NAMES`, or a function of the type `Law`.
+        name: one of `PLANNER_NAMES`, a function of the type `Law`, or a class of planners that is
+            made of `Constants`.
         gain: p in 1/s, the inverse of the time constant asked for.
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
@@ -125,6 +130,9 @@ def make_planner(
         TypeError: an option that the planner does not take.
         ValueError: unknown name, or a value out of range.
     """
+    if isinstance(name, type):
+        made: PlannerFactory = name
+        return made(make_constants(gain, yaw_gain, limits, **options))
     if callable(name):
         return LawPlanner(name, make_constants(gain, yaw_gain, limits, **options))
     if name == MODEL_FOLLOWING:

@@ -19,11 +19,11 @@ from companion.guidance import (
     GuidanceInput,
     HoverThrust,
     LinearCommand,
-    LinearGuidance,
     Pose,
     Reference,
     VehicleMotion,
 )
+from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
@@ -57,7 +57,7 @@ class GuidanceLoop:
     def __init__(
         self,
         loop: ControlLoop,
-        guidance: LinearGuidance,
+        guidance: Guidance,
         estimate: MotionEstimate,
         hover_thrust: HoverThrust,
         state: VehicleState,

@@ -10,7 +10,7 @@ from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
-from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
+from companion.control.outer_loop import make_guidance, motion_estimate, predictive
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -228,7 +228,7 @@ def _control(
     ground = GroundContact(link.state, clock)
     guidance_loop = GuidanceLoop(
         loop,
-        linear_guidance(config),
+        make_guidance(config),
         motion_estimate(config, lambda: link.clock.offset),
         thrust,
         link.state,
