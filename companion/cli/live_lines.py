@@ -16,19 +16,19 @@ _ALARM = "\x1b[1;31m{}\x1b[0m"
 
 def can_redraw(file: IO[str]) -> bool:
     """Whether lines can be rewritten there: a terminal with ANSI codes, and none are forbidden."""
-    forbidden = "NO_COLOR" in os.environ or os.environ.get("TERM", "dumb") in ("dumb", "unknown")
-    return file.isatty() and not forbidden
+    dumb = os.environ.get("TERM", "dumb") in ("", "dumb", "unknown")
+    return file.isatty() and not dumb and not os.environ.get("NO_COLOR")
 
 
 def status_lines(status: FlightStatus) -> list[str]:
-    """The three lines: what is flown, how the vehicle moves, and link, battery and safety."""
+    """The three lines: what is flown, how the vehicle moves, and safety, setpoints and battery."""
     return [
-        f"{status.phase:<10} {_times(status)}   {_doing(status)}",
-        f"{'':<10} height {_number(status.height, '.1f', 'm')}   "
+        f"{status.phase:<9} {_times(status)}   {_doing(status)}",
+        f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
         f"speed {_number(status.speed, '.1f', 'm/s')}   "
         f"tilt {_number(None if status.tilt is None else degrees(status.tilt), '.0f', '°')}   "
         f"tracking error {_number(status.error, '.2f', 'm')}",
-        f"{'':<10} {_loop(status)}   battery {_battery(status)}   safety {_safety(status)}",
+        f"{'':<9} safety {_safety(status)}  {_loop(status)}  battery {_battery(status)}",
     ]
 
 
@@ -51,10 +51,10 @@ def _times(status: FlightStatus) -> str:
 
 
 def _loop(status: FlightStatus) -> str:
-    rate = "no setpoints" if status.rate is None else f"{status.rate:.0f} setpoints/s"
+    rate = "no setpoints" if status.rate is None else f"{status.rate:.0f} Hz"
     if status.latency is None:
         return rate
-    return f"{rate}   latency {1e3 * status.latency:.2f} ms ({status.missed} late)"
+    return f"{rate}  latency {1e3 * status.latency:.2f} ms ({status.missed} late)"
 
 
 def _battery(status: FlightStatus) -> str:

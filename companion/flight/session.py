@@ -209,10 +209,9 @@ class Session:
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.over_the_flight()
         advised = advice(assembled, dead_times)
-        known = {text for _, text in flight.events}  # the dead time is watched in flight, too
         for text in advised:  # shown with the figures, not here
-            if text in known:
-                continue
+            if text == dead_times.warning():
+                continue  # told in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
         assembled.memory.save()
