@@ -179,7 +179,7 @@ class StampJudge:
             self._remark(
                 f"this computer's clock is not to be trusted: it says {_date(start)}, but "
                 f"{_date(kept)} has passed, and counts; {SET_CLOCK}; if it was ahead before, "
-                "delete the file of time stamps (docs/companion-computer.md)"
+                "delete the file of time stamps (docs/signing.md)"
             )
         elif start < _PROGRAM_DATE:
             self._remark(

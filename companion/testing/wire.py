@@ -26,26 +26,23 @@ class MemoryTransport:
     Args:
         receiver: takes what arrives.
         take: takes what is sent.
-        clock: stamps what arrives.
     """
 
     reconnects = False
 
-    def __init__(
-        self, receiver: Receiver, take: Callable[[bytes], None], clock: VirtualClock
-    ) -> None:
+    def __init__(self, receiver: Receiver, take: Callable[[bytes], None]) -> None:
         self.is_open = True
-        self._receiver, self._take, self._clock = receiver, take, clock
+        self._receiver, self._take = receiver, take
         self._loop = asyncio.get_running_loop()
         self._connected = self._heard = False
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
-    def deliver(self, datagram: bytes) -> None:
-        """Let a datagram of the vehicle arrive."""
-        receiver, now_ns = self._receiver, self._clock.read_ns()
+    def deliver(self, datagram: bytes, received_ns: int) -> None:
+        """Let a datagram of the vehicle arrive at a time of the loop, ns."""
+        receiver = self._receiver
         if self._connected:
-            self._heard = receiver.receive(datagram, now_ns) or self._heard
-        elif receiver.claim(datagram, now_ns, _NAME) or receiver.may_answer(_NAME):
+            self._heard = receiver.receive(datagram, received_ns) or self._heard
+        elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_answer(_NAME):
             self._connected = self._heard = True
 
     def send(self, frame: bytes) -> bool:
@@ -87,16 +84,16 @@ class Wire:
         """
         if self._transport is not None and self._transport.is_open:
             raise EndpointError("the mock vehicle has one companion link, which is open already")
-        self._transport = MemoryTransport(receiver, self._take, self._clock)
+        self._transport = MemoryTransport(receiver, self._take)
         return self._transport
 
     def _take(self, frame: bytes) -> None:
         """Take a frame of the application."""
         self._vehicle.receive(frame)
 
-    def _deliver(self, datagram: bytes) -> None:
+    def _deliver(self, datagram: bytes, at: float) -> None:
         if self._transport is not None and self._transport.is_open:
-            self._transport.deliver(datagram)
+            self._transport.deliver(datagram, round(at * 1e9))
 
 
 class LockstepWire(Wire):
@@ -107,8 +104,9 @@ class LockstepWire(Wire):
 
     def advance(self, until: float) -> None:
         """Let the vehicle make a step. The application's timers wait for it."""
-        for datagram in self._vehicle.begin() or self._vehicle.step():
-            self._deliver(datagram)
+        datagrams = self._vehicle.begin() or self._vehicle.step()
+        for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
+            self._deliver(datagram, self._vehicle.time)
         # Without an open link, or with one that does not accept the beacon, time passes as well.
         self._clock.now = max(self._clock.now, self._vehicle.time)
 
@@ -154,7 +152,10 @@ class FreeWire(Wire):
 
     def _send(self, datagrams: list[bytes]) -> None:
         for datagram in datagrams:
-            self._put(self._deliver, datagram)
+            self._put(self._arrive, datagram)
+
+    def _arrive(self, datagram: bytes) -> None:
+        self._deliver(datagram, self._clock.now)
 
     def _put(self, deliver: Callable[[bytes], None], datagram: bytes) -> None:
         due = self._clock.now + self._delay

@@ -5,10 +5,8 @@ from dataclasses import replace
 import pytest
 from pymavlink import mavutil
 
-from companion.testing import MockVehicle
-from companion.testing import fly as fly_in_memory
-from tests.flight import fly as sockets
-from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QUICK_MOCK, QUICK_PARAMETERS, merged
+from tests.flight import fly as memory
+from tests.flight import sockets
 
 GUSTS = {"speed_m_s": 2.0, "from_deg": 40.0, "gust_m_s": 0.7, "vertical_gust_m_s": 0.3}
 BAD_LINK = [
@@ -43,10 +41,8 @@ def setpoints(summary):
 def test_the_same_setpoints_to_the_bit(tmp_path, autopilot, settings):
     with sockets.mock_vehicle(tmp_path, autopilot=autopilot, seed=7, **settings) as mock:
         over_udp = sockets.fly(mock, tmp_path / "udp", **CIRCLE)
-    quick = {**QUICK_MOCK, "parameters": QUICK_PARAMETERS[autopilot]}
-    vehicle = MockVehicle(autopilot, seed=7, **quick, **settings)
-    config = merged(merged(QUICK_FLIGHT, OTHER_VEHICLES.get(autopilot, {})), CIRCLE)
-    in_memory = fly_in_memory(config, vehicle, tmp_path / "memory")
+    with memory.mock_vehicle(in_lockstep=True, autopilot=autopilot, seed=7, **settings) as vehicle:
+        in_memory = memory.fly(vehicle, tmp_path / "memory", **CIRCLE)
     sent = setpoints(over_udp)
     assert len(sent) > 1500
     assert sent == setpoints(in_memory)
