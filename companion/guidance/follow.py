@@ -65,12 +65,12 @@ class Follow:
     Attributes:
         trajectory: to follow.
         yaw_rate: largest in the turn before it, rad/s.
-        slowed: factor by which it was slowed down to be feasible.
+        notes: how its file was understood and how it is flown, a sentence each.
     """
 
     trajectory: Trajectory
     yaw_rate: float
-    slowed: float = 1.0
+    notes: tuple[str, ...] = ()
     _turned: Trajectory | None = None
     _pose: Pose | None = None
 

@@ -55,6 +55,8 @@ class FrameScanner:
         streaming: True if a frame may go on in the next call (TCP, serial); false for datagrams,
             where an unfinished frame is dropped.
         stats: Where wrong checksums and unknown messages are counted.
+        keep_unknown: True to return frames of unknown messages, too. Their checksum is not checked;
+            their id is not in `crc_extra`.
     """
 
     def __init__(
@@ -63,9 +65,11 @@ class FrameScanner:
         *,
         streaming: bool = False,
         stats: LinkStats | None = None,
+        keep_unknown: bool = False,
     ) -> None:
         self._crc_extra = crc_extra
         self._streaming = streaming
+        self._keep_unknown = keep_unknown
         self._stats = stats or LinkStats()
         self._rest = b""
 
@@ -103,7 +107,7 @@ class FrameScanner:
         check_at = at + _V2_HEADER_LENGTH + data[at + 1]
         end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
         fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None:
+        if fault is not None and not (fault == end - at and self._keep_unknown):
             return fault
         frames.append(
             Frame(
@@ -125,7 +129,7 @@ class FrameScanner:
         check_at = at + _V1_HEADER_LENGTH + size
         end = check_at + 2
         fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None:
+        if fault is not None and not (fault == end - at and self._keep_unknown):
             return fault
         payload = data[at + _V1_HEADER_LENGTH : check_at]
         frames.append(
@@ -152,7 +156,14 @@ class FrameScanner:
         if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
             self._stats.unknown += 1
             return end - at
+        if self._keep_unknown and end > len(data) and _is_plausible(data, at):
+            return _INCOMPLETE
         return _NOT_A_FRAME
+
+
+def _is_plausible(data: bytes, at: int) -> bool:
+    """Whether garbage is unlikely to look like this version 2 header: both bytes are usually 0."""
+    return data[at] == V2 and data[at + 3] == 0 and data[at + 9] == 0
 
 
 def build_frame(

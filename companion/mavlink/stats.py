@@ -29,6 +29,7 @@ class LinkStats:
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages whose fields make no sense.
         sent: Handed to the kernel.
+        forwarded: Of other nodes, handed to the kernel as they came.
         not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
         reconnects: How often the connection was opened again.
         peers: How often the peer changed to another address or port, or to another TCP client,
@@ -51,6 +52,7 @@ class LinkStats:
     stamped_ahead: int = 0
     malformed: int = 0
     sent: int = 0
+    forwarded: int = 0
     not_sent: int = 0
     reconnects: int = 0
     peers: int = 0

@@ -169,6 +169,22 @@ class Link(VehicleClient):
         self._inbox.on_foreign = callback
 
     @property
+    def on_frame(self) -> Callable[[Frame], None] | None:
+        """Called with each frame that came, of any sender and message, after all other callbacks.
+
+        Exceptions are reported. The checksum of a message that the dialect lacks is not checked.
+        """
+        return self._inbox.on_frame
+
+    @on_frame.setter
+    def on_frame(self, callback: Callable[[Frame], None] | None) -> None:
+        self._inbox.on_frame = callback
+
+    def forward(self, frame: bytes) -> bool:
+        """Send another node's whole frame as it is; false if it could not leave."""
+        return self._outbox.forward(frame)
+
+    @property
     def on_error(self) -> Callable[[Exception], None] | None:
         """Called with what a callback raised; without it such errors go to the log."""
         return self._router.on_error
