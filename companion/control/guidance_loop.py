@@ -1,7 +1,7 @@
 """The guidance loop: a timer that makes a fresh command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees, nan
+from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -13,6 +13,7 @@ from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.control.ticker import Ticker
+from companion.control.tracking_record import TrackingRecord
 from companion.guidance import (
     GRAVITY,
     GuidanceInput,
@@ -50,6 +51,7 @@ class GuidanceLoop:
         predictive: flies trajectories instead of linear guidance, or None.
         estimate: of the motion.
         learning: of the hover thrust.
+        record: of how the reference is tracked.
     """
 
     def __init__(
@@ -80,7 +82,7 @@ class GuidanceLoop:
         self._guidance = guidance
         self._state = state
         self._ground = ground
-        self._trace = trace
+        self.record = TrackingRecord(trace, self.flown)
         self._max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
@@ -200,7 +202,7 @@ class GuidanceLoop:
             )
         if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
-            self._record_tracking(measured_at, reference, inputs.now)
+            self.record.add(now, measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; returns the reference from which it was made."""
@@ -263,13 +265,3 @@ class GuidanceLoop:
         limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.hold_here()
-
-    def _record_tracking(
-        self, vehicle_time: float, reference: Reference, motion: VehicleMotion
-    ) -> None:
-        north, east, down = reference.position_ned
-        if not reference.position_is_meant:
-            north = east = nan  # only the height is a reference in open loop
-        if not reference.holds_height:
-            down = nan
-        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

@@ -85,13 +85,13 @@ class ManeuverSource:
 class CommandedSource:
     """The newest reference that another program or the user's code gave, while it is fresh.
 
-    Between two of them the reference moves on by its own velocity, acceleration and jerk. Once the
-    newest is older than `stale`, the vehicle is held where it is then, and `silent_since` tells it.
+    Between two of them the reference moves on by its own velocity, acceleration and jerk. Once one
+    has become older than `stale`, or the next one comes later than that, the source has failed: the
+    vehicle is held where it is, and no later reference is flown.
 
     Attributes:
         name: who gives the references.
         pose: where the source began, or None before.
-        silent_since: when the newest reference became too old, or None.
 
     Args:
         name: who gives the references.
@@ -102,10 +102,9 @@ class CommandedSource:
     def __init__(self, name: str, stale: float, begins_within: float) -> None:
         self.name = name
         self.pose: Pose | None = None
-        self.silent_since: float | None = None
         self._stale = stale
         self._begins_within = begins_within
-        self._held = Reference((0.0, 0.0, 0.0))
+        self._held: Reference | None = None
         self._newest: Reference | None = None
         self._given_at = 0.0
         self._jerk = (0.0, 0.0, 0.0)
@@ -114,9 +113,7 @@ class CommandedSource:
 
     def begin(self, now: float, pose: Pose) -> None:
         """Hold `pose` until the first reference."""
-        self.pose = pose
-        self._held = Reference(pose.position_ned, heading=pose.heading)
-        self._given_at = now
+        self.pose, self._given_at = pose, now
 
     def give(
         self, reference: Reference, now: float, jerk_ned: tuple[float, float, float] | None = None
@@ -127,12 +124,13 @@ class CommandedSource:
             reference: at `now`.
             now: s on our clock.
             jerk_ned: rate of the reference's acceleration, m/s³. None: by the difference from the
-                reference before, if that is fresh and given in closed loop.
+                reference before.
         """
         before, since = self._newest, now - self._given_at
+        self._require_fresh(now)
         if jerk_ned is not None:
             self._jerk = jerk_ned
-        elif before is None or not 0.0 < since <= self._stale or self.silent_since is not None:
+        elif before is None or since <= 0.0:
             self._jerk = (0.0, 0.0, 0.0)
         else:
             old, new = before.acceleration_ned, reference.acceleration_ned
@@ -141,7 +139,7 @@ class CommandedSource:
                 (new[1] - old[1]) / since,
                 (new[2] - old[2]) / since,
             )
-        self._newest, self._given_at, self.silent_since = reference, now, None
+        self._newest, self._given_at = reference, now
 
     def end(self) -> None:
         """Give no more references."""
@@ -149,27 +147,32 @@ class CommandedSource:
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, continued; or a hold where the vehicle is when it is too old."""
-        newest, given_at = self._newest, self._given_at
-        if now - given_at > self._patience and self.silent_since is None:
-            self.silent_since = now
-            if newest is not None:
-                self._held = Reference(motion.position_ned, heading=newest.heading)
-        if newest is None or self.silent_since is not None:
-            held = self._held
-            return lambda _: held
-        jerk = self._jerk
-        return lambda time: continued(newest, jerk, time - given_at)
+        self._require_fresh(now)
+        newest, given_at, jerk = self._newest, self._given_at, self._jerk
+        if newest is not None and self._failure is None:
+            return lambda time: continued(newest, jerk, time - given_at)
+        if self._held is None or newest is None:
+            self._held = self._hold(motion)
+        held = self._held
+        return lambda _: held
 
-    @property
-    def _patience(self) -> float:
-        return self._begins_within if self._newest is None else self._stale
+    def _hold(self, motion: VehicleMotion) -> Reference:
+        """Hold where the source began; after references were flown, where the vehicle is."""
+        if self._newest is None and self.pose is not None:
+            return Reference(self.pose.position_ned, heading=self.pose.heading)
+        heading = 0.0 if self._newest is None else self._newest.heading
+        return Reference(motion.position_ned, heading=heading)
+
+    def _require_fresh(self, now: float) -> None:
+        """Note a failure if the newest reference is too old, or the first one does not come."""
+        patience = self._begins_within if self._newest is None else self._stale
+        if self._failure is None and not self._ended and now - self._given_at > patience:
+            self._failure = f"{self.name} gave no new command for {patience:g} s"
 
     @property
     def failure(self) -> str | None:
         """Why control must end: told by `fail`, or the references have stopped."""
-        if self._failure is not None or self.silent_since is None or self._ended:
-            return self._failure
-        return f"{self.name} gave no new command for {self._patience:g} s"
+        return self._failure
 
     def fail(self, reason: str) -> None:
         """Give no more references, because of `reason`."""

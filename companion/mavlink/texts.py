@@ -1,11 +1,14 @@
-"""STATUSTEXT: pieces joined, PX4's trailing tab cut."""
+"""STATUSTEXT: pieces joined, PX4's trailing tab cut; and our own words as frames for a log."""
 
 from collections import deque
 from typing import NamedTuple
 
-from companion.mavlink.messages import Message
+from companion.files.ascii_text import ascii_for
+from companion.mavlink.framing import build_frame
+from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
+_MOST_ID = 0xFFFF
 _KEPT = 100
 _SAME_WITHIN_S = 1.0
 
@@ -78,3 +81,45 @@ class TextAssembler:
 def _told(told: deque[StatusText], words: str, now: float) -> bool:
     """Whether these words came within the last second."""
     return any(one.text == words for one in told if one.time >= now - _SAME_WITHIN_S)
+
+
+class TextFrames:
+    """Makes STATUSTEXT frames of our own words, for a log; nothing sends them.
+
+    They come from our system and the component MAV_COMP_ID_LOG: with the component that sends, its
+    running numbers would look as if frames were lost.
+
+    Args:
+        system: our system id.
+    """
+
+    def __init__(self, system: int) -> None:
+        self._system = system
+        self._sequence = self._id = 0
+
+    def frames(self, words: str) -> list[bytes]:
+        """The words in ASCII as frames, each with at most 50 characters, in order."""
+        text = ascii_for(words)
+        pieces = [
+            text[at : at + _CHUNK_CHARACTERS] for at in range(0, len(text) + 1, _CHUNK_CHARACTERS)
+        ]
+        # A piece with a zero byte ends a text; a text of one piece has no number.
+        number = 0
+        if len(pieces) > 1:
+            number = self._id = self._id % _MOST_ID + 1
+        return [self._frame(piece, number, order) for order, piece in enumerate(pieces)]
+
+    def _frame(self, piece: str, number: int, order: int) -> bytes:
+        message = dialect.MAVLink_statustext_message(
+            dialect.MAV_SEVERITY_INFO, piece.encode("ascii"), number, order
+        )
+        kind = message.get_msgId()
+        self._sequence = (self._sequence + 1) & 0xFF
+        return build_frame(
+            kind,
+            encode(message),
+            CRC_EXTRA[kind],
+            sequence=self._sequence,
+            system=self._system,
+            component=dialect.MAV_COMP_ID_LOG,
+        )

@@ -30,6 +30,7 @@ class SafetyLadder:
 
     Attributes:
         note: takes a message for every transition.
+        breaches: the name of the monitor for each breach so far, by the breach in words.
 
     Args:
         monitors: the table; among equally severe breaches the first row decides.
@@ -38,10 +39,16 @@ class SafetyLadder:
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:
         self.note: Callable[[str], None] = lambda _: None
+        self.breaches: dict[str, str] = {}
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
         self._held_at: float | None = None
         self._held_for = ""
+
+    @property
+    def raised(self) -> tuple[str, ...]:
+        """The names of the monitors whose alarm is raised now."""
+        return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
         """Judge one snapshot; returns the action to take now, or None."""
@@ -72,6 +79,7 @@ class SafetyLadder:
         if alarm.reason is None:
             self.note(f"safety: {name} is over")
         else:
+            self.breaches[alarm.reason] = name
             self.note(f"safety: {name}: {alarm.reason} → {alarm.monitor.action.value}")
         return alarm.reason is not None
 
