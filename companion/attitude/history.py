@@ -15,7 +15,8 @@ def between(times: Sequence[float], time: float) -> tuple[int, float]:
         The index of the later of the two times around it, and the share of the way from the
         earlier one to it; below 0 before the first time, above 1 past the last.
     """
-    later = min(max(bisect_right(times, time), 1), len(times) - 1)
+    later, last = bisect_right(times, time), len(times) - 1
+    later = 1 if later < 1 else last if later > last else later
     start = times[later - 1]
     return later, (time - start) / (times[later] - start)
 
@@ -95,7 +96,7 @@ class History(Generic[Row]):
         """The plan at `time`: linear between rows and beyond them."""
         later, share = between(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
-        return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
+        return before._make([a + share * (b - a) for a, b in zip(before, after, strict=True)])
 
 
 class Turn(NamedTuple):
