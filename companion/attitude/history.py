@@ -96,7 +96,7 @@ class History(Generic[Row]):
         """The plan at `time`: linear between rows and beyond them."""
         later, share = between(self._times, time)
         before, after = self._rows[later - 1], self._rows[later]
-        return before._make([a + share * (b - a) for a, b in zip(before, after, strict=True)])
+        return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
 
 
 class Turn(NamedTuple):
