@@ -1,15 +1,16 @@
 """Resets of the autopilot's estimator: the estimate jumps while the vehicle does not move.
 
-A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets
-position and heading when it rejects them, and counts resets in ODOMETRY's `reset_counter`, which
-comes later and has no size. Guidance and control work in a frame without these jumps:
+A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets its
+position or heading when it has rejected their measurements for a while. It counts resets in
+ODOMETRY's `reset_counter`, which comes later and does not tell their size. Guidance and control
+work in a frame without these jumps:
 
 - All position jumps are subtracted from a position.
 - Poses, references and targets have headings without jumps. An attitude is turned back by all
-  heading jumps before its heading is compared with them.
+  heading jumps before its heading is compared with theirs.
 
-Horizontal accelerations stay in the estimator's frame, in which position is measured: they profit
-from a corrected heading at once.
+Horizontal accelerations stay in the estimator's frame, in which position is measured, so a
+corrected heading improves them at once.
 """
 
 from collections import deque
@@ -23,15 +24,15 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 _LONGEST = 0.1
 """Attitudes further apart than this are not compared, s: the rates between them are unknown."""
 _ANGLE = radians(4.0)
-"""Smaller attitude jumps are not separated from noise; the controller follows them, rad."""
+"""Smallest attitude jump that is told from noise, rad; the controller follows smaller ones."""
 _DISTANCE = 0.2
-"""Smaller position jumps are not separated from noise, m."""
+"""Smallest position jump that is told from noise, m."""
 _LONGEST_POSITIONS = 0.5
 """Positions further apart than this are not compared, s."""
 _ACCELERATION_CHANGE = 10.0
 """Largest change of the acceleration between two positions, m/s²."""
 _ONE_RESET = 0.5
-"""Jumps within this time belong to one reset, s; the counter comes at 10 Hz."""
+"""Jumps within this time count as one reset, s; ODOMETRY comes at 10 Hz."""
 
 
 class EstimatorResets:
@@ -42,7 +43,7 @@ class EstimatorResets:
         shift: sum of the position jumps, m NED.
         largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
-        times: times of the latest resets, s on our clock.
+        times: when the latest resets were found, s of event-loop time.
     """
 
     def __init__(self) -> None:
@@ -55,7 +56,7 @@ class EstimatorResets:
         self._counter: int | None = None
 
     def on_attitude(self, sample: AttitudeSample) -> bool:
-        """Compare a newer sample with the last one; returns whether the thrust axis jumped."""
+        """Compare a newer sample with the last one; return whether the thrust axis jumped."""
         if not is_unit(sample.q):
             return False
         before, self.newest = self.newest, sample
@@ -82,7 +83,7 @@ class EstimatorResets:
         return position._replace(position_ned=_less(position.position_ned, self.shift))
 
     def forget(self) -> None:
-        """Start the frame without jumps at the present estimate, as on the ground."""
+        """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
         self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
 
     def on_counter(self, counter: int | None, now: float) -> None:

@@ -8,7 +8,7 @@ from companion.guidance.follow import Follow
 from companion.guidance.linear import ReferenceAt
 
 _REJOINED = 1.0
-"""Closer than this to its reference, a vehicle is back from open-loop commands, m."""
+"""After open-loop commands, the vehicle has returned when it is this close to its reference, m."""
 
 
 class FlownManeuver:
@@ -16,8 +16,8 @@ class FlownManeuver:
 
     Attributes:
         pose: the held pose, or the one from which the maneuvers began; None: no reference.
-        maneuvers: those being flown, or None.
-        begun_at: when the maneuvers began, s on our clock, or None.
+        maneuvers: the maneuvers that are flown, or None.
+        begun_at: when the maneuvers began, s of event-loop time, or None.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class FlownManeuver:
         self.pose, self.maneuvers, self.begun_at = None, None, None
 
     def begin(self, maneuvers: ManeuverSequence, now: float) -> None:
-        """Fly `maneuvers` from the held pose; `now` in s on our clock."""
+        """Fly `maneuvers` from the held pose; `now` in s of event-loop time."""
         self.maneuvers, self.begun_at = maneuvers, now
 
     def finished(self, now: float) -> bool:
@@ -41,11 +41,11 @@ class FlownManeuver:
         return now - self.begun_at >= self.maneuvers.duration
 
     def reference(self, motion: VehicleMotion, heading: float) -> ReferenceAt:
-        """The reference as a function of our clock; without a pose, where the vehicle is.
+        """The reference as a function of event-loop time (s); without a pose, the present place.
 
         Args:
-            motion: of the vehicle now.
-            heading: of the vehicle now, rad.
+            motion: present motion of the vehicle.
+            heading: present heading of the vehicle, rad.
         """
         pose, maneuvers, begun_at = self.pose, self.maneuvers, self.begun_at
         if pose is None:
@@ -60,7 +60,7 @@ class FlownManeuver:
         """The trajectory that is followed now, or None.
 
         Args:
-            now: s on our clock.
+            now: s of event-loop time.
             turn: sum of the heading resets, rad.
         """
         if self.maneuvers is None or self.begun_at is None or self.pose is None:
@@ -71,7 +71,7 @@ class FlownManeuver:
         return Following(part, elapsed, self.pose, turn)
 
     def steers_by_rates(self, now: float) -> str | None:
-        """The maneuvers' name while they command body rates in open loop, or None."""
+        """Name of the maneuvers if they command body rates in open loop at `now`; else None."""
         if self.pose is None or self.maneuvers is None or self.begun_at is None:
             return None
         reference = self.maneuvers.at(now - self.begun_at, self.pose)
@@ -80,7 +80,7 @@ class FlownManeuver:
     def tracking_error(self, reference: Reference, motion: VehicleMotion) -> float | None:
         """Distance from the reference, m.
 
-        None without a pose, in open loop, and on the way back from open loop.
+        It is None without a pose, in open loop, and while the vehicle returns from open loop.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         returning = self._off_reference and distance > _REJOINED

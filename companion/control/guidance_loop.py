@@ -1,4 +1,4 @@
-"""The guidance loop: a timer that makes a fresh command from the newest position."""
+"""The guidance loop: a timer that makes a new command from the newest position."""
 
 import asyncio
 from collections.abc import Callable
@@ -44,12 +44,13 @@ class GuidanceLoop:
         flown: the held pose and the maneuvers flown from it.
         given_up: why the maneuver was given up, or None.
         bound_to_hold: whether no maneuver may be flown any more; set by `give_up`.
-        motion: of the vehicle at the last step, without resets, or None.
+        motion: motion of the vehicle at the last step, without resets, or None.
         off_course: distance from the reference at the last step, m; see
             `FlownManeuver.tracking_error`.
-        predictive: flies trajectories instead of linear guidance, or None.
-        estimate: of the motion.
-        learning: of the hover thrust.
+        predictive: predictive control, which flies trajectories instead of linear guidance, or
+            None.
+        estimate: estimates the motion.
+        learning: learns the hover thrust.
     """
 
     def __init__(
@@ -95,10 +96,7 @@ class GuidanceLoop:
             self.estimate.note_attitude(sample)
 
     def fresh_position(self) -> LocalPosition | None:
-        """The newest position, or None if it is stale by our clock or by the vehicle's.
-
-        By our clock, nothing came since; by the vehicle's clock, the position was delayed.
-        """
+        """The newest position, or None if it arrived, or was measured, too long ago."""
         position, now = self._state.position, self._clock()
         if position is None or now - position.received > self._position_stale:
             return None
@@ -113,7 +111,7 @@ class GuidanceLoop:
         """Hold the present position and heading.
 
         Raises:
-            RuntimeError: no position came yet.
+            RuntimeError: no position has come yet.
         """
         self.stand_by()
         position_ned = self._guidance_input(self._clock()).now.position_ned
@@ -138,7 +136,7 @@ class GuidanceLoop:
         return self.flown.finished(self._clock())
 
     async def run(self) -> None:
-        """Make commands until cancelled; missed steps are not made up for."""
+        """Make commands until cancelled; missed steps are not repeated."""
         due = self._clock()
         while True:
             self.step()
@@ -152,7 +150,8 @@ class GuidanceLoop:
         if position is None:
             self.learning.pause()
             return
-        # Under our control the safety monitors judge a landed flag: zero thrust would make it true.
+        # While offboard is active, a landed flag must not lead to zero thrust, which would make it
+        # true; the safety monitors judge it.
         standing = self._ground.standing and not self._loop.offboard_active
         if standing:
             self.learning.on_ground()
@@ -180,12 +179,12 @@ class GuidanceLoop:
             self._record_tracking(measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
-        """Write the command for `now`; returns the reference from which it was made."""
+        """Write the command for `now`; return the reference from which it was made."""
         reference_at = self.flown.reference(inputs.now, self._heading())
         reference = reference_at(now)
         linear = self._guidance.command(reference_at, now, inputs)
         target, later, down = self._predicted(now, linear, inputs)
-        # Open-loop steps, predictive control and the lead do not know the learned thrust limit.
+        # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self.learning.limit_tilt(each, down) for each in (target, later))
         self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
         self._loop.command = GuidanceCommand(
@@ -204,10 +203,10 @@ class GuidanceLoop:
         return heading(self._loop.resets.attitude(self._q))
 
     def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
-        """The command of predictive control while it flies, else `linear`.
+        """The command of predictive control while it flies a trajectory, else `linear`.
 
-        Its headings are in the autopilot's frame, resets included. Its target stays constant for a
-        period, which its model accounts for.
+        Predictive control works in the estimator's frame, with heading resets. Its target is
+        constant for a period, which its model takes into account.
         """
         if self.predictive is None:
             return linear

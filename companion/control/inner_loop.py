@@ -1,4 +1,4 @@
-"""The inner loop from the configuration: planner, limits, thrust map, vehicle response."""
+"""Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
 
 from companion.attitude import Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
@@ -9,7 +9,7 @@ from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettin
 
 
 def planner(config: Config) -> Planner:
-    """The planner with its limits, and with the vehicle's response if it plans with that."""
+    """The configured planner with its limits; `model-following` gets the vehicle's response too."""
     following = config.planner_name == MODEL_FOLLOWING
     return make_planner(
         config.planner_name,
@@ -33,7 +33,7 @@ def rate_limits(config: Config) -> Limits:
 
 
 def hover_thrust(config: Config) -> HoverThrust:
-    """The map from specific thrust to normalised thrust, 0..1."""
+    """The conversion of specific thrust to normalised thrust, 0..1."""
     thrust = config.thrust
     return HoverThrust(
         ThrustSettings(
@@ -67,9 +67,9 @@ def tilt_response(config: Config) -> InnerResponse:
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
-    """Lag and dead time of the slower of roll and pitch, s; 0 where unknown.
+    """Lag and dead time of the slower of roll and pitch, s; 0 if unknown.
 
-    The quicker axis waits for the slower one, so the coefficients respond like this.
+    The quicker axis is delayed to match the slower one, so the coefficients respond like this.
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]

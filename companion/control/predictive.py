@@ -1,4 +1,4 @@
-"""Predictive control beside linear guidance, which flies every step that it misses."""
+"""Predictive control; linear guidance flies every step for which it has no answer."""
 
 from array import array
 from collections import Counter, deque
@@ -37,7 +37,7 @@ class Following(NamedTuple):
 
 @dataclass
 class PredictiveRecord:
-    """What predictive control did in one flight.
+    """Counters of predictive control in one flight.
 
     Attributes:
         flown: number of answers that were flown.
@@ -51,16 +51,16 @@ class PredictiveRecord:
 
 
 class Predictive:
-    """Requests at each step of guidance the solver's answer for the next step.
+    """Requests the solver's answer for the next step, at each step of guidance.
 
-    Linear guidance makes its own command at every step, so it replaces an answer that is late,
-    failed or implausible without a pause. The first trouble of each kind is reported.
+    Linear guidance also makes a command at every step. It replaces an answer that is late, failed
+    or implausible without a pause. The first trouble of each kind is reported.
 
     Args:
         solver: starts the solver's process for a trajectory.
-        period: of guidance, s.
-        lockstep: wait for the solver, as the vehicle waits for us.
-        note: takes messages for the user.
+        period: period of guidance, s.
+        lockstep: whether to wait for the solver, as the vehicle waits in lockstep.
+        note: called with messages for the user.
     """
 
     def __init__(
@@ -86,12 +86,15 @@ class Predictive:
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """The solver's answer for now, else `linear`; also requests the next answer.
+        """Take the solver's answer for now, else `linear`, and request the next answer.
 
         Args:
-            linear: target and downward acceleration (m/s²) by linear guidance.
-            vehicle: state of the vehicle now.
-            following: the trajectory, or None.
+            linear: target and downward acceleration (m/s²) of linear guidance.
+            vehicle: present state of the vehicle.
+            following: the trajectory that is followed, or None.
+
+        Returns:
+            Target and downward acceleration (m/s²) to fly.
         """
         chosen = linear
         if following is not None:
@@ -109,7 +112,7 @@ class Predictive:
         if self._lockstep:
             self._wait_until_ready()
         answer = self._solver.take(_LONGEST_WAIT if self._lockstep else 0.0)
-        # An answer for a step that guidance has missed is too old.
+        # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None
         return answer
@@ -142,9 +145,9 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The target, and the vertical acceleration of its thrust at the answer's own tilt.
+    """The target, and the downward acceleration (m/s²) that the answer's thrust has at its tilt.
 
-    The present tilt differs, and the thrust map corrects for it to hold the height.
+    `HoverThrust` converts this acceleration to the thrust at the present tilt.
     """
     cosine = sqrt(max(0.0, 1.0 - answer.north**2 - answer.east**2))
     target = Target(answer.north, answer.east, answer.heading)

@@ -1,4 +1,4 @@
-"""Endpoints in the usual notation, such as `udpin://0.0.0.0:14540`; opens nothing."""
+"""Parses endpoints in the usual notation, such as `udpin://0.0.0.0:14540`."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
 
 @dataclass(frozen=True)
 class PeerAddress:
-    """A host that may talk to a listening endpoint, from any port if that is `None`."""
+    """A host that may talk to a listening endpoint; a port of `None` is any port."""
 
     host: str
     port: int | None = None
@@ -33,7 +33,7 @@ class UdpIn:
 
 @dataclass(frozen=True)
 class UdpOut:
-    """Send to a known address and hear only it."""
+    """Send to a known address, and receive only from this address."""
 
     host: str
     port: int
@@ -49,7 +49,7 @@ class TcpClient:
 
 @dataclass(frozen=True)
 class TcpServer:
-    """Listen for one vehicle that connects to us; with `peers`, from one of them."""
+    """Listen for one vehicle that connects; if `peers` are given, only from one of them."""
 
     host: str
     port: int
@@ -79,12 +79,12 @@ _NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
 def parse_endpoint(text: str) -> Endpoint:
     """Read an endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`.
 
-    `udp://` is taken as `udpin://`. An empty host of a listening endpoint means every interface.
-    A listening endpoint may name who is let in: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a
-    port as in `?peer=192.0.2.7:14580`, several with commas between.
+    `udp://` means `udpin://`. An empty host of a listening endpoint means every interface. A
+    listening endpoint may name its peers: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in
+    `?peer=192.0.2.7:14580`, several separated by commas.
 
     Raises:
-        EndpointError: The text is not one of the five notations, or its port is not 1..65535
+        EndpointError: The text is in none of the five notations, or its port is not 1..65535
             (a listening endpoint also takes 0: any free port).
     """
     scheme, separator, rest = text.strip().partition("://")

@@ -18,8 +18,8 @@ _READ_BYTES = 4096
 class SerialTransport:
     """A serial port, read and written without blocking.
 
-    A frame is never cut short on the wire: when the driver takes only part of one, the rest
-    follows as soon as there is room, and frames that come meanwhile are dropped.
+    No frame is sent in part. If the driver takes only part of a frame, the rest is sent as soon as
+    there is room, and frames sent meanwhile are dropped.
 
     Raises:
         EndpointError: The device is missing, in use, or not permitted.
@@ -54,7 +54,7 @@ class SerialTransport:
         self._receive(data, time.perf_counter_ns())
 
     def send(self, frame: bytes) -> bool:
-        """Write one frame; false if the device is gone or the last frame is not out yet."""
+        """Write one frame; return False if the device is gone or the last frame is unfinished."""
         if self._fd < 0 or self._unsent:
             return False
         return self._write(frame)
@@ -65,7 +65,7 @@ class SerialTransport:
         except BlockingIOError:
             return False
         except OSError as error:
-            # Not from inside send(): its caller may be in the middle of anything.
+            # Not called from inside `send`, whose caller may be in the middle of anything.
             self._loop.call_soon(self._drop, f"serial device failed: {error.strerror}")
             return False
         if written < len(data):
@@ -90,7 +90,7 @@ class SerialTransport:
             self._lost(reason)
 
     def close(self) -> None:
-        """Close the device; a frame cut short is discarded."""
+        """Close the device; the rest of an unfinished frame is discarded."""
         if self._fd < 0:
             return
         unwatch(self._loop, self._fd)
