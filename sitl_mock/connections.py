@@ -5,37 +5,35 @@ import select
 from sitl_mock.config.endpoint import SerialLine, TcpIn, parse_endpoint
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.control_channel import reply
-from sitl_mock.link.endpoint import Endpoint, bundles
-from sitl_mock.link.framing import Message, decode
+from sitl_mock.exchange import Arrived, Exchange
+from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.link import Link
-from sitl_mock.link.pipe import DatagramPipe
 from sitl_mock.link.serial_endpoint import SerialEndpoint
 from sitl_mock.link.tcp_endpoint import TcpEndpoint
 from sitl_mock.link.udp_endpoint import UdpEndpoint
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
-Arrived = tuple[bytes, list[Message]]
-"""A datagram and the messages in it."""
-
 
 class Connections:
-    """The endpoints and their links, and the faults of the companion link.
+    """The endpoints and their links.
 
     Attributes:
         companion: the companion's endpoint.
 
     Args:
         settings: of this vehicle.
-        simulation: takes what arrives; its links are emptied.
+        simulation: its links are emptied; the control channel acts on it.
+        exchange: takes what arrives, and gives what is to be sent.
 
     Raises:
         ConfigError: a port is in use.
     """
 
-    def __init__(self, settings: MockSettings, simulation: Simulation) -> None:
+    def __init__(self, settings: MockSettings, simulation: Simulation, exchange: Exchange) -> None:
         self.companion = _companion_endpoint(settings)
         self._simulation = simulation
+        self._exchange = exchange
         self._links: dict[Endpoint, Link] = {self.companion: simulation.companion}
         if settings.gcs_port:
             gcs = UdpEndpoint(settings.gcs_port + GCS_PORT_OFFSET, settings.gcs_port, "--gcs-port")
@@ -45,9 +43,6 @@ class Connections:
             if settings.control_port
             else None
         )
-        self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
-        self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
-        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
 
     def close(self) -> None:
         """Close all sockets."""
@@ -67,34 +62,18 @@ class Connections:
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
     def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
-        """Hand what came on an endpoint to the autopilot, after the faults of its link."""
-        simulation, link = self._simulation, self._links[endpoint]
-        faults = simulation.faults.link
-        if endpoint is self.companion and not self._pipe_in.is_clear(faults):
-            datagrams = [datagram for datagram, _ in arrived]
-            passed = self._pipe_in.push(datagrams, faults, simulation.time_us)
-            arrived = [(datagram, decode(datagram)) for datagram in passed]
-        for _, messages in arrived:
-            for message in messages:
-                simulation.handle(message, link)
+        """Hand what came on an endpoint to the autopilot."""
+        self._exchange.deliver(arrived, self._links[endpoint])
 
     def send_beacon(self, beacon: bytes) -> None:
         """Send the companion a lockstep beacon, and nothing else."""
         self.companion.send([self._simulation.companion.sign(beacon)])
 
     def flush(self, beacon: bytes | None = None) -> None:
-        """Send the queued frames of every link; the beacon, if any, comes last.
-
-        The faults of the companion link apply to all but the beacon.
-        """
-        simulation = self._simulation
+        """Send the queued frames of every link; the beacon, if any, to the companion alone."""
         for endpoint, link in self._links.items():
-            frames = link.take()
-            if endpoint is self.companion and not self._pipe_out.is_clear(simulation.faults.link):
-                frames = self._pipe_out.push(frames, simulation.faults.link, simulation.time_us)
-            if endpoint is self.companion and beacon is not None:
-                frames.append(link.sign(beacon))
-            endpoint.send(bundles(frames) if self._bundle else frames)
+            own = beacon if endpoint is self.companion else None
+            endpoint.send(self._exchange.outgoing(link, own))
 
     def _serve(self, control: UdpEndpoint) -> None:
         while (request := control.receive_from()) is not None:

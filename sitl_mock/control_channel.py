@@ -5,20 +5,56 @@ Requests, one object each:
 - ``{"fault": {"kind": "drop", "probability": 0.5, "duration_s": 3}}``: any fault of the
   configuration; without a start it begins at once -> ``{"ok": true}``
 - ``{"clear": true}``: end all faults -> ``{"ok": true}``
-- ``{"state": true}``: return the true state -> see `truth`
+- ``{"state": true}``: return the true state -> see `Truth`
 
 Anything else -> ``{"error": "..."}``.
 """
 
 import json
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, TypedDict
 
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import fault_adapter
+from sitl_mock.config.section import ConfigError
+from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
 _USAGE = 'send {"fault": {...}}, {"clear": true} or {"state": true}'
+
+
+class Truth(TypedDict):
+    """The true state of a vehicle: SI, NED (origin: home on the ground), FRD, q body to world."""
+
+    time: float
+    """Vehicle time since boot, s."""
+    armed: bool
+    mode: str
+    """PX4's mode names or ArduCopter's."""
+    intended_mode: str
+    """The mode that its user chose last; a failsafe does not change it."""
+    failsafe: bool
+    landed: bool
+    """By the autopilot's land detector."""
+    aborted: bool
+    """The autopilot's process has ended: it neither flies nor answers."""
+    position: Vector
+    velocity: Vector
+    q: Quaternion
+    rates: Vector
+    on_ground: bool
+    crashed: bool
+    touchdown_speed: float | None
+    """Of the last touchdown, m/s; None before the first."""
+    battery: float
+    """0..1."""
+    setpoints: int
+    """Number of setpoints that the autopilot accepted."""
+    last_setpoint: float | None
+    """Vehicle time of the last one, s; None if there was none."""
+    signing: dict[str, int] | None
+    """Numbers of the companion's frames that were accepted, unsigned, refused; None: no signing."""
 
 
 def reply(simulation: Simulation, request: bytes) -> bytes:
@@ -26,14 +62,30 @@ def reply(simulation: Simulation, request: bytes) -> bytes:
     return json.dumps(_answer(simulation, request), allow_nan=False).encode()
 
 
-def _answer(simulation: Simulation, request: bytes) -> dict[str, Any]:
+def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
+    """Inject a fault of the configuration; without a start it begins in the next slot.
+
+    Raises:
+        ConfigError: there is no such fault; the message names the key.
+    """
+    try:
+        valid = fault_adapter.validate_python(dict(fault))
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"])
+        told = f"fault {where}: {detail['msg']}".replace("fault :", "fault:")
+        raise ConfigError(told) from error
+    simulation.faults.add(valid, simulation.time_us)
+
+
+def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
     try:
         requested = json.loads(request)
     except (ValueError, RecursionError):
         return {"error": f"not JSON; {_USAGE}"}
     match requested:
         case {"fault": dict(fault)} if len(requested) == 1:
-            return _add_fault(simulation, fault)
+            return _try_fault(simulation, fault)
         case {"clear": True} if len(requested) == 1:
             simulation.clear_faults()
             return {"ok": True}
@@ -42,27 +94,16 @@ def _answer(simulation: Simulation, request: bytes) -> dict[str, Any]:
     return {"error": _USAGE}
 
 
-def _add_fault(simulation: Simulation, fault: dict[str, Any]) -> dict[str, Any]:
+def _try_fault(simulation: Simulation, fault: dict[str, Any]) -> dict[str, Any]:
     try:
-        valid = fault_adapter.validate_python(fault)
-    except ValidationError as error:
-        detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"])
-        return {"error": f"fault {where}: {detail['msg']}".replace("fault :", "fault:")}
-    simulation.faults.add(valid, simulation.time_us)
+        add_fault(simulation, fault)
+    except ConfigError as error:
+        return {"error": str(error)}
     return {"ok": True}
 
 
-def truth(simulation: Simulation) -> dict[str, Any]:
-    """Return the true state: SI, NED (origin: home on the ground), FRD, q body to world.
-
-    Keys: ``time`` (s), ``armed``, ``mode``, ``intended_mode``, ``failsafe``, ``landed``,
-    ``aborted`` (the autopilot's process has ended: it neither flies nor answers),
-    ``position``, ``velocity``, ``q``, ``rates``, ``on_ground``, ``crashed``,
-    ``touchdown_speed`` (None before the first), ``battery`` (0..1), ``setpoints`` (number
-    accepted), ``last_setpoint`` (vehicle time in s, None if none), ``signing`` (None, or the number
-    of the companion's frames that were ``accepted``, ``unsigned``, ``refused``).
-    """
+def truth(simulation: Simulation) -> Truth:
+    """Return the true state."""
     state, stream = simulation.state, simulation.stream
     now = simulation.vehicle.truth
     signing = simulation.companion.signing

@@ -3,11 +3,11 @@
 import os
 import time
 from collections.abc import Callable
-from math import ceil
 
-from sitl_mock.connections import Arrived, Connections
+from sitl_mock.connections import Connections
+from sitl_mock.exchange import Arrived, Exchange, in_burst
 from sitl_mock.link.endpoint import Endpoint
-from sitl_mock.link.framing import Message, decode
+from sitl_mock.link.framing import decode
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
@@ -21,13 +21,6 @@ we make these up, because a lost tenth would look to the companion like a slower
 
 SPIN_S = 0.0005
 """The server polls without sleeping for this long before it sleeps."""
-
-_ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
-
-
-def in_burst(elapsed_s: float, burst_s: float) -> float:
-    """Return the time of the burst in which a step runs, s; without bursts the time itself."""
-    return ceil(elapsed_s / burst_s) * burst_s if burst_s > 0.0 else elapsed_s
 
 
 class Server:
@@ -51,7 +44,8 @@ class Server:
         self._settings = settings
         self._status = status
         self._simulation = Simulation(settings, system_id)
-        self._connections = Connections(settings, self._simulation)
+        self._exchange = Exchange(settings, self._simulation)
+        self._connections = Connections(settings, self._simulation, self._exchange)
         self._companion = self._connections.companion
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
@@ -89,30 +83,25 @@ class Server:
         """Simulate one slot: in lockstep after the latest answer, else when it is due."""
         if not self._lockstep:
             self._wait_for_time()
-        self._handle_collected()
-        self._simulation.tick()
-        if self._settings.lockstep.enabled:
-            self._connections.flush(self._new_beacon())
-            if self._lockstep:
-                self._await_answer()
-        else:
-            self._connections.flush()
+        collected, self._collected = self._collected, []
+        beacon = self._exchange.step(collected)
+        if beacon is not None:
+            self._beacon, self._answered = beacon, False
+        self._connections.flush(beacon)
+        if self._lockstep:
+            self._await_answer()
         if self._status is not None:
             self._status(self._simulation)
 
     # Lockstep
-
-    def _new_beacon(self) -> bytes:
-        self._beacon = self._simulation.beacon()
-        self._answered = False
-        return self._beacon
 
     def _await_answer_to_first_beacon(self) -> None:
         """Send the first beacon until a client answers it; the simulation starts then.
 
         If a client sends anything but no answer within ``patience_s``, continue in real time.
         """
-        self._connections.send_beacon(self._new_beacon())
+        self._beacon = self._simulation.beacon()
+        self._connections.send_beacon(self._beacon)
         heard_at: float | None = None
         while not self._answered:
             self._collect(BEACON_FIRST_S)
@@ -170,21 +159,11 @@ class Server:
                 return
             datagram, from_partner = received
             messages = decode(datagram)
+            if from_partner and self._exchange.is_repeated_answer(messages):
+                continue
             self._collected.append((datagram, messages))
-            if from_partner and self._is_answer(messages):
+            if from_partner and self._exchange.is_answer(messages):
                 self._answered = True
-
-    def _is_answer(self, messages: list[Message]) -> bool:
-        now_ms = self._simulation.time_us // 1000
-        return any(
-            message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
-            for message in messages
-        )
-
-    def _handle_collected(self) -> None:
-        """Handle the collected datagrams in order."""
-        collected, self._collected = self._collected, []
-        self._connections.deliver(collected, self._companion)
 
     # Real time
 
@@ -227,7 +206,7 @@ class Server:
             messages = decode(datagram)
             self._connections.deliver([(datagram, messages)], endpoint)
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
-            if in_lockstep and from_partner and self._is_answer(messages):
+            if in_lockstep and from_partner and self._exchange.is_answer(messages):
                 # The latest beacon is answered: lockstep resumes.
                 self._answered = self._lockstep = True
         self._connections.flush()

@@ -16,7 +16,9 @@ from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
 """A control law on scalars: a unit quaternion, an admissible target, the sample period in s and
-the constants → body rates (roll, pitch, yaw) in rad/s."""
+the constants → body rates (roll, pitch, yaw) in rad/s.
+
+A batch passes quaternion and target as plain sequences, so a law unpacks them."""
 
 
 class Planner(Protocol):
@@ -100,16 +102,16 @@ PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
 def make_planner(
-    name: str,
+    name: str | Law,
     gain: float = 5.0,
     yaw_gain: float = 2.0,
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     **options: Any,
 ) -> Planner:
-    """Make a planner by its name.
+    """Make a planner by its name, or of a law of your own.
 
     Args:
-        name: one of `PLANNER_NAMES`.
+        name: one of `PLANNER_NAMES`, or a function of the type `Law`.
         gain: p in 1/s, the inverse of the wanted time constant.
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
@@ -125,6 +127,8 @@ def make_planner(
         TypeError: the planner does not take an option.
         ValueError: unknown name, or a value out of range.
     """
+    if callable(name):
+        return LawPlanner(name, make_constants(gain, yaw_gain, limits, **options))
     if name == MODEL_FOLLOWING:
         return _model_following(gain, yaw_gain, limits, **options)
     if name not in _LAWS:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from companion.attitude.kinematics import tilt_products
 from companion.attitude.planner import LawPlanner
 from companion.batch.checks import admissible_targets, as_rows, compiled_check, unit_quaternions
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
@@ -109,6 +110,19 @@ def simulate(
         loops = compiled_loops(planner.law, any_angle=True)
         loops.record(history.q, targets, history.rates, dt, planner.constants)
     return history
+
+
+def coefficients(q: ArrayLike) -> Array:
+    """Acceleration coefficients of many attitudes (equation 10), as of one in `companion.attitude`.
+
+    Args:
+        q: (..., 4, n) unit quaternions w, x, y, z, such as `History.q`; they are not checked.
+
+    Returns:
+        (..., 2, n) north, east.
+    """
+    _, ax, ay = tilt_products(*np.moveaxis(np.asarray(q, dtype=np.float64), -2, 0))
+    return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 
 def _prepared(

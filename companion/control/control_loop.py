@@ -78,6 +78,7 @@ class ControlLoop:
         trace: FlightTrace,
         limits: Limits,
         clock: Callable[[], float],
+        clock_ns: Callable[[], int] = perf_counter_ns,
     ) -> None:
         self.command: GuidanceCommand | None = None
         self.on = False
@@ -92,6 +93,7 @@ class ControlLoop:
         self._hover_thrust = hover_thrust
         self._send = send
         self._clock = clock
+        self._clock_ns = clock_ns
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
@@ -167,9 +169,12 @@ class ControlLoop:
         # Checked here, because body rates from guidance bypass the planner's own check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
-        return self._rates(sample, command, period), self._hover_thrust.normalised(
-            command.acceleration_down, sample.q, sample.body_rates
+        thrust = (
+            self._hover_thrust.normalised(command.acceleration_down, sample.q, sample.body_rates)
+            if command.thrust is None
+            else self._hover_thrust.within_limits(command.thrust)
         )
+        return self._rates(sample, command, period), thrust
 
     def _rates(self, sample: AttitudeSample, command: GuidanceCommand, period: float) -> BodyRates:
         """The body rates of the planner, or those of guidance within the same limits."""
@@ -189,7 +194,7 @@ class ControlLoop:
         """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
-        latency = perf_counter_ns() - sample.received_ns
+        latency = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
         if self.offboard_active:

@@ -17,6 +17,8 @@ class GuidanceCommand(NamedTuple):
         is_step: whether this is an open-loop step whose response is measured.
         body_rates: body rates to send, within the limits, instead of the planner's, rad/s; None:
             the planner's are sent.
+        thrust: thrust to send, within the limits, instead of that for `acceleration_down`, 0..1;
+            None: that for `acceleration_down` is sent.
         turn: sum of the heading resets when the command was made, rad.
         later: the target `period` after `made_at`; the target moves there on a straight line and
             then stays. None: the target is constant.
@@ -29,6 +31,7 @@ class GuidanceCommand(NamedTuple):
     idle: bool = False
     is_step: bool = False
     body_rates: BodyRates | None = None
+    thrust: float | None = None
     turn: float = 0.0
     later: Target | None = None
     period: float = 0.0

@@ -7,7 +7,7 @@ from math import degrees, nan
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
 from companion.control.control_loop import ControlLoop
-from companion.control.flown_maneuver import FlownManeuver
+from companion.control.flown_source import FlownSource
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
@@ -19,11 +19,11 @@ from companion.guidance import (
     HoverThrust,
     LinearCommand,
     LinearGuidance,
-    ManeuverSequence,
     Pose,
     Reference,
     VehicleMotion,
 )
+from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -36,17 +36,17 @@ class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate, while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, without a pose, it
-    damps the motion; `hold_here` holds a pose; `follow` flies maneuvers from it. If open-loop rates
-    tilt the vehicle too far, the maneuver ends and the vehicle holds where it is. Poses and
+    damps the motion; `hold_here` holds a pose; `follow` flies a source from it. If open-loop rates
+    tilt the vehicle too far, the source ends and the vehicle holds where it is. Poses and
     references are in the frame without estimator resets, so no reset moves the vehicle.
 
     Attributes:
-        flown: the held pose and the maneuvers flown from it.
-        given_up: why the maneuver was given up, or None.
-        bound_to_hold: whether no maneuver may be flown any more; set by `give_up`.
+        flown: the held pose and the source that is flown from it.
+        given_up: why the source was given up, or None.
+        bound_to_hold: whether no source may be flown any more; set by `give_up`.
         motion: motion of the vehicle at the last step, without resets, or None.
         off_course: distance from the reference at the last step, m; see
-            `FlownManeuver.tracking_error`.
+            `FlownSource.tracking_error`.
         predictive: predictive control, which flies trajectories instead of linear guidance, or
             None.
         estimate: estimates the motion.
@@ -69,7 +69,7 @@ class GuidanceLoop:
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
-        self.flown = FlownManeuver()
+        self.flown = FlownSource()
         self.given_up: str | None = None
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
@@ -118,21 +118,22 @@ class GuidanceLoop:
         self.flown.pose = Pose(position_ned, self._heading())
 
     def give_up(self) -> None:
-        """Hold here, and fly no maneuver any more."""
+        """Hold here, and fly no source any more."""
         self.bound_to_hold = True
         self.hold_here()
 
-    def follow(self, maneuvers: ManeuverSequence) -> None:
-        """Fly `maneuvers` from the held pose; after `give_up`, keep holding."""
+    def follow(self, source: Source) -> None:
+        """Fly `source` from the held pose; after `give_up`, keep holding."""
         if self.bound_to_hold:
             return
         if self.flown.pose is None:
             self.hold_here()
-        self.flown.begin(maneuvers, self._clock())
+        assert self.flown.pose is not None
+        self.flown.begin(source, self.flown.pose, self._clock())
 
     @property
     def finished(self) -> bool:
-        """Whether the maneuvers have ended."""
+        """Whether the source has no more to fly."""
         return self.flown.finished(self._clock())
 
     async def run(self) -> None:
@@ -164,7 +165,7 @@ class GuidanceLoop:
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self._guidance_input(now)
         self.motion = inputs.now
-        self._give_up_if_tilted(now)
+        self._give_up_if_tilted(now, inputs.now)
         reference = self._write_command(now, inputs)
         self.off_course = self.flown.tracking_error(reference, inputs.now)
         if not standing:
@@ -180,7 +181,7 @@ class GuidanceLoop:
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; return the reference from which it was made."""
-        reference_at = self.flown.reference(inputs.now, self._heading())
+        reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
         linear = self._guidance.command(reference_at, now, inputs)
         target, later, down = self._predicted(now, linear, inputs)
@@ -191,8 +192,9 @@ class GuidanceLoop:
             target,
             down,
             now,
-            is_step=reference.coefficients is not None,
+            is_step=reference.coefficients is not None and reference.thrust is None,
             body_rates=reference.body_rates,
+            thrust=reference.thrust,
             turn=self._loop.resets.turn,
             later=later,
             period=self._period,
@@ -226,9 +228,9 @@ class GuidanceLoop:
             now, self._guidance.acts_after, self.learning.thrust_limits
         )
 
-    def _give_up_if_tilted(self, now: float) -> None:
+    def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
         """Hold here if open-loop rates have tilted the vehicle too far."""
-        name = self.flown.steers_by_rates(now)
+        name = self.flown.steers_by_rates(now, motion)
         if name is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
@@ -245,4 +247,6 @@ class GuidanceLoop:
         north, east, down = reference.position_ned
         if not reference.position_is_meant:
             north = east = nan  # only the height is a reference in open loop
+        if not reference.holds_height:
+            down = nan
         self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

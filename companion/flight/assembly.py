@@ -13,6 +13,7 @@ from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
+from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
@@ -26,6 +27,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport.base import Tap
+from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.realtime import Wishes
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
@@ -52,8 +54,10 @@ def link_settings(config: Config) -> LinkSettings:
     )
 
 
-def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
-    """The link of `link.backend`, still closed; `tap` and `notice` as in `Link`.
+def open_link(
+    config: Config, tap: Tap | None, notice: Notice, opener: OpenTransport = open_transport
+) -> Link:
+    """The link of `link.backend`, still closed; the other arguments as in `Link`.
 
     Raises:
         SigningError: the key cannot be used.
@@ -64,7 +68,7 @@ def open_link(config: Config, tap: Tap | None, notice: Notice) -> Link:
         from companion.mavsdk_link.link import MavsdkLink  # noqa: PLC0415  needs the extra
 
         return MavsdkLink(settings, tap, notice)
-    return Link(settings, tap, notice=notice)
+    return Link(settings, tap, opener, notice)
 
 
 def realtime_wishes(config: Config) -> Wishes:
@@ -129,13 +133,17 @@ def assemble(
     link: Link,
     observer: Observer,
     ask_landing: AskLanding,
-    folder: Path,
+    folder: Path | None,
     maneuvers: ManeuverSequence,
+    environment: Environment = THIS_COMPUTER,
 ) -> Assembled:
-    """Assemble a flight of `maneuvers` over an open link; its records are written to `folder`."""
+    """Assemble a flight of `maneuvers` over an open link.
+
+    Its records are written to `folder`; with None, nothing is written or remembered.
+    """
     clock: Callable[[], float] = asyncio.get_running_loop().time
     trace = FlightTrace(folder)
-    loop, guidance_loop, ground = _control(config, link, trace, clock)
+    loop, guidance_loop, ground = _control(config, link, trace, clock, environment)
     snapshot_builder = SnapshotBuilder(
         link, loop, guidance_loop, real_time=not config.link.lockstep
     )
@@ -161,7 +169,8 @@ def assemble(
     ladder.note = context.note = preflight.note = flight.note
     link.clock.on_event = rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None
-    memory = VehicleMemory(folder.parent, guidance_loop.estimate.drag, drag_is_set, flight.note)
+    remembered = None if folder is None else folder.parent
+    memory = VehicleMemory(remembered, guidance_loop.estimate.drag, drag_is_set, flight.note)
     preflight.on_identity = memory.load
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
@@ -174,7 +183,11 @@ def assemble(
 
 
 def _control(
-    config: Config, link: Link, trace: FlightTrace, clock: Callable[[], float]
+    config: Config,
+    link: Link,
+    trace: FlightTrace,
+    clock: Callable[[], float],
+    environment: Environment,
 ) -> tuple[ControlLoop, GuidanceLoop, GroundContact]:
     """The control loop, and the guidance loop that writes its commands."""
     thrust = hover_thrust(config)
@@ -191,6 +204,7 @@ def _control(
         trace,
         rate_limits(config),
         clock,
+        environment.clock_ns,
     )
     ground = GroundContact(link.state, clock)
     guidance_loop = GuidanceLoop(

@@ -12,6 +12,7 @@ from companion.flight.commands import (
     require_role,
 )
 from companion.flight.context import FlightContext
+from companion.guidance.source import ManeuverSource
 from companion.safety.actions import FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
@@ -30,7 +31,7 @@ async def maneuvers(context: FlightContext) -> None:
     began, sent = now(), context.loop.record.setpoints
     tilt_margin = _TiltMargin(context)
     tilt_margin.check()
-    context.guidance_loop.follow(context.maneuvers)
+    context.guidance_loop.follow(ManeuverSource(context.maneuvers))
 
     def over() -> bool:
         elapsed = now() - began

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,9 +10,11 @@ from companion import realtime
 from companion.config import Config
 from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Observer, StateLogger
+from companion.realtime import Wishes
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
@@ -25,22 +28,25 @@ class Session:
 
     Args:
         config: of the flight.
-        folder: an existing folder for this flight's files.
+        folder: an existing folder for this flight's files; None: nothing is recorded.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
+        environment: what the flight gets from the computer.
     """
 
     def __init__(
         self,
         config: Config,
-        folder: Path,
+        folder: Path | None,
         observer: Observer,
         ask_landing: AskLanding,
+        environment: Environment = THIS_COMPUTER,
     ) -> None:
         self._config = config
         self._folder = folder
         self._observer = observer
         self._ask_landing = ask_landing
+        self._environment = environment
         self._assembled: Assembled | None = None
         self._flying: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
@@ -73,21 +79,15 @@ class Session:
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
-        flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
-        (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
+        if self._folder is not None:
+            flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
+            (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
         maneuvers = configured_maneuvers(self._config)
-        loop = asyncio.get_running_loop()
-        epoch = 0.0 if self._config.link.lockstep else time.time() - loop.time()
-
-        def on_failure(text: str) -> None:  # called in the writing thread
-            loop.call_soon_threadsafe(self.note, text)
-
-        with (
-            realtime.asked_for(realtime_wishes(self._config)) as grants,
-            TlogWriter(self._folder / "flight.tlog", epoch, on_failure) as tlog,
-        ):
-            async with open_link(self._config, tlog, self.note) as link:
+        environment = self._environment
+        wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
+        with realtime.asked_for(wishes) as grants, self._recorder() as tlog:
+            async with open_link(self._config, tlog, self.note, environment.open_transport) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
@@ -95,6 +95,7 @@ class Session:
                     self._ask_landing,
                     self._folder,
                     maneuvers,
+                    environment,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
@@ -103,7 +104,21 @@ class Session:
                 finally:
                     self._assembled.close()
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
-        return self._finish(link, self._assembled, result, tlog.dropped, grants)
+        dropped = 0 if tlog is None else tlog.dropped
+        return self._finish(link, self._assembled, result, dropped, grants)
+
+    def _recorder(self) -> AbstractContextManager[TlogWriter | None]:
+        """What writes the frames of the flight, if they are recorded."""
+        if self._folder is None:
+            return nullcontext()
+        loop = asyncio.get_running_loop()
+        in_vehicle_time = self._config.link.lockstep or not self._environment.realtime
+        epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
+
+        def on_failure(text: str) -> None:  # called in the writing thread
+            loop.call_soon_threadsafe(self.note, text)
+
+        return TlogWriter(self._folder / "flight.tlog", epoch, on_failure)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Connect the link's callbacks to the flight, and fly it."""
@@ -182,9 +197,13 @@ class Session:
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
         )
-        try:
-            (self._folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            trace.save(self._folder)
-        except OSError as error:
-            flight.note(f"{self._folder}: some files were not written: {error.strerror}")
+        if self._folder is not None:
+            self._save(self._folder, summary)
         return summary
+
+    def _save(self, folder: Path, summary: Summary) -> None:
+        try:
+            (folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
+            summary.trace.save(folder)
+        except OSError as error:
+            self.note(f"{folder}: some files were not written: {error.strerror}")

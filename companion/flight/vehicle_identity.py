@@ -117,14 +117,18 @@ class VehicleMemory:
     A configured drag takes precedence. A vehicle without a hardware id is not remembered.
 
     Args:
-        directory: of the flights.
+        directory: of the flights; None: nothing is remembered.
         estimate: of the drag.
         configured: whether the configuration sets the drag.
         note: takes messages for the user.
     """
 
     def __init__(
-        self, directory: Path, estimate: DragEstimate, configured: bool, note: Callable[[str], None]
+        self,
+        directory: Path | None,
+        estimate: DragEstimate,
+        configured: bool,
+        note: Callable[[str], None],
     ) -> None:
         self._directory, self._estimate = directory, estimate
         self._configured, self._note = configured, note
@@ -132,7 +136,7 @@ class VehicleMemory:
 
     def load(self, identity: Identity) -> None:
         """Load the learned drag of this vehicle, before it is flown."""
-        if identity.uid is None:
+        if identity.uid is None or self._directory is None:
             return
         file = LearnedFile(self._directory, identity.uid)
         if self._file is not None and self._file.path == file.path:

@@ -95,8 +95,10 @@ class HeightGains:
 
 def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleMotion) -> float:
     """The wanted acceleration downwards, m/s²."""
-    error = reference.position_ned[2] - motion.position_ned[2]
-    speed = reference.velocity_ned[2] + gains.height * error
-    speed = min(max(speed, -gains.max_climb), gains.max_descent)
-    wanted = reference.acceleration_ned[2] + gains.climb * (speed - motion.velocity_ned[2])
+    wanted = reference.acceleration_ned[2]
+    if reference.holds_height:
+        error = reference.position_ned[2] - motion.position_ned[2]
+        speed = reference.velocity_ned[2] + gains.height * error
+        speed = min(max(speed, -gains.max_climb), gains.max_descent)
+        wanted += gains.climb * (speed - motion.velocity_ned[2])
     return min(max(wanted, -_LARGEST_UP), _LARGEST_DOWN)

@@ -105,7 +105,11 @@ class HoverThrust:
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)
         thrust = specific_thrust(acceleration_down, 1.0 if settings.tilt_compensated else cosine)
-        return min(max(self._normalised(thrust), settings.lowest), settings.highest)
+        return self.within_limits(self._normalised(thrust))
+
+    def within_limits(self, normalised: float) -> float:
+        """The normalised thrust, limited to its bounds."""
+        return min(max(normalised, self._settings.lowest), self._settings.highest)
 
     def sent(self, normalised: float, q: Quaternion) -> None:
         """Note a normalised thrust that the vehicle follows, and its attitude at that time."""

@@ -1,6 +1,5 @@
 """Linear guidance: follows a reference without lag, as the response of the tilt is known."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple
@@ -9,11 +8,15 @@ from companion.attitude import Coefficients, Target
 from companion.drag import Drag
 from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
-from companion.guidance.reference import GRAVITY, Horizontal, Reference, VehicleMotion, limited
+from companion.guidance.reference import (
+    GRAVITY,
+    Horizontal,
+    Reference,
+    ReferenceAt,
+    VehicleMotion,
+    limited,
+)
 from companion.guidance.thrust import height_first
-
-ReferenceAt = Callable[[float], Reference]
-"""The reference as a function of time (s)."""
 
 
 @dataclass(frozen=True, slots=True)

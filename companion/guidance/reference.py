@@ -1,5 +1,6 @@
 """Types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
 
+from collections.abc import Callable
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -31,7 +32,9 @@ class Reference(NamedTuple):
 
     `coefficients` or `body_rates` (rad/s) command the horizontal motion open loop; position and
     velocity then count for the height only. `thrust_steps` says that the vertical acceleration
-    jumps. `drifting` pauses the horizontal feedback: only the disturbance is compensated.
+    jumps. `drifting` pauses the horizontal feedback: only the disturbance is compensated. Without
+    `holds_height`, the vertical acceleration is commanded as it is, and the height is not held.
+    `thrust` (0..1) replaces the thrust that guidance computes.
     """
 
     position_ned: Vector
@@ -43,6 +46,8 @@ class Reference(NamedTuple):
     body_rates: BodyRates | None = None
     thrust_steps: bool = False
     drifting: bool = False
+    holds_height: bool = True
+    thrust: float | None = None
 
     @property
     def closed_loop(self) -> bool:
@@ -57,7 +62,11 @@ class Reference(NamedTuple):
     @property
     def height_is_steady(self) -> bool:
         """Whether the thrust changes no faster than the rotors follow: not in a doublet."""
-        return not self.thrust_steps and self.body_rates is None
+        return not self.thrust_steps and self.body_rates is None and self.thrust is None
+
+
+ReferenceAt = Callable[[float], Reference]
+"""The reference over time, s."""
 
 
 Horizontal = tuple[float, float]

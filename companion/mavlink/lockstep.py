@@ -9,9 +9,10 @@ is bit-identical each time, and runs as fast as both can compute.
 import asyncio
 import os
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from contextvars import Context
-from typing import Any, TypeVar, TypeVarTuple
+from typing import Any, Protocol, TypeVar, TypeVarTuple
 
 from companion.mavlink.loop import HotSelector, LinkEventLoop, Ready
 
@@ -29,6 +30,18 @@ _TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
 
 _MAX_ITERATIONS = 200
 """The loop counts as settled after this many iterations: a task that never rests must not block."""
+
+
+class LockstepClock(Protocol):
+    """The clock of an event loop that the vehicle advances."""
+
+    def read(self) -> float:
+        """Event-loop time, s."""
+        ...
+
+    def advance(self, vehicle_time: float) -> bool:
+        """Set the vehicle time, s; return False for a repeated beacon."""
+        ...
 
 
 class _VehicleClock:
@@ -71,12 +84,11 @@ class _VehicleClock:
         self.start_waiting()
 
 
-class _SteppingSelector(HotSelector):
-    """Detects when the loop has nothing left to do; no timer waits on the wall clock."""
+class SettlingSelector(HotSelector, ABC):
+    """Detects when the loop has nothing left to do."""
 
-    def __init__(self, clock: _VehicleClock) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._clock = clock
         self._when_idle: Callable[[], None] | None = None
         self._iterations = 0
 
@@ -84,22 +96,49 @@ class _SteppingSelector(HotSelector):
         """Call `then` once no callback or timer of the loop is ready; no I/O happens before."""
         self._when_idle, self._iterations = then, 0
 
+    @property
+    def settling(self) -> bool:
+        """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
+        return self._when_idle is not None
+
     def select(self, timeout: float | None = None) -> Ready:
-        if self._when_idle is not None:
-            # The loop polls with timeout 0 exactly when callbacks or timers are ready.
-            self._iterations += 1
-            if timeout != 0 or self._iterations > _MAX_ITERATIONS:
-                then, self._when_idle = self._when_idle, None
-                then()
-                self._clock.start_waiting()
-            return []
+        """Settle an open step; otherwise wait for the vehicle."""
+        if self._when_idle is None:
+            return self.wait(timeout)
+        # The loop polls with timeout 0 exactly when callbacks or timers are ready.
+        self._iterations += 1
+        if timeout != 0 or self._iterations > _MAX_ITERATIONS:
+            then, self._when_idle = self._when_idle, None
+            then()
+        return []
+
+    @abstractmethod
+    def wait(self, timeout: float | None) -> Ready:
+        """Wait for I/O, as `select` of every selector does."""
+
+
+class _SteppingSelector(SettlingSelector):
+    """Lets no timer wait on the wall clock while the vehicle sends beacons."""
+
+    def __init__(self, clock: _VehicleClock) -> None:
+        super().__init__()
+        self._clock = clock
+
+    def select(self, timeout: float | None = None) -> Ready:
+        was_settling = self.settling
+        ready = super().select(timeout)
+        if was_settling and not self.settling:
+            self._clock.start_waiting()
+        return ready
+
+    def wait(self, timeout: float | None) -> Ready:
         left = None if timeout == 0 else self._clock.time_left()
         if left is None:
-            return super().select(timeout)
+            return HotSelector.select(self, timeout)
         ready = self._spin()
-        if not ready and self._when_idle is None:
-            ready = super().select(left)
-        if self._when_idle is None and self._clock.time_left() == 0.0:
+        if not ready and not self.settling:
+            ready = HotSelector.select(self, left)
+        if not self.settling and self._clock.time_left() == 0.0:
             self._clock.advance_alone()
         return ready
 
@@ -107,8 +146,8 @@ class _SteppingSelector(HotSelector):
         """Poll for the next beacon without sleeping: waking up would take longer."""
         give_up = time.perf_counter() + _SPIN_S
         while time.perf_counter() < give_up:
-            ready = super().select(0)
-            if ready or self._when_idle is not None:
+            ready = HotSelector.select(self, 0)
+            if ready or self.settling:
                 return ready
             os.sched_yield()  # let other processes use this core
         return []
@@ -119,11 +158,20 @@ class LockstepEventLoop(LinkEventLoop):
 
     Before the first beacon it runs on wall time. If nothing has been received for `PATIENCE_S` of
     wall time, its time advances by that. So the usual timeouts end if the vehicle is gone.
+
+    Args:
+        clock: another clock instead of this one; needs `selector` too.
+        selector: the selector that advances `clock`.
     """
 
-    def __init__(self) -> None:
-        self._clock = _VehicleClock()
-        self._stepping = _SteppingSelector(self._clock)
+    def __init__(
+        self, clock: LockstepClock | None = None, selector: SettlingSelector | None = None
+    ) -> None:
+        if clock is None or selector is None:
+            clock = wall_or_vehicle = _VehicleClock()
+            selector = _SteppingSelector(wall_or_vehicle)
+        self._clock: LockstepClock = clock
+        self._stepping = selector
         self._scheduled_so_far = 0
         super().__init__(self._stepping)
 
@@ -162,64 +210,3 @@ def run(main: Coroutine[Any, Any, T]) -> T:
     """Run `main` like `asyncio.run`, in vehicle time."""
     with asyncio.Runner(loop_factory=LockstepEventLoop) as runner:
         return runner.run(main)
-
-
-class LockstepClient:
-    """Handles beacons: runs one step of `companion` for each, and answers.
-
-    Args:
-        loop: The event loop to advance.
-        process: Handles the frames of one step, in order, after the clock has advanced.
-        deliver: Passes the attitude sample of the step, if any, to the control loop.
-        answer: Sends the answer that closes the step of `time_boot_ms`.
-
-    Attributes:
-        first_beacon: Done when the first beacon has come.
-    """
-
-    def __init__(
-        self,
-        loop: LockstepEventLoop,
-        process: Callable[[], None],
-        deliver: Callable[[], None],
-        answer: Callable[[int], None],
-    ) -> None:
-        self._loop = loop
-        self._process, self._deliver, self._answer = process, deliver, answer
-        self._step_ms: int | None = None
-        self._closed = False
-        self.first_beacon: asyncio.Future[None] = loop.create_future()
-
-    @property
-    def step_ms(self) -> int | None:
-        """Vehicle time of the open step, ms; `None` between an answer and the next beacon."""
-        return self._step_ms
-
-    def beacon(self, time_boot_ms: int) -> None:
-        """Take a beacon: start a step, or answer a repeated beacon again."""
-        if self._step_ms is not None:
-            return  # a beacon repeated during the step, whose answer will follow
-        if not self._loop.advance(time_boot_ms / 1000.0):
-            self._answer(time_boot_ms)
-            return
-        self._step_ms = time_boot_ms
-        if not self.first_beacon.done():
-            self.first_beacon.set_result(None)
-        self._process()
-        self._loop.settle(self._after_tasks)
-
-    def close(self) -> None:
-        """Stop: the open step gets no sample and no answer."""
-        self._closed = True
-
-    def _after_tasks(self) -> None:
-        if self._closed:
-            return
-        self._deliver()
-        # Settle again, so that tasks started by the control loop send before the step closes.
-        self._loop.settle(self._close)
-
-    def _close(self) -> None:
-        step, self._step_ms = self._step_ms, None
-        if step is not None and not self._closed:
-            self._answer(step)

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from companion import batch
 from companion.attitude import Coefficients, Planner, Quaternion, Target, attitude
-from companion.attitude.kinematics import tilt_products
 from companion.attitude.planner import LawPlanner
 from companion.attitude.reference import FirstOrderReference
 
@@ -115,7 +114,7 @@ def fly(planner: LawPlanner, step: Step) -> Response:
     history = batch.simulate(
         planner, np.array(starts).T, np.array(targets).T, 1.0 / step.rate_hz, step.samples
     )
-    return Response(step, _coefficients(history.q), history.rates)
+    return Response(step, batch.coefficients(history.q), history.rates)
 
 
 def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
@@ -128,12 +127,6 @@ def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
         flights.append(loop.fly(planner, start, target, seconds=step.seconds, rate_hz=step.rate_hz))
     return Response(
         step,
-        _coefficients(np.stack([flight.q for flight in flights], axis=-1)),
+        batch.coefficients(np.stack([flight.q for flight in flights], axis=-1)),
         np.stack([flight.commanded for flight in flights], axis=-1),
     )
-
-
-def _coefficients(q: Floats) -> Floats:
-    """(n, 2, headings) coefficients of (n, 4, headings) attitudes (equation 10)."""
-    _, ax, ay = tilt_products(*np.moveaxis(q, 1, 0))
-    return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=1)

@@ -17,7 +17,8 @@ from companion.mavlink.codec import (
 )
 from companion.mavlink.frame_filter import FrameFilter, Notice
 from companion.mavlink.framing import Frame, FrameScanner
-from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.lockstep import LockstepEventLoop
+from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.router import Router

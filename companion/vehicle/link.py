@@ -9,7 +9,8 @@ from companion.attitude.types import BodyRates
 from companion.mavlink.errors import LinkError, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.framing import Frame
-from companion.mavlink.lockstep import LockstepClient, LockstepEventLoop
+from companion.mavlink.lockstep import LockstepEventLoop
+from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import Pending
 from companion.mavlink.router import Router

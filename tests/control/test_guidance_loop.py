@@ -10,7 +10,8 @@ from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.outer_loop import linear_guidance, motion_estimate
-from companion.guidance import Doublets
+from companion.guidance import Doublets, ManeuverSequence
+from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -66,7 +67,7 @@ class Bench:
         )
         self.fly(0.0, HERE)
         self.guidance_loop.hold_here()
-        self.guidance_loop.follow(DOUBLETS)
+        self.guidance_loop.follow(ManeuverSource(ManeuverSequence([DOUBLETS])))
 
     def fly(self, after, position=HERE, tilt=0.0):
         """One step of guidance, `after` s into the maneuver, at a position and roll angle (°)."""

@@ -74,7 +74,7 @@ def test_with_the_clock_months_back_the_vehicle_is_heard_and_obeys(autopilot, ke
         truth = mock.state()
     assert truth["signing"]["accepted"] > 0
     assert truth["signing"]["refused"] == 0
-    assert any("days behind the vehicle, which has our key" in notice for notice in notices)
+    assert any("days behind the vehicle, which has the right key" in notice for notice in notices)
 
 
 def test_another_system_id_is_not_heard(tmp_path):

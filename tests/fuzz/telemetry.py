@@ -12,8 +12,8 @@ from typing import Any
 from unittest import mock
 
 from companion.config import Config
+from companion.flight.environment import Environment
 from companion.flight.session import Session
-from companion.vehicle.link import Link
 from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
 from tests.fuzz.family import ARDUPILOT, PX4
@@ -93,36 +93,26 @@ async def _flown(case: Case, outcome: Outcome) -> None:
     vehicle = Vehicle(_FAMILIES[case["family"]])
     judge = Judge(vehicle, config.model_dump(mode="json"))
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
-        session = Session(config, Path(name), outcome, _no)
         channel = Channel(
             vehicle, judge, case["events"], lambda: session.interrupt("the user (Ctrl-C)")
         )
+        environment = Environment(channel.wire.open, realtime=False)
+        session = Session(config, Path(name), outcome, _no, environment)
         outcome.channel = channel
-        opened = {"opener": channel.wire.open}
         living = asyncio.create_task(channel.run())
         pilot = asyncio.create_task(_pilot(vehicle, outcome)) if not case["arm"] else None
-        with mock.patch(
-            "companion.flight.session.open_link",
-            lambda config, tap, notice: Link(_settings(config), tap, notice=notice, **opened),
-        ):
-            try:
-                async with asyncio.timeout(_LONGEST_FLIGHT):
-                    summary = await session.fly()
-            finally:
-                living.cancel()
-                if pilot is not None:
-                    pilot.cancel()
+        try:
+            async with asyncio.timeout(_LONGEST_FLIGHT):
+                summary = await session.fly()
+        finally:
+            living.cancel()
+            if pilot is not None:
+                pilot.cancel()
         outcome.result = summary.result
         judge.over = True
         await asyncio.sleep(1.0)
     outcome.setpoints, outcome.faults = judge.setpoints, judge.faults
     outcome.seconds = loop.time() - 100.0
-
-
-def _settings(config: Config) -> Any:
-    from companion.flight.assembly import link_settings  # noqa: PLC0415
-
-    return link_settings(config)
 
 
 async def _no() -> bool:

@@ -24,7 +24,7 @@ UDP = LinkSettings(endpoint="udpin://127.0.0.1:0")
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(udp_module, "_PEER_SILENCE_S", 0.05)
+    monkeypatch.setattr(udp_module, "PEER_SILENCE_S", 0.05)
 
 
 def test_what_a_stranger_queued_before_the_peer_was_fixed_is_not_taken(run):

@@ -258,7 +258,7 @@ def test_a_missing_device_is_said(run):
 
 
 def test_udp_vehicle_may_come_back_from_another_port(run, monkeypatch):
-    monkeypatch.setattr(udp_module, "_PEER_SILENCE_S", 0.05)
+    monkeypatch.setattr(udp_module, "PEER_SILENCE_S", 0.05)
 
     async def scene():
         async with linked() as (link, _):

@@ -12,9 +12,9 @@ from mock_process import HOST, Client, ask, free_gcs_port, free_port, mock_proce
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
+from sitl_mock.exchange import in_burst
 from sitl_mock.link.endpoint import bundles
 from sitl_mock.link.framing import Framer, decode
-from sitl_mock.server import in_burst
 from sitl_mock.settings import MockSettings
 
 FAST = "MPC_TKO_RAMP_T: 0.3, COM_SPOOLUP_TIME: 0.1, MPC_TKO_SPEED: 3.0"

@@ -132,8 +132,7 @@ SAID = [
     (
         link_judges.gaps(2),
         at(health=Health(gaps=3)),
-        "3 times within 5 s no setpoint could be sent for longer than "
-        "deadman.telemetry_stale_ms",
+        "3 times within 5 s no setpoint could be sent for longer than deadman.telemetry_stale_ms",
     ),
 ]
 

@@ -52,7 +52,9 @@ def test_the_jerk_of_figures_is_continuous(figure, share):
     joints = (figure.law.gathering, figure.duration - figure.law.losing)
     for t in (share * figure.duration, 0.0, figure.duration, *joints):
         before, after = (figure.at(t + d).jerk for d in (-1e-7, 1e-7))
-        np.testing.assert_allclose(before, after, atol=1e-4 * (1.0 + largest(figure, "jerk", 200)))
+        # A short ramp may lie between two of the 200 places: its own jerk counts, too.
+        scale = 1.0 + max(largest(figure, "jerk", 200), float(np.linalg.norm(before)))
+        np.testing.assert_allclose(before, after, atol=1e-4 * scale)
 
 
 @settings(max_examples=25)

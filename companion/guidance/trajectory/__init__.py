@@ -1,74 +1,82 @@
-"""What can be followed: curves in space with a time law, sampled up to the jerk."""
+"""Trajectories: curves in space with a time law, sampled up to the jerk.
 
-from companion.guidance.trajectory.csv_file import Table
-from companion.guidance.trajectory.csv_file import read as read_csv
-from companion.guidance.trajectory.demand import Motion
-from companion.guidance.trajectory.derived import Slowed, turned_first
-from companion.guidance.trajectory.feasibility import (
-    Envelope,
-    Violation,
-    judge,
-    slow_down,
-    violations,
-)
-from companion.guidance.trajectory.figures import (
-    Hover,
-    Laps,
-    bernoulli_eight,
-    circle,
-    gerono_eight,
-    helix,
-    line,
-    steady_circle,
-)
-from companion.guidance.trajectory.from_samples import (
-    Frame,
-    HeadingFrom,
-    SampleOptions,
-    from_samples,
-)
-from companion.guidance.trajectory.sample import (
-    FARTHEST,
-    FASTEST,
-    LONGEST,
-    Sample,
-    Trajectory,
-    TrajectoryError,
-    Vector,
-    computable,
-)
-from companion.guidance.trajectory.waypoints import waypoints
+    >>> from math import radians
+    >>> from companion.guidance.trajectory import Envelope, Laps, circle, slow_down, violations
+    >>> path = circle(radius=5.0, laps=Laps(speed=8.0))  # 8 m/s on 5 m of radius
+    >>> limits = Envelope(max_tilt=radians(35.0))
+    >>> print(violations(path, limits)[0].limit)
+    limits.max_tilt_deg
+    >>> slower, factor = slow_down(path, limits)
+    >>> violations(slower, limits)
+    ()
 
-__all__ = [
-    "FARTHEST",
-    "FASTEST",
-    "LONGEST",
-    "Envelope",
-    "Frame",
-    "HeadingFrom",
-    "Hover",
-    "Laps",
-    "Motion",
-    "Sample",
-    "SampleOptions",
-    "Slowed",
-    "Table",
-    "Trajectory",
-    "TrajectoryError",
-    "Vector",
-    "Violation",
-    "bernoulli_eight",
-    "circle",
-    "computable",
-    "from_samples",
-    "gerono_eight",
-    "helix",
-    "judge",
-    "line",
-    "read_csv",
-    "slow_down",
-    "steady_circle",
-    "turned_first",
-    "violations",
-    "waypoints",
-]
+World NED, SI units, radians; positions are relative to where the trajectory begins. Each name below
+has its own page: `help(companion.guidance.trajectory.waypoints)`.
+
+A trajectory
+    Trajectory       what a trajectory is: any class with these five members
+    Sample           position, velocity, acceleration, jerk, heading and heading rate at one instant
+    TrajectoryError  it cannot be made or flown; its text is for the user
+    Vector           (north, east, down)
+
+Made from a shape
+    Hover            stay at the start
+    line             straight, from rest to rest
+    circle, helix    laps of a circle, level or rising; `Laps` says how
+    Laps             speed, number, acceleration and direction of laps
+    steady_circle    the circle of `flight.maneuvers`
+    gerono_eight, bernoulli_eight  figures-eight
+    waypoints        through points without a stop
+
+Made from a table
+    read_csv         samples of a CSV file: a `Table`
+    Table            times, positions, derivatives and yaw
+    from_samples     a smooth trajectory through samples
+    SampleOptions    how to read them: Frame, HeadingFrom, smoothing
+    Frame, HeadingFrom
+
+Checked
+    Envelope         limits; None is no limit
+    violations       the limits that a trajectory breaks: each a `Violation`
+    slow_down        the trajectory stretched in time until it keeps them
+    Violation        the limit, when it is broken, and what to do
+    Slowed           a trajectory stretched in time
+    Motion, judge    the same for a motion given as arrays
+    turned_first     a turn on the spot before a trajectory that begins with a heading
+    computable       turns numerical errors into a `TrajectoryError`
+    LONGEST, FARTHEST, FASTEST  bounds of every trajectory: s, m, m/s
+"""
+
+# Without `__all__`: with it, help() prints the methods of every tuple. A name imported as itself is
+# public.
+from companion.guidance.trajectory.csv_file import Table as Table
+from companion.guidance.trajectory.csv_file import read_csv as read_csv
+from companion.guidance.trajectory.demand import Motion as Motion
+from companion.guidance.trajectory.derived import Slowed as Slowed
+from companion.guidance.trajectory.derived import turned_first as turned_first
+from companion.guidance.trajectory.feasibility import Envelope as Envelope
+from companion.guidance.trajectory.feasibility import Violation as Violation
+from companion.guidance.trajectory.feasibility import judge as judge
+from companion.guidance.trajectory.feasibility import slow_down as slow_down
+from companion.guidance.trajectory.feasibility import violations as violations
+from companion.guidance.trajectory.figures import Hover as Hover
+from companion.guidance.trajectory.figures import Laps as Laps
+from companion.guidance.trajectory.figures import bernoulli_eight as bernoulli_eight
+from companion.guidance.trajectory.figures import circle as circle
+from companion.guidance.trajectory.figures import gerono_eight as gerono_eight
+from companion.guidance.trajectory.figures import helix as helix
+from companion.guidance.trajectory.figures import line as line
+from companion.guidance.trajectory.figures import steady_circle as steady_circle
+from companion.guidance.trajectory.from_samples import Frame as Frame
+from companion.guidance.trajectory.from_samples import HeadingFrom as HeadingFrom
+from companion.guidance.trajectory.from_samples import SampleOptions as SampleOptions
+from companion.guidance.trajectory.from_samples import from_samples as from_samples
+from companion.guidance.trajectory.sample import FARTHEST as FARTHEST
+from companion.guidance.trajectory.sample import FASTEST as FASTEST
+from companion.guidance.trajectory.sample import LONGEST as LONGEST
+from companion.guidance.trajectory.sample import Sample as Sample
+from companion.guidance.trajectory.sample import Trajectory as Trajectory
+from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryError
+from companion.guidance.trajectory.sample import Vector as Vector
+from companion.guidance.trajectory.sample import computable as computable
+from companion.guidance.trajectory.waypoints import waypoints as waypoints

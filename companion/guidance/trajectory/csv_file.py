@@ -86,7 +86,7 @@ class Table:
     yaw: Floats | None
 
 
-def read(path: Path) -> Table:
+def read_csv(path: Path) -> Table:
     """Read a file.
 
     Raises:

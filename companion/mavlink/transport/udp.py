@@ -23,7 +23,9 @@ _STAMP = struct.Struct("@qq")  # s and ns since 1970
 _STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
 _OLDEST_NS = 1_000_000_000  # an older stamp means that the computer's clock was changed
 _BURST = 32  # datagrams read before the loop does other work
-_PEER_SILENCE_S = 2.0  # after this silence a sender at another address may become the peer
+
+PEER_SILENCE_S = 2.0
+"""After this silence of the peer, a sender at another address may become the peer, s."""
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
@@ -84,7 +86,7 @@ class UdpTransport:
         self.local: tuple[str, int] = bound[:2]
         if isinstance(endpoint, UdpIn):
             self._address = bound  # a new socket takes the port that the kernel chose
-        self._timer = self._loop.call_later(_PEER_SILENCE_S, self._check_peer)
+        self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def _open(self) -> socket.socket:
         opened = socket.socket(self._family, socket.SOCK_DGRAM)
@@ -141,7 +143,7 @@ class UdpTransport:
         return taken or self._receiver.may_answer(who)
 
     def _check_peer(self) -> None:
-        self._timer = self._loop.call_later(_PEER_SILENCE_S, self._check_peer)
+        self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
         silent, self._heard = not self._heard, False
         if not self._connected or isinstance(self._endpoint, UdpOut):
             return

@@ -1,0 +1,93 @@
+"""What guidance flies now: nothing, a held pose, or a source of references."""
+
+from math import dist
+
+from companion.control.predictive import Following
+from companion.guidance import Pose, Reference, VehicleMotion
+from companion.guidance.follow import Follow
+from companion.guidance.reference import ReferenceAt
+from companion.guidance.source import ManeuverSource, Source
+
+_REJOINED = 1.0
+"""After open-loop commands, the vehicle has returned when it is this close to its reference, m."""
+
+
+class FlownSource:
+    """The held pose, and the source that is flown from it.
+
+    Attributes:
+        pose: the held pose, or the one from which the source began; None: no reference.
+        source: the source of references, or None.
+        begun_at: when the source began, s of event-loop time, or None.
+    """
+
+    def __init__(self) -> None:
+        self.pose: Pose | None = None
+        self.source: Source | None = None
+        self.begun_at: float | None = None
+        self._off_reference = False
+
+    def clear(self) -> None:
+        """Fly no source and hold no pose."""
+        self.pose, self.source, self.begun_at = None, None, None
+
+    def begin(self, source: Source, pose: Pose, now: float) -> None:
+        """Fly `source` from `pose`; `now` in s of event-loop time."""
+        source.begin(now, pose)
+        self.pose, self.source, self.begun_at = pose, source, now
+
+    def finished(self, now: float) -> bool:
+        """Whether the source has no more to fly."""
+        return self.source is not None and self.source.finished(now)
+
+    def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
+        """The reference as a function of event-loop time (s).
+
+        Without a source and a pose it is the present place of the vehicle.
+
+        Args:
+            now: s of event-loop time.
+            motion: present motion of the vehicle.
+            heading: present heading of the vehicle, rad.
+        """
+        pose, source = self.pose, self.source
+        if source is not None:
+            return source.reference(now, motion)
+        held = (
+            Reference(motion.position_ned, heading=heading)
+            if pose is None
+            else Reference(pose.position_ned, heading=pose.heading)
+        )
+        return lambda _: held
+
+    def following(self, now: float, turn: float) -> Following | None:
+        """The trajectory that is followed now, or None.
+
+        Args:
+            now: s of event-loop time.
+            turn: sum of the heading resets, rad.
+        """
+        source = self.source
+        if not isinstance(source, ManeuverSource) or source.begun_at is None or self.pose is None:
+            return None
+        part, elapsed = source.maneuvers.part_at(now - source.begun_at)
+        if not isinstance(part, Follow):
+            return None
+        return Following(part, elapsed, self.pose, turn)
+
+    def steers_by_rates(self, now: float, motion: VehicleMotion) -> str | None:
+        """Name of the source if it commands body rates in open loop at `now`; else None."""
+        if self.source is None:
+            return None
+        reference = self.source.reference(now, motion)(now)
+        return None if reference.body_rates is None else self.source.name
+
+    def tracking_error(self, reference: Reference, motion: VehicleMotion) -> float | None:
+        """Distance from the reference, m.
+
+        It is None without a pose, in open loop, and while the vehicle returns from open loop.
+        """
+        distance = dist(reference.position_ned, motion.position_ned)
+        returning = self._off_reference and distance > _REJOINED
+        self._off_reference = not reference.position_is_meant or returning
+        return None if self.pose is None or self._off_reference else distance

@@ -1,0 +1,180 @@
+"""Sources of references for guidance: maneuvers, or references given one by one."""
+
+from typing import Protocol
+
+from companion.guidance.maneuvers import ManeuverSequence
+from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
+
+
+class Source(Protocol):
+    """Gives guidance its reference: maneuvers, another program's setpoints, or a user's coroutine.
+
+    Times are event-loop times, s. Positions are m NED, in the frame without estimator resets.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name to show to the user."""
+        ...
+
+    def begin(self, now: float, pose: Pose) -> None:
+        """Start at `now` from `pose`, which the vehicle has held so far."""
+        ...
+
+    def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
+        """The reference as a function of time; guidance asks once in each of its periods.
+
+        Args:
+            now: time of this step of guidance.
+            motion: motion of the vehicle at `now`.
+        """
+        ...
+
+    def finished(self, now: float) -> bool:
+        """Whether the source has no more to fly; its last reference stays in force."""
+        ...
+
+
+class ManeuverSource:
+    """Flies maneuvers, one after the other, from the pose at which it begins.
+
+    Attributes:
+        maneuvers: the maneuvers to fly.
+        begun_at: when they began, or None.
+        pose: the pose at which they began, or None.
+    """
+
+    def __init__(self, maneuvers: ManeuverSequence) -> None:
+        self.maneuvers = maneuvers
+        self.begun_at: float | None = None
+        self.pose: Pose | None = None
+
+    @property
+    def name(self) -> str:
+        """The names of the maneuvers."""
+        return self.maneuvers.name
+
+    def begin(self, now: float, pose: Pose) -> None:
+        """Begin the first maneuver at `now`, from `pose`."""
+        self.begun_at, self.pose = now, pose
+
+    def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
+        """The reference of the maneuver that is flown at each time.
+
+        Raises:
+            RuntimeError: the maneuvers have not begun.
+        """
+        begun_at, pose = self.begun_at, self.pose
+        if begun_at is None or pose is None:
+            raise RuntimeError("the maneuvers have not begun")
+        return lambda time: self.maneuvers.at(time - begun_at, pose)
+
+    def finished(self, now: float) -> bool:
+        """Whether the maneuvers have ended."""
+        return self.begun_at is not None and now - self.begun_at >= self.maneuvers.duration
+
+
+class CommandedSource:
+    """References that another program or the user's code gives one by one.
+
+    Between two of them the reference moves on by its own velocity, acceleration and jerk. When the
+    newest is older than `stale`, the vehicle holds its position and `silent_since` is set.
+
+    Args:
+        name: who gives the references.
+        stale: age beyond which a reference is not flown, s.
+
+    Attributes:
+        name: who gives the references.
+        silent_since: when the newest reference became too old, or None.
+    """
+
+    def __init__(self, name: str, stale: float) -> None:
+        self.name = name
+        self.silent_since: float | None = None
+        self._stale = stale
+        self._held = Reference((0.0, 0.0, 0.0))
+        self._heading = 0.0
+        self._newest: Reference | None = None
+        self._given_at = 0.0
+        self._jerk = (0.0, 0.0, 0.0)
+        self._ended = False
+
+    def begin(self, now: float, pose: Pose) -> None:
+        """Hold `pose` until the first reference; it must come within `stale` seconds."""
+        self._held = Reference(pose.position_ned, heading=pose.heading)
+        self._given_at = now
+
+    def give(
+        self, reference: Reference, now: float, jerk_ned: tuple[float, float, float] | None = None
+    ) -> None:
+        """Take a new reference.
+
+        Args:
+            reference: the reference at `now`.
+            now: s of event-loop time.
+            jerk_ned: derivative of the reference's acceleration, m/s³. None: the difference from
+                the reference before, if that one was fresh; else 0.
+        """
+        before, since = self._newest, now - self._given_at
+        if jerk_ned is not None:
+            self._jerk = jerk_ned
+        elif before is None or not 0.0 < since <= self._stale or self.silent_since is not None:
+            self._jerk = (0.0, 0.0, 0.0)
+        else:
+            old, new = before.acceleration_ned, reference.acceleration_ned
+            self._jerk = (
+                (new[0] - old[0]) / since,
+                (new[1] - old[1]) / since,
+                (new[2] - old[2]) / since,
+            )
+        self._newest, self._given_at, self.silent_since = reference, now, None
+
+    def end(self) -> None:
+        """Note that no more references will come."""
+        self._ended = True
+
+    def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
+        """The newest reference, extrapolated; if it is too old, a hold of the present position."""
+        newest, given_at = self._newest, self._given_at
+        if now - given_at > self._stale and self.silent_since is None:
+            self.silent_since = now
+            if newest is not None:
+                self._held = Reference(motion.position_ned, heading=newest.heading)
+        if newest is None or self.silent_since is not None:
+            held = self._held
+            return lambda _: held
+        jerk = self._jerk
+        return lambda time: continued(newest, jerk, time - given_at)
+
+    def finished(self, now: float) -> bool:
+        """Whether `end` was called."""
+        return self._ended
+
+
+def continued(
+    reference: Reference, jerk_ned: tuple[float, float, float], elapsed: float
+) -> Reference:
+    """The reference `elapsed` seconds later, at a constant jerk (m/s³) and heading rate."""
+    position, velocity, acceleration = (
+        reference.position_ned,
+        reference.velocity_ned,
+        reference.acceleration_ned,
+    )
+    t, t2, t3 = elapsed, 0.5 * elapsed**2, elapsed**3 / 6.0
+    (p0, p1, p2), (v0, v1, v2), (a0, a1, a2), (j0, j1, j2) = (
+        position,
+        velocity,
+        acceleration,
+        jerk_ned,
+    )
+    return reference._replace(
+        position_ned=(
+            p0 + v0 * t + a0 * t2 + j0 * t3,
+            p1 + v1 * t + a1 * t2 + j1 * t3,
+            p2 + v2 * t + a2 * t2 + j2 * t3,
+        ),
+        velocity_ned=(v0 + a0 * t + j0 * t2, v1 + a1 * t + j1 * t2, v2 + a2 * t + j2 * t2),
+        acceleration_ned=(a0 + j0 * t, a1 + j1 * t, a2 + j2 * t),
+        heading=reference.heading + reference.heading_rate * t,
+    )

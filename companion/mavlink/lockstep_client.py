@@ -1,0 +1,67 @@
+"""The program's side of lockstep: handles the vehicle's beacons."""
+
+import asyncio
+from collections.abc import Callable
+
+from companion.mavlink.lockstep import LockstepEventLoop
+
+
+class LockstepClient:
+    """Handles beacons: runs one step of this program for each, and answers.
+
+    Args:
+        loop: The event loop to advance.
+        process: Handles the frames of one step, in order, after the clock has advanced.
+        deliver: Passes the attitude sample of the step, if any, to the control loop.
+        answer: Sends the answer that closes the step of `time_boot_ms`.
+
+    Attributes:
+        first_beacon: Done when the first beacon has come.
+    """
+
+    def __init__(
+        self,
+        loop: LockstepEventLoop,
+        process: Callable[[], None],
+        deliver: Callable[[], None],
+        answer: Callable[[int], None],
+    ) -> None:
+        self._loop = loop
+        self._process, self._deliver, self._answer = process, deliver, answer
+        self._step_ms: int | None = None
+        self._closed = False
+        self.first_beacon: asyncio.Future[None] = loop.create_future()
+
+    @property
+    def step_ms(self) -> int | None:
+        """Vehicle time of the open step, ms; `None` between an answer and the next beacon."""
+        return self._step_ms
+
+    def beacon(self, time_boot_ms: int) -> None:
+        """Take a beacon: start a step, or answer a repeated beacon again."""
+        if self._step_ms is not None:
+            return  # a beacon repeated during the step, whose answer will follow
+        if not self._loop.advance(time_boot_ms / 1000.0):
+            self._answer(time_boot_ms)
+            return
+        self._step_ms = time_boot_ms
+        if not self.first_beacon.done():
+            self.first_beacon.set_result(None)
+        self._process()
+        self._loop.settle(self._after_tasks)
+
+    def close(self) -> None:
+        """Stop: the open step gets no sample and no answer."""
+        self._closed = True
+
+    def _after_tasks(self) -> None:
+        if self._closed:
+            return
+        self._deliver()
+        # Settle again, so that tasks started by the control loop send before the step closes.
+        self._loop.settle(self._close)
+
+    def _close(self) -> None:
+        step, self._step_ms = self._step_ms, None
+        if step is not None and not self._closed:
+            self._answer(step)

@@ -1,0 +1,121 @@
+"""Flies a configuration against a mock vehicle in memory."""
+
+import asyncio
+from collections.abc import Coroutine, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from companion.config import Config
+from companion.config.files import changed, load
+from companion.files.yaml_file import ConfigError
+from companion.flight.environment import Environment
+from companion.flight.flight import AskLanding
+from companion.flight.observer import Observer, Silent
+from companion.flight.session import Session
+from companion.recording.summary import Summary
+from companion.testing.vehicle import MockVehicle
+from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
+from companion.testing.wire import open_wire, wire_to
+
+T = TypeVar("T")
+
+Configuration = Config | Path | str | Mapping[str, Mapping[str, Any]]
+"""A configuration, its file, or the keys by section that differ from the defaults."""
+
+
+class UnseenError(RuntimeError):
+    """A task or callback failed, and nothing in the program took its error."""
+
+
+def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine on the vehicle's clock, as `asyncio.run` does on the wall's.
+
+    Inside, `Link(settings, opener=open_wire)` opens the companion link, with `settings.lockstep` as
+    the vehicle has it.
+
+    Raises:
+        UnseenError: a task or callback failed unseen.
+    """
+    unseen: list[dict[str, Any]] = []
+
+    def make_loop() -> VirtualEventLoop:
+        clock = VirtualClock(vehicle.time)
+        return VirtualEventLoop(clock, wire_to(vehicle, clock))
+
+    with asyncio.Runner(loop_factory=make_loop) as runner:
+        runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
+        result = runner.run(main)
+    if unseen:
+        raise UnseenError(unseen[0]["message"]) from unseen[0].get("exception")
+    return result
+
+
+def _loop_time_ns() -> int:
+    return round(asyncio.get_running_loop().time() * 1e9)
+
+
+environment = Environment(open_wire, _loop_time_ns, realtime=False)
+"""What a flight inside `run` gets from the computer: its latencies are 0, for no time passes."""
+
+
+def session(
+    config: Configuration,
+    vehicle: MockVehicle,
+    folder: Path | None = None,
+    observer: Observer | None = None,
+    ask_landing: AskLanding | None = None,
+) -> Session:
+    """A session to be flown inside `run`; the arguments are those of `fly`.
+
+    `link.endpoint` and `realtime` have no effect, and `link.lockstep` is as the vehicle has it.
+    `Session.interrupt` and `Session.leave` are Ctrl-C and a second Ctrl-C.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+    """
+    known = _known(config)
+    if known.link.backend != "direct":
+        raise ConfigError(f"link.backend {known.link.backend} cannot reach a vehicle in memory")
+    if known.link.lockstep != vehicle.in_lockstep:
+        known = changed(known, {"link": {"lockstep": vehicle.in_lockstep}}, "the vehicle")
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    return Session(known, folder, observer or Silent(), ask_landing or _decline, environment)
+
+
+def fly(
+    config: Configuration,
+    vehicle: MockVehicle,
+    folder: Path | None = None,
+    observer: Observer | None = None,
+    ask_landing: AskLanding | None = None,
+) -> Summary:
+    """Fly once, as `companion fly` does, in vehicle time.
+
+    Args:
+        config: what to fly.
+        vehicle: is flown; it stays as the flight leaves it.
+        folder: for the files of the flight; None: nothing is written.
+        observer: receives phases and events as they happen.
+        ask_landing: asks the user after an interrupt whether to land; by default the answer is no.
+
+    Returns:
+        what `companion fly --json` prints, as an object.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+        UnseenError: a part of the program failed unseen.
+    """
+    return run(vehicle, session(config, vehicle, folder, observer, ask_landing).fly())
+
+
+def _known(config: Configuration) -> Config:
+    if isinstance(config, Config):
+        return config
+    if isinstance(config, Mapping):
+        return changed(Config(), config, "the configuration")
+    return load(Path(config))
+
+
+async def _decline() -> bool:
+    return False

@@ -1,0 +1,236 @@
+"""A mock vehicle in memory: its true state, its faults, its pilot, and what it received."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import common
+
+from sitl_mock.control_channel import Truth, add_fault, truth
+from sitl_mock.exchange import Arrived, Exchange
+from sitl_mock.link.framing import decode
+from sitl_mock.settings import load_settings
+from sitl_mock.simulation import Simulation
+
+Relay = Callable[[bytes], Iterable[bytes]]
+"""Takes a datagram and returns what arrives instead of it."""
+
+_STATION = 255, 190
+"""MAVLink ids of a ground station."""
+_COMMAND_PARAMETERS = 7
+
+
+class ReceivedSetpoint(NamedTuple):
+    """A SET_ATTITUDE_TARGET that reached the autopilot.
+
+    Attributes:
+        time: vehicle time at which it was handled, s.
+        answers: its `time_boot_ms`, the stamp of the sample that it answers, ms.
+        rates: about body x, y, z (FRD), rad/s.
+        thrust: 0..1.
+    """
+
+    time: float
+    answers: int
+    rates: tuple[float, float, float]
+    thrust: float
+
+
+class MockVehicle:
+    """A multirotor with its autopilot, without sockets. It lives between flights, too.
+
+    Args:
+        autopilot: "px4" or "ardupilot"; None: as `config` says, otherwise PX4.
+        config: a YAML file whose section `mock` is read.
+        lockstep: whether the application answers each step before the next one, as with
+            `link.lockstep`; a mapping sets more keys of `mock.lockstep`. Without lockstep the
+            application meets samples as over UDP: it answers each one when it arrives, and its
+            timers run between the vehicle's steps.
+        delay_s: each datagram needs this long, s; without lockstep only.
+        settings: keys of the section `mock`, such as `wind`, `faults`, `parameters` or `seed`.
+
+    Attributes:
+        in_lockstep: whether `lockstep` was asked for.
+        delay_s: as the argument.
+        setpoints: those that reached the autopilot, oldest first. Clear it to save memory.
+        after_step: called after each step; `at` and `when` add to it.
+        to_companion: changes what the vehicle sends; None: all arrives as sent.
+        from_companion: changes what the vehicle receives; None: all arrives as sent.
+
+    Raises:
+        sitl_mock.config.section.ConfigError: a key or a value is wrong.
+    """
+
+    def __init__(
+        self,
+        autopilot: str | None = None,
+        *,
+        config: Path | None = None,
+        lockstep: bool | Mapping[str, Any] = True,
+        delay_s: float = 0.0,
+        **settings: Any,
+    ) -> None:
+        if isinstance(lockstep, bool):
+            lockstep = {"enabled": lockstep}
+        own = {} if autopilot is None else {"autopilot": autopilot}
+        stepping = {"lockstep": {"enabled": True, **lockstep}}
+        known = load_settings(config, {"gcs_port": 0, **own, **settings, **stepping})
+        self.autopilot: str = known.autopilot
+        self.in_lockstep, self.delay_s = known.lockstep.enabled, delay_s
+        self.setpoints: list[ReceivedSetpoint] = []
+        self.after_step: list[Callable[[], None]] = []
+        self.to_companion: Relay | None = None
+        self.from_companion: Relay | None = None
+        self.settings = known
+        self._simulation = Simulation(known)
+        self._exchange = Exchange(known, self._simulation)
+        self._exchange.on_message = self._note
+        self._arrived: list[Arrived] = []
+        self._begun = False
+
+    # --- what is true
+
+    @property
+    def time(self) -> float:
+        """Vehicle time since boot, s."""
+        return self._simulation.time_us / 1e6
+
+    def state(self) -> Truth:
+        """The true state now."""
+        return truth(self._simulation)
+
+    # --- what happens to it
+
+    def inject(self, fault: Mapping[str, Any]) -> None:
+        """Inject a fault, given as an entry of `mock.faults`.
+
+        It begins in the next step, or as its `at_s` or `after_offboard_s` says.
+
+        Raises:
+            sitl_mock.config.section.ConfigError: there is no such fault.
+        """
+        add_fault(self._simulation, fault)
+
+    def clear_faults(self) -> None:
+        """End all faults."""
+        self._simulation.clear_faults()
+
+    def take_over(self, mode: str = "POSCTL") -> None:
+        """Let the pilot take over in the next step, in this mode (PX4's names)."""
+        self.inject({"kind": "pilot_takeover", "mode": mode})
+
+    def command(self, number: int, *parameters: float) -> None:
+        """Let a ground station send a COMMAND_LONG (MAV_CMD, its parameters)."""
+        padded = (*parameters, *[0.0] * (_COMMAND_PARAMETERS - len(parameters)))
+        self.transmit(common.MAVLink_command_long_message(1, 1, number, 0, *padded))
+
+    def transmit(self, message: Any, sender: tuple[int, int] = _STATION) -> None:
+        """Let another station (system, component) send a pymavlink message to the autopilot."""
+        frame = message.pack(common.MAVLink(None, *sender))
+        self.receive(bytes(frame))
+
+    def at(self, time: float, action: Callable[[], object]) -> None:
+        """Do `action` once vehicle time has reached `time`, s."""
+        self.when(lambda: self.time >= time, action)
+
+    def when(self, condition: Callable[[], bool], action: Callable[[], object]) -> None:
+        """Do `action` once, after the first step at which `condition` holds."""
+
+        def look() -> None:
+            if condition():
+                self.after_step.remove(look)
+                action()
+
+        self.after_step.append(look)
+
+    # --- time without an application
+
+    def run(self, seconds: float) -> None:
+        """Let time pass while no application is connected, s."""
+        end = self.time + seconds
+        while self.time < end:
+            self.step()
+
+    def until(self, condition: Callable[[Truth], bool], seconds: float = 60.0) -> Truth:
+        """Let time pass, without an application, until `condition` holds; returns that state.
+
+        Raises:
+            AssertionError: it does not hold within `seconds` of vehicle time.
+        """
+        end = self.time + seconds
+        while not condition(state := self.state()):
+            if self.time >= end:
+                raise AssertionError(f"not within {seconds:g} s; still {state}")
+            self.step()
+        return state
+
+    # --- the vehicle's end of the wire
+
+    @property
+    def next_step_at(self) -> float:
+        """Vehicle time of the next step, s."""
+        return self._simulation.next_us / 1e6
+
+    def set_clock(self, clock_ns: Callable[[], int]) -> None:
+        """Set the vehicle time told by TIMESYNC, ns: between two steps it goes on."""
+        simulation = self._simulation
+
+        def told() -> int:
+            if simulation.effects.clock_frozen:
+                return simulation.state.shown_us * 1000
+            return min(max(clock_ns(), simulation.time_us * 1000), simulation.next_us * 1000)
+
+        simulation.set_clock(told)
+
+    def receive(self, datagram: bytes) -> None:
+        """Take a datagram of the companion link; in lockstep it waits for the next step."""
+        relay = self.from_companion
+        for each in (datagram,) if relay is None else relay(datagram):
+            self._arrived.append((each, decode(each)))
+        if not self.in_lockstep:
+            arrived, self._arrived = self._arrived, []
+            self._exchange.deliver(arrived, self._simulation.companion)
+
+    def sent(self) -> list[bytes]:
+        """Take the datagrams that the vehicle has sent since the last call."""
+        return self._relayed(self._exchange.outgoing(self._simulation.companion))
+
+    def begin(self) -> list[bytes]:
+        """Boot; returns what the vehicle sends then. Later calls do nothing.
+
+        In lockstep that is the first beacon.
+        """
+        if self._begun:
+            return []
+        self._begun = True
+        if self.in_lockstep:
+            beacon = self._simulation.beacon()
+            return self._relayed([self._simulation.companion.sign(beacon)])
+        self._simulation.boot()
+        return self.sent()
+
+    def step(self) -> list[bytes]:
+        """Simulate one step; returns what the vehicle sends in it."""
+        self._begun = True
+        arrived, self._arrived = self._arrived, []
+        beacon = self._exchange.step(arrived)
+        datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
+        for look in tuple(self.after_step):
+            look()
+        return self._relayed(datagrams)
+
+    def take_slip(self) -> float:
+        """Time that the vehicle's clock lost since the last call by a fault, s."""
+        return self._simulation.effects.take_slip()
+
+    def _relayed(self, datagrams: list[bytes]) -> list[bytes]:
+        relay = self.to_companion
+        return datagrams if relay is None else [out for one in datagrams for out in relay(one)]
+
+    def _note(self, message: Any) -> None:
+        if message.get_type() == "SET_ATTITUDE_TARGET":
+            rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
+            time = self._simulation.time_us / 1e6
+            self.setpoints.append(
+                ReceivedSetpoint(time, message.time_boot_ms, rates, message.thrust)
+            )

@@ -1,0 +1,78 @@
+"""An asyncio event loop whose time is a mock vehicle's: nothing sleeps, nothing is polled."""
+
+from typing import Protocol
+
+from companion.mavlink.lockstep import LockstepEventLoop, SettlingSelector
+from companion.mavlink.loop import Ready
+
+
+class VirtualClock:
+    """The time of one loop, s.
+
+    Args:
+        now: at which it begins.
+    """
+
+    def __init__(self, now: float) -> None:
+        self.now = now
+        self._beacon: float | None = None
+
+    def read(self) -> float:
+        """The loop's time, s."""
+        return self.now
+
+    def read_ns(self) -> int:
+        """The loop's time, ns."""
+        return round(self.now * 1e9)
+
+    def advance(self, vehicle_time: float) -> bool:
+        """Set the time by a lockstep beacon, s; false for a repeated one."""
+        if self._beacon is not None and vehicle_time <= self._beacon:
+            return False
+        self._beacon = self.now = vehicle_time
+        return True
+
+
+class World(Protocol):
+    """What moves the clock when the application has nothing left to do."""
+
+    def deliver_due(self) -> None:
+        """Deliver what arrives at the present time."""
+        ...
+
+    def advance(self, until: float) -> None:
+        """Go on to the next event, or to the time `until`, s, if that is earlier."""
+        ...
+
+
+class _VirtualSelector(SettlingSelector):
+    """Lets the vehicle go on instead of waiting."""
+
+    def __init__(self, clock: VirtualClock, world: World) -> None:
+        super().__init__()
+        self._clock, self._world = clock, world
+
+    def wait(self, timeout: float | None) -> Ready:
+        if timeout == 0:
+            self._world.deliver_due()
+        else:
+            until = float("inf") if timeout is None else self._clock.now + timeout
+            self._world.advance(until)
+        return []
+
+
+class VirtualEventLoop(LockstepEventLoop):
+    """An event loop on a virtual clock. File descriptors are not watched.
+
+    Args:
+        clock: its time.
+        world: moves it.
+
+    Attributes:
+        clock: as the argument.
+        world: as the argument.
+    """
+
+    def __init__(self, clock: VirtualClock, world: World) -> None:
+        self.clock, self.world = clock, world
+        super().__init__(clock, _VirtualSelector(clock, world))

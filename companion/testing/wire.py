@@ -1,0 +1,178 @@
+"""Joins a mock vehicle and an application in memory.
+
+The application's end is a transport that behaves as a listening UDP socket: it talks to nobody
+before it was addressed by a valid frame (`PeerRule`), and it forgets a peer that falls silent.
+"""
+
+import asyncio
+import heapq
+from collections.abc import Callable
+from itertools import count
+from typing import Any
+
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.transport.base import Receiver
+from companion.mavlink.transport.udp import PEER_SILENCE_S
+from companion.testing.vehicle import MockVehicle
+from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
+from sitl_mock.exchange import in_burst
+
+_NAME = "the mock vehicle"
+
+
+class MemoryTransport:
+    """The application's end of the wire.
+
+    Args:
+        receiver: takes what arrives.
+        take: takes what is sent.
+        clock: stamps what arrives.
+    """
+
+    reconnects = False
+
+    def __init__(
+        self, receiver: Receiver, take: Callable[[bytes], None], clock: VirtualClock
+    ) -> None:
+        self.is_open = True
+        self._receiver, self._take, self._clock = receiver, take, clock
+        self._loop = asyncio.get_running_loop()
+        self._connected = self._heard = False
+        self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
+
+    def deliver(self, datagram: bytes) -> None:
+        """Let a datagram of the vehicle arrive."""
+        receiver, now_ns = self._receiver, self._clock.read_ns()
+        if self._connected:
+            self._heard = receiver.receive(datagram, now_ns) or self._heard
+        elif receiver.claim(datagram, now_ns, _NAME) or receiver.may_answer(_NAME):
+            self._connected = self._heard = True
+
+    def send(self, frame: bytes) -> bool:
+        """Send one datagram now; false if there is no peer."""
+        if not self._connected:
+            return False
+        self._take(frame)
+        return True
+
+    def close(self) -> None:
+        """Close it: what is on its way to the application is lost."""
+        self.is_open = False
+        self._timer.cancel()
+
+    def _check_peer(self) -> None:
+        self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
+        silent, self._heard = not self._heard, False
+        if silent or self._receiver.claim_lapsed():
+            self._connected = False
+
+
+class Wire:
+    """The vehicle, the transport that is open to it, and the clock that both share.
+
+    Args:
+        vehicle: at one end.
+        clock: moved by the vehicle.
+    """
+
+    def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
+        self._vehicle, self._clock = vehicle, clock
+        self._transport: MemoryTransport | None = None
+
+    def open(self, receiver: Receiver) -> MemoryTransport:
+        """Open the application's end.
+
+        Raises:
+            EndpointError: it is open already.
+        """
+        if self._transport is not None and self._transport.is_open:
+            raise EndpointError("the mock vehicle has one companion link, which is open already")
+        self._transport = MemoryTransport(receiver, self._take, self._clock)
+        return self._transport
+
+    def _take(self, frame: bytes) -> None:
+        """Take a frame of the application."""
+        self._vehicle.receive(frame)
+
+    def _deliver(self, datagram: bytes) -> None:
+        if self._transport is not None and self._transport.is_open:
+            self._transport.deliver(datagram)
+
+
+class LockstepWire(Wire):
+    """The vehicle makes a step when the application has settled; its beacon moves the clock."""
+
+    def deliver_due(self) -> None:
+        """Nothing arrives between two steps."""
+
+    def advance(self, until: float) -> None:
+        """Let the vehicle make a step. The application's timers wait for it."""
+        for datagram in self._vehicle.begin() or self._vehicle.step():
+            self._deliver(datagram)
+        # Without an open link, or with one that does not accept the beacon, time passes as well.
+        self._clock.now = max(self._clock.now, self._vehicle.time)
+
+
+class FreeWire(Wire):
+    """Both sides run freely on the clock; datagrams need `MockVehicle.delay_s`."""
+
+    def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
+        super().__init__(vehicle, clock)
+        self._delay = vehicle.delay_s
+        self._burst = vehicle.settings.burst_ms * 1e-3
+        self._under_way: list[tuple[float, int, Callable[[bytes], None], bytes]] = []
+        self._order = count()
+        self._slipped = clock.now - vehicle.time
+        vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
+
+    def deliver_due(self) -> None:
+        """Deliver what arrives at the present time, in the order of sending."""
+        under_way = self._under_way
+        while under_way and under_way[0][0] <= self._clock.now:
+            _, _, deliver, datagram = heapq.heappop(under_way)
+            deliver(datagram)
+
+    def advance(self, until: float) -> None:
+        """Go on to the next arrival, the vehicle's next step or `until`."""
+        clock, vehicle = self._clock, self._vehicle
+        step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
+        arrival = self._under_way[0][0] if self._under_way else step_at
+        clock.now = max(clock.now, min(until, arrival, step_at))
+        self.deliver_due()
+        if clock.now >= step_at:
+            self._send(vehicle.begin())
+            self._send(vehicle.step())
+            self._slipped += vehicle.take_slip()
+            self.deliver_due()
+
+    def _take(self, frame: bytes) -> None:
+        self._put(self._hand_over, frame)
+
+    def _hand_over(self, datagram: bytes) -> None:
+        self._vehicle.receive(datagram)
+        self._send(self._vehicle.sent())
+
+    def _send(self, datagrams: list[bytes]) -> None:
+        for datagram in datagrams:
+            self._put(self._deliver, datagram)
+
+    def _put(self, deliver: Callable[[bytes], None], datagram: bytes) -> None:
+        due = self._clock.now + self._delay
+        heapq.heappush(self._under_way, (due, next(self._order), deliver, datagram))
+
+
+def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:
+    """The wire of a vehicle, with or without lockstep."""
+    return (LockstepWire if vehicle.in_lockstep else FreeWire)(vehicle, clock)
+
+
+async def open_wire(_endpoint: Any, receiver: Receiver, _lost: Any) -> MemoryTransport:
+    """Open a transport to the vehicle of the running loop; an `OpenTransport` for `Link`.
+
+    Raises:
+        EndpointError: the running loop is not a vehicle's, or the vehicle has an open link.
+    """
+    loop = asyncio.get_running_loop()
+    if not (isinstance(loop, VirtualEventLoop) and isinstance(loop.world, Wire)):
+        raise EndpointError("a mock vehicle in memory is reached inside companion.testing.run only")
+    return loop.world.open(receiver)

@@ -1,0 +1,105 @@
+"""What one vehicle receives and sends, with the faults of its companion link (pure).
+
+`Server` joins it to sockets, `companion.testing` joins it to an application in the same process.
+Both do the same in each slot: collect what arrived, `step`, send `outgoing` of each link.
+"""
+
+from collections.abc import Callable
+from math import ceil
+
+from sitl_mock.link.endpoint import bundles
+from sitl_mock.link.framing import Message, decode
+from sitl_mock.link.link import Link
+from sitl_mock.link.pipe import DatagramPipe
+from sitl_mock.settings import MockSettings
+from sitl_mock.simulation import Simulation
+
+Arrived = tuple[bytes, list[Message]]
+"""A datagram and the messages in it."""
+
+_ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
+
+
+def in_burst(elapsed_s: float, burst_s: float) -> float:
+    """Return the time of the burst in which a step runs, s; without bursts the time itself."""
+    return ceil(elapsed_s / burst_s) * burst_s if burst_s > 0.0 else elapsed_s
+
+
+class Exchange:
+    """Brings datagrams to the autopilot and takes those that it sends.
+
+    Args:
+        settings: of this vehicle.
+        simulation: the vehicle.
+
+    Attributes:
+        on_message: called with each message that reaches the autopilot over the companion link.
+    """
+
+    def __init__(self, settings: MockSettings, simulation: Simulation) -> None:
+        self.on_message: Callable[[Message], None] | None = None
+        self._simulation = simulation
+        self._companion = simulation.companion
+        self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
+        self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
+        self._lockstep = settings.lockstep.enabled
+        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
+
+    def step(self, arrived: list[Arrived]) -> bytes | None:
+        """Handle what arrived on the companion link, and simulate one slot.
+
+        Returns:
+            the lockstep beacon of the new slot, unsigned; None without lockstep.
+        """
+        self.deliver(arrived, self._companion)
+        self._simulation.tick()
+        return self._simulation.beacon() if self._lockstep else None
+
+    def deliver(self, arrived: list[Arrived], link: Link) -> None:
+        """Hand what came on a link to the autopilot, after the faults of that link."""
+        simulation = self._simulation
+        faults = simulation.faults.link
+        if link is self._companion and not self._pipe_in.is_clear(faults):
+            datagrams = [datagram for datagram, _ in arrived]
+            passed = self._pipe_in.push(datagrams, faults, simulation.time_us)
+            arrived = [(datagram, decode(datagram)) for datagram in passed]
+        hook = self.on_message if link is self._companion else None
+        for _, messages in arrived:
+            for message in messages:
+                if hook is not None:
+                    hook(message)
+                simulation.handle(message, link)
+
+    def outgoing(self, link: Link, beacon: bytes | None = None) -> list[bytes]:
+        """Return the datagrams that a link has queued; the beacon, if any, comes last.
+
+        The faults of the companion link apply to all but the beacon.
+        """
+        frames = link.take()
+        faults = self._simulation.faults.link
+        if link is self._companion and not self._pipe_out.is_clear(faults):
+            frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
+        if beacon is not None:
+            frames.append(link.sign(beacon))
+        return bundles(frames) if self._bundle else frames
+
+    def is_answer(self, messages: list[Message]) -> bool:
+        """Whether one of these messages answers the latest lockstep beacon."""
+        now_ms = self._simulation.time_us // 1000
+        return any(
+            message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
+            for message in messages
+        )
+
+    def is_repeated_answer(self, messages: list[Message]) -> bool:
+        """Whether this datagram only answers an earlier beacon, which was sent twice.
+
+        How often a beacon is sent depends on the wall clock, so the faults of the link, which count
+        datagrams, must not see the second answer.
+        """
+        now_ms = self._simulation.time_us // 1000
+        return (
+            len(messages) == 1
+            and messages[0].get_type() == "SYSTEM_TIME"
+            and messages[0].time_boot_ms != now_ms
+        )
