@@ -1,4 +1,4 @@
-"""What the numbers of the study say of the statements on its page."""
+"""The findings of the study `lag`: statements, and whether its numbers support them."""
 
 from companion.study.lag.flights import (
     COMPLETE_HZ,
@@ -26,7 +26,7 @@ def find(
 
     Args:
         grid: flights over dead times, lags and sample rates.
-        example: flights behind one of these loops, in full.
+        example: flights with one rate loop, in full.
         complete: flights with the complete inner loop.
         from_fit: largest deviation from the fitted second-order model, by method.
     """
