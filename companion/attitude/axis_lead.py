@@ -35,7 +35,7 @@ class AxisLead:
         plans = self._plans
         planned_for = plans.time - self._wait
         self._plan = plans.tilt.at(planned_for) if self._wait else plans.tilt.newest
-        self._turn = plans.turn_when(planned_for, self._plan)
+        self._turn = plans.predicted_turn(planned_for, self._plan)
 
     def command(self, dt: float, heading: float) -> float:
         """Advance to the next plan; return the rate that leads from the last plan to it, rad/s.

@@ -90,7 +90,7 @@ def _rotation(
     for _ in range(_MAX_ITERATIONS):
         reached = part
         if max_angle < inf:
-            reached = _reach(a, x, y, north_left, east_left, part, max_angle / f)
+            reached = _reachable_share(a, x, y, north_left, east_left, part, max_angle / f)
         d_w, d_x, d_y, d_z = _tilt_change(a, x, y, reached * north_left, reached * east_left)
         length = sqrt(d_w * d_w + d_z * d_z)
         own_half = atan2(d_z, d_w)
@@ -127,7 +127,7 @@ def _tilt_change(
     )
 
 
-def _reach(
+def _reachable_share(
     a: float,
     x: float,
     y: float,

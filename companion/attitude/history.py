@@ -146,7 +146,7 @@ class PlanHistory:
         now = self.time + late
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
-    def turn_when(self, planned_for: float, plan: PlannedTilt) -> Turn:
+    def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
         """How far the heading has turned when `plan`, made for `planned_for` (s), takes effect.
 
         It turns by the yaw rate, less the part of the yaw rate that keeps the heading still.

@@ -169,7 +169,7 @@ class TargetFrame:
         """
         reported = self.heading()
         if reported is not None:
-            turn = plans.turn_when(plans.time, plans.tilt.newest)
+            turn = plans.predicted_turn(plans.time, plans.tilt.newest)
             lead = wrap_angle(reported - heading - turn.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead

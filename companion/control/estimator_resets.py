@@ -71,7 +71,7 @@ class EstimatorResets:
             self.turn = short_way(self.turn + yaw)
         elif not jumped:
             return False
-        self._count(sample.received)
+        self._count_reset(sample.received)
         self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
         return jumped
 
@@ -80,7 +80,7 @@ class EstimatorResets:
         before, self._raw = self._raw, position
         if before is not None:
             self._find_position_jump(before, position)
-        return position._replace(position_ned=_less(position.position_ned, self.shift))
+        return position._replace(position_ned=_difference(position.position_ned, self.shift))
 
     def forget(self) -> None:
         """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
@@ -89,7 +89,7 @@ class EstimatorResets:
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
         if counter is not None and self._counter not in (None, counter):
-            self._count(now)
+            self._count_reset(now)
         self._counter = counter
 
     def attitude(self, q: Quaternion) -> Quaternion:
@@ -124,9 +124,9 @@ class EstimatorResets:
         if hypot(*jump) > _DISTANCE + _ACCELERATION_CHANGE * dt * dt / 8.0:
             north, east, down = self.shift
             self.shift = (north + jump[0], east + jump[1], down + jump[2])
-            self._count(position.received)
+            self._count_reset(position.received)
 
-    def _count(self, now: float) -> None:
+    def _count_reset(self, now: float) -> None:
         if not self.times or now - self.times[-1] > _ONE_RESET:
             self.times.append(now)
 
@@ -150,5 +150,5 @@ def _attitude_jump(
     return yaw, tilt, _ANGLE + 0.5 * change * dt
 
 
-def _less(left: Vector, right: Vector) -> Vector:
+def _difference(left: Vector, right: Vector) -> Vector:
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]

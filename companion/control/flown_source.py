@@ -89,5 +89,5 @@ class FlownSource:
         """
         distance = dist(reference.position_ned, motion.position_ned)
         returning = self._off_reference and distance > _REJOINED
-        self._off_reference = not reference.position_is_meant or returning
+        self._off_reference = not reference.holds_position or returning
         return None if self.pose is None or self._off_reference else distance

@@ -245,7 +245,7 @@ class GuidanceLoop:
         self, vehicle_time: float, reference: Reference, motion: VehicleMotion
     ) -> None:
         north, east, down = reference.position_ned
-        if not reference.position_is_meant:
+        if not reference.holds_position:
             north = east = nan  # only the height is a reference in open loop
         if not reference.holds_height:
             down = nan

@@ -57,21 +57,21 @@ _LARGEST_CORRECTION = 0.2
 def hold_weights(config: Config) -> Weights:
     """The weights of the position hold; those not configured follow from the delay T.
 
-    T is the delay of the attitude behind its target (`hold_delay`).
+    T is the delay of the attitude behind its target (`delay_of_hold`).
 
     The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
     position weight. `tests/control/test_margins.py` checks the stability margins against errors of
     T and of the thrust.
     """
-    guidance, delay = config.guidance, hold_delay(config)
+    guidance, delay = config.guidance, delay_of_hold(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
-        (1.0 + _quickness(config)) / delay**4 if position is None else position,
+        (1.0 + _rate_loop_quickness(config)) / delay**4 if position is None else position,
         1.0 / delay**2 if velocity is None else velocity,
     )
 
 
-def _quickness(config: Config) -> float:
+def _rate_loop_quickness(config: Config) -> float:
     """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop."""
     if not config.vehicle.known:
         return 0.0
@@ -81,16 +81,16 @@ def _quickness(config: Config) -> float:
 
 def _position_pull(config: Config) -> float:
     slow, quick = _POSITION_PULL
-    return slow + _quickness(config) * (quick - slow)
+    return slow + _rate_loop_quickness(config) * (quick - slow)
 
 
 def disturbance_bandwidth(config: Config) -> float:
     """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
     configured = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / hold_delay(config) if configured is None else configured
+    return 1.5 / delay_of_hold(config) if configured is None else configured
 
 
-def hold_delay(config: Config) -> float:
+def delay_of_hold(config: Config) -> float:
     """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified."""
     delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
@@ -106,7 +106,7 @@ def linear_guidance(config: Config) -> LinearGuidance:
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
     drag = drag_prior(config).drag.linear
-    weights = _CALM if _identifies(config) else hold_weights(config)
+    weights = _CALM if _flies_identify(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearGuidance(
@@ -137,7 +137,7 @@ def motion_estimate(
         offset: returns vehicle time minus event-loop time, s, or None.
     """
     guidance = config.guidance
-    bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
+    bandwidth = _CALM_BANDWIDTH if _flies_identify(config) else disturbance_bandwidth(config)
     settings = ObserverSettings(
         bandwidth, _POSITION_TIME, _position_pull(config), guidance.max_disturbance_m_s2
     )
@@ -201,5 +201,5 @@ def predictive_settings(config: Config) -> Settings:
         ) from error
 
 
-def _identifies(config: Config) -> bool:
+def _flies_identify(config: Config) -> bool:
     return "identify" in config.flight.maneuvers

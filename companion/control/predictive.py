@@ -103,9 +103,9 @@ class Predictive:
                 self.record.flown += 1
                 self.record.seconds.append(answer.seconds)
                 chosen = _command_of(answer)
-        self._remember(vehicle.time, chosen)
+        self._record_input(vehicle.time, chosen)
         if following is not None:
-            self._ask(vehicle, following)
+            self._request(vehicle, following)
         return chosen
 
     def _answer(self, now: float) -> Answer | None:
@@ -117,7 +117,7 @@ class Predictive:
             return None
         return answer
 
-    def _ask(self, vehicle: Vehicle, following: Following) -> None:
+    def _request(self, vehicle: Vehicle, following: Following) -> None:
         part, pose = following.part, following.pose
         at = following.time - part.turns_for
         if at < 0.0:
@@ -127,7 +127,7 @@ class Predictive:
         start = Start(pose.position_ned, turned + following.turn)
         self._solver.request(Request(self._number, vehicle, at, start, tuple(self._inputs)))
 
-    def _remember(self, now: float, command: tuple[Target, float]) -> None:
+    def _record_input(self, now: float, command: tuple[Target, float]) -> None:
         target, down = command
         lift = GRAVITY - down
         thrust = lift / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))

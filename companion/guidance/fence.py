@@ -110,11 +110,11 @@ class Fence:
             velocity: m/s NED; numbers, or arrays of them.
         """
         north, east, down = velocity
-        level = self._seconds((north * north + east * east) ** 0.5)
+        level = self._distance_per_speed((north * north + east * east) ** 0.5)
         return (
             offset[0] + level * north,
             offset[1] + level * east,
-            offset[2] + self._seconds(abs(down)) * down,
+            offset[2] + self._distance_per_speed(abs(down)) * down,
         )
 
     def stop_breach(
@@ -133,7 +133,7 @@ class Fence:
         sunk = stop[2] - offset[2]
         return self.breach(stop, None if height is None else height - sunk, origin, margin)
 
-    def _seconds(self, speed: Any) -> Any:
+    def _distance_per_speed(self, speed: Any) -> Any:
         """Stopping distance divided by the speed, s."""
         return self.reaction + speed / (2.0 * self.deceleration)
 

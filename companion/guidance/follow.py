@@ -55,7 +55,7 @@ class HeldFigure:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the maneuver began at `start`."""
-        return _from(start, self.trajectory.at(time), start.heading)
+        return _reference_from(start, self.trajectory.at(time), start.heading)
 
 
 @dataclass(slots=True)
@@ -102,10 +102,10 @@ class Follow:
             self._pose = start
             self._turned = turned_first(self.trajectory, start.heading, self.yaw_rate)
         held = start.heading if self.trajectory.holds_heading else 0.0
-        return _from(start, self._turned.at(time), held)
+        return _reference_from(start, self._turned.at(time), held)
 
 
-def _from(start: Pose, sample: Sample, heading: float) -> Reference:
+def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:
     """The reference of a sample whose position counts from `start`, and heading from `heading`."""
     north, east, down = start.position_ned
     return Reference(

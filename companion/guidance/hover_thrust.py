@@ -61,7 +61,7 @@ class HoverThrust:
         self._filter = ThrustFilter(
             self._curve.share(settings.hover), settings.correction_limit, settings.correction_time
         )
-        self._began: tuple[float, float] | None = None
+        self._window_start: tuple[float, float] | None = None
         self._sum = 0.0
         self._count = 0
 
@@ -121,10 +121,10 @@ class HoverThrust:
 
     def observe(self, time: float, velocity_down: float) -> None:
         """Learn the hover thrust from a vertical velocity (m/s, down) at a vehicle time (s)."""
-        if self._began is None:
-            self._begin(time, velocity_down)
+        if self._window_start is None:
+            self._begin_window(time, velocity_down)
             return
-        began, before = self._began
+        began, before = self._window_start
         span = time - began
         if 0.0 <= span < SHORTEST:
             return
@@ -135,11 +135,11 @@ class HoverThrust:
             if _PLAUSIBLE[0] <= measured <= _PLAUSIBLE[1]:
                 extra_variance = (_DRAG_DEVIATION * velocity) ** 2
                 self._filter.learn(span, self._sum / self._count, measured, extra_variance)
-        self._begin(time, velocity_down)
+        self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
         """Drop the current window: nothing is learned across a pause."""
-        self._began = None
+        self._window_start = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the battery voltage (V; None: not known) at a time in s."""
@@ -156,7 +156,7 @@ class HoverThrust:
     def _specific(self, normalised: float) -> float:
         return self._filter.gain * self._battery.factor * self._curve.share(normalised)
 
-    def _begin(self, time: float, velocity_down: float) -> None:
-        self._began = (time, velocity_down)
+    def _begin_window(self, time: float, velocity_down: float) -> None:
+        self._window_start = (time, velocity_down)
         self._sum = 0.0
         self._count = 0

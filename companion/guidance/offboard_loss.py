@@ -104,28 +104,28 @@ class _HeldResult(NamedTuple):
 
 def reach(flown: Flown, loss: Loss) -> Reach:
     """How far the vehicle can move if the setpoints end now."""
-    held = _hold(flown, loss)
+    held = _held_motion(flown, loss)
     size = hypot(*flown.thrust)
     speed = hypot(*held.velocity[:2])
     widest = speed + held.extra_speed
-    stop, farthest = (_stop(value, held.tilt, size, loss) for value in (speed, widest))
+    stop, farthest = (_stopping_distance(value, held.tilt, size, loss) for value in (speed, widest))
     north, east = (
         way + (stop * component / speed if speed > 0.0 else 0.0)
         for way, component in zip(held.way[:2], held.velocity[:2], strict=True)
     )
     up_speed = max(0.0, held.extra_speed - held.velocity[2])
-    up = held.highest + held.extra_way + up_speed * _FAILSAFE_DELAY + _brake(up_speed)
-    return Reach((north, east), held.extra_way + farthest - stop, up, _fall(held, size))
+    up = held.highest + held.extra_way + up_speed * _FAILSAFE_DELAY + _braking_distance(up_speed)
+    return Reach((north, east), held.extra_way + farthest - stop, up, _fall_distance(held, size))
 
 
-def _hold(flown: Flown, loss: Loss) -> _HeldResult:
+def _held_motion(flown: Flown, loss: Loss) -> _HeldResult:
     """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
     duration = loss.held + _FAILSAFE_DELAY
     step = duration / _STEPS
     size = hypot(*flown.thrust)
     axis: Vector = _scaled(flown.thrust, 1.0 / size)
     along = sum(a * b for a, b in zip(axis, flown.turn, strict=True))
-    across: Vector = _plus(flown.turn, axis, -along)
+    across: Vector = _plus_scaled(flown.turn, axis, -along)
     rate = hypot(*across) / size
     ahead = _scaled(across, 1.0 / (rate * size)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
@@ -134,10 +134,10 @@ def _hold(flown: Flown, loss: Loss) -> _HeldResult:
     extra_way = extra_speed = highest = 0.0
     for index in range(_STEPS):
         angle = rate * (index + 0.5) * step
-        thrust = _plus(_scaled(axis, cos(angle)), ahead, sin(angle))
-        velocity = _plus(_slowed(velocity, loss.drag, step), thrust, size * step)
+        thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
+        velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, size * step)
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
-        way = _plus(way, velocity, step)
+        way = _plus_scaled(way, velocity, step)
         stray = 2.0 * size * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
         extra_speed += (stray - loss.drag.linear * extra_speed) * step
         extra_way += extra_speed * step
@@ -146,7 +146,7 @@ def _hold(flown: Flown, loss: Loss) -> _HeldResult:
     return _HeldResult(way, velocity, extra_way, extra_speed, highest, min(pi, tilt))
 
 
-def _stop(speed: float, tilt: float, size: float, loss: Loss) -> float:
+def _stopping_distance(speed: float, tilt: float, size: float, loss: Loss) -> float:
     """Horizontal distance from the end of the held rates to the stop, m."""
     if loss.brakes:
         return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
@@ -155,7 +155,7 @@ def _stop(speed: float, tilt: float, size: float, loss: Loss) -> float:
     return speed * levelled + speed / max(loss.drag.linear, _SMALLEST_DRAG)
 
 
-def _fall(held: _HeldResult, size: float) -> float:
+def _fall_distance(held: _HeldResult, size: float) -> float:
     """Largest fall while the rates are held, while the vehicle levels and until it stops, m."""
     duration = _level_time(held.tilt)
     mean_cosine = sin(held.tilt) / held.tilt if held.tilt > 0.0 else 1.0  # while it levels
@@ -163,7 +163,7 @@ def _fall(held: _HeldResult, size: float) -> float:
     fall = held.way[2] + held.extra_way
     gain = max(0.0, GRAVITY - size * mean_cosine)
     fall += max(0.0, speed) * duration + 0.5 * gain * duration * duration
-    return max(0.0, fall + _brake(max(0.0, speed) + gain * duration))
+    return max(0.0, fall + _braking_distance(max(0.0, speed) + gain * duration))
 
 
 def _level_time(tilt: float) -> float:
@@ -171,7 +171,7 @@ def _level_time(tilt: float) -> float:
     return _FAILSAFE_DELAY + tilt / _LEVELLING_RATE
 
 
-def _brake(speed: float) -> float:
+def _braking_distance(speed: float) -> float:
     return speed * speed / (2.0 * _VERTICAL_BRAKING)
 
 
@@ -179,7 +179,7 @@ def _scaled(a: Vector, factor: float) -> Vector:
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
-def _plus(a: Vector, b: Vector, factor: float) -> Vector:
+def _plus_scaled(a: Vector, b: Vector, factor: float) -> Vector:
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 

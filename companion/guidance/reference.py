@@ -55,7 +55,7 @@ class Reference(NamedTuple):
         return self.coefficients is None and self.body_rates is None
 
     @property
-    def position_is_meant(self) -> bool:
+    def holds_position(self) -> bool:
         """Whether the vehicle should be at the horizontal position, not only at the height."""
         return self.closed_loop and not self.drifting
 

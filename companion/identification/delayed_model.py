@@ -160,11 +160,11 @@ class DelayedModel:
     def response(self, unknown: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
         shape = unknown[: self._delay]
-        return self._each(unknown, lambda knots, at: self.model.response(shape, knots, at))
+        return self._per_stretch(unknown, lambda knots, at: self.model.response(shape, knots, at))
 
-    def asked(self, unknown: Floats, later: float = 0.0) -> Floats:
+    def delayed_commands(self, unknown: Floats, later: float = 0.0) -> Floats:
         """(m,), the commands after slew limit and dead time, delayed by another `later` s."""
-        return self._each(
+        return self._per_stretch(
             unknown, lambda knots, at: value_at(knots, np.maximum(at - later, knots.time[0]))
         )
 
@@ -210,14 +210,14 @@ class DelayedModel:
             row, column = row + rows, column + width
         return columns
 
-    def _each(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
+    def _per_stretch(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
         """(m,), the result of `of` for the commands of each stretch after slew limit and delay."""
         slew, delay = self.slew(unknown), self.dead_time(unknown)
-        commands = self.commands if slew is None else self._limited(slew)
+        commands = self.commands if slew is None else self._slew_limited(slew)
         each = zip(commands, self.times, strict=True)
         return np.concatenate([of(knots, times - delay) for knots, times in each])
 
-    def _limited(self, slew: float) -> list[Knots]:
+    def _slew_limited(self, slew: float) -> list[Knots]:
         """The commands after the slew limit; kept, as the search often keeps this unknown."""
         if slew != self._slewed[0]:
             self._slewed = slew, [slewed(knots, slew) for knots in self.commands]

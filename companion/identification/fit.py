@@ -101,7 +101,7 @@ def fit_lag(
     fine, coarse = 1 + samples // _FINE, 1 + samples // _COARSE
     data = DelayedModel(record, FirstOrder(), gain, fine)
     first_look = DelayedModel(record, FirstOrder(), gain, coarse)
-    best = _best_without_slew(data, _start(first_look))
+    best = _best_without_slew(data, _grid_start(first_look))
     if may_slew:
         best = _slewed_if_clearly(best, data, first_look)
     found = _lag_fit(data, best)
@@ -170,9 +170,9 @@ def _second_order(
 def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
     """The `LagFit` of a solution."""
     lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
-    asked = data.asked(found.unknown)
-    span = float(np.ptp(asked))
-    excited = int((np.abs(data.response(found.unknown) - asked) > _EXCITED * span).sum())
+    commands = data.delayed_commands(found.unknown)
+    span = float(np.ptp(commands))
+    excited = int((np.abs(data.response(found.unknown) - commands) > _EXCITED * span).sum())
     residuals = _residuals(data, found, excited)
     moved = float(np.std(data.measured))
     return LagFit(
@@ -198,7 +198,7 @@ def _residuals(data: DelayedModel, found: Solution, excited: int) -> Residuals:
     return analyse(
         found.residual,
         found.slopes,
-        lambda later: data.asked(unknown, later),
+        lambda later: data.delayed_commands(unknown, later),
         memory,
         excited,
         correlated,
@@ -221,7 +221,7 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
     return min(found, *neighbours, key=lambda each: each.squares)
 
 
-def _start(data: DelayedModel) -> Floats:
+def _grid_start(data: DelayedModel) -> Floats:
     """(2,), the best start (log lag, dead time) from a coarse grid."""
     return data.best_of(
         [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]

@@ -48,7 +48,7 @@ def held(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Knots:
 
 def slewed(commands: Knots, slew: float) -> Knots:
     """Held commands after a slew limit `slew` (per second); it starts at the first command."""
-    start = _before_each(commands, slew)
+    start = _values_before(commands, slew)
     way = commands.value - start
     arrival = commands.time + np.abs(way) / slew
     ramps = np.column_stack((commands.time, start, np.copysign(slew, way)))
@@ -59,7 +59,7 @@ def slewed(commands: Knots, slew: float) -> Knots:
     return Knots(*rows[np.column_stack((moves, arrives)).ravel()].T)
 
 
-def _before_each(commands: Knots, slew: float) -> Floats:
+def _values_before(commands: Knots, slew: float) -> Floats:
     """(n,), value after the slew limit at the time of each command.
 
     It needs a loop, because each piece starts where the one before ended.
@@ -91,7 +91,7 @@ def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
-    excess = _decaying(commands.time / lag, jumps)
+    excess = _decayed_sums(commands.time / lag, jumps)
     piece = np.searchsorted(commands.time, at, side="right") - 1
     since = at - commands.time[piece]
     straight = steady[piece] + commands.slope[piece] * since
@@ -99,7 +99,7 @@ def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
     return response
 
 
-def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
+def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
     """(n,), sum of all jumps up to each age, each decayed exponentially since its own age.
 
     It is computed by running sums, in parts short enough that no exponential overflows.

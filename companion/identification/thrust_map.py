@@ -61,7 +61,7 @@ class ThrustMap:
         )
 
 
-def _excited(record: list[Stretch]) -> list[Stretch]:
+def _excited_samples(record: list[Stretch]) -> list[Stretch]:
     """The record without samples of steady thrust, which contain only vibration and gusts."""
     if not record:
         return []
@@ -99,7 +99,7 @@ def fit_thrust_map(
     Raises:
         ValueError: a time series and its values are not two rows of equal length.
     """
-    record = _excited(stretches(time, thrust, measured_time, specific_thrust))
+    record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
     found = fit_lag(record, may_slew=False)
     if found is None:
         return None

@@ -60,8 +60,8 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
     """
-    commands, measured = _table(setpoints, 5), _table(rates, 4)
-    accelerations = _table(specific_thrust, 2)
+    commands, measured = _as_array(setpoints, 5), _as_array(rates, 4)
+    accelerations = _as_array(specific_thrust, 2)
     roll, pitch, yaw = (_response(commands, measured, axis) for axis in (1, 2, 3))
     thrust = fit_thrust_map(
         commands[:, 0], commands[:, 4], accelerations[:, 0], accelerations[:, 1]
@@ -69,7 +69,7 @@ def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> Ide
     return IdentifiedVehicle(roll, pitch, yaw, thrust)
 
 
-def _table(rows: Rows, columns: int) -> Floats:
+def _as_array(rows: Rows, columns: int) -> Floats:
     return np.array(rows, dtype=np.float64).reshape(-1, columns)
 
 
@@ -96,7 +96,7 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         for name, response in vehicle.axes.items()
         if response.second_order is not None
     ]
-    return Group(table, *nearer, Text(_thrust(vehicle.thrust, gravity)))
+    return Group(table, *nearer, Text(_thrust_line(vehicle.thrust, gravity)))
 
 
 def _cells(response: RateResponse) -> tuple[str, ...]:
@@ -114,7 +114,7 @@ def _cells(response: RateResponse) -> tuple[str, ...]:
     )
 
 
-def _thrust(thrust: ThrustMap | None, gravity: float) -> str:
+def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:
     if thrust is None:
         return "thrust: not measured, or never changed"
     if not thrust.is_good(gravity):

@@ -61,7 +61,7 @@ def plain_host(host: str) -> str:
     return str(mapped or address)
 
 
-def spelled(address: Any) -> str:
+def host_and_port(address: Any) -> str:
     """A socket address as HOST:PORT."""
     host = plain_host(str(address[0]))
     return f"[{host}]:{address[1]}" if ":" in host else f"{host}:{address[1]}"

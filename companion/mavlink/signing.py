@@ -112,7 +112,7 @@ class Signing:
         """Append the signature to a frame built with `signed=True`."""
         self._stamp = max(self._stamp + 1, self._judge.date())
         if frame[_ID_AT] == _TIMESYNC:
-            answer_at, question = _timesync(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
+            answer_at, question = _timesync_fields(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
             if not any(answer_at):
                 self._requests.append(question)
         tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
@@ -128,7 +128,7 @@ class Signing:
             return SignatureResult.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
-        verdict = self._judge.judge(stream, stamp, answers=self._answers(frame))
+        verdict = self._judge.judge(stream, stamp, answers=self._answers_timesync(frame))
         if verdict is SignatureResult.GOOD:
             self._stamp = max(self._stamp, stamp)
         elif verdict is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
@@ -146,18 +146,18 @@ class Signing:
         """The stamps of this run, to be kept in the file; called by another thread."""
         return Stamps(self._judge.date(), self._stamp, self._judge.streams())
 
-    def _answers(self, frame: Frame) -> bool:
+    def _answers_timesync(self, frame: Frame) -> bool:
         """Whether a frame answers a TIMESYNC request of this run; no recording can contain that."""
         if frame.message_id != _TIMESYNC_ID:
             return False
-        answer_at, question = _timesync(frame.payload)
+        answer_at, question = _timesync_fields(frame.payload)
         return any(answer_at) and any(question) and question in self._requests
 
     def _hash(self, data: bytes) -> bytes:
         return hashlib.sha256(self._key + data).digest()[:_HASH_BYTES]
 
 
-def _timesync(payload: bytes) -> tuple[bytes, bytes]:
+def _timesync_fields(payload: bytes) -> tuple[bytes, bytes]:
     """Fields tc1 and ts1 of TIMESYNC; tc1 is zero in a request, and an answer repeats ts1."""
     whole = payload.ljust(16, b"\0")
     return whole[:8], whole[8:16]

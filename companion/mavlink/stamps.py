@@ -126,7 +126,7 @@ class StampJudge:
         if stamp > date + _FURTHEST:
             self._remark_ahead(stamp - date, f"and refused; {SET_CLOCK}, or the vehicle's")
             return SignatureResult.AHEAD
-        if stamp <= self._oldest(stream, ahead, date):
+        if stamp <= self._lower_bound(stream, ahead, date):
             if date - stamp > _MINUTE and not self._newest[ahead]:
                 self._remark(
                     f"the vehicle's signatures are dated {_days(date - stamp)} before this "
@@ -157,21 +157,22 @@ class StampJudge:
         heard = dict(self._heard)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:
-            floors = (
-                heard.get((stream, ahead), self._floor(stream, ahead)) for ahead in (False, True)
+            stamps = (
+                heard.get((stream, ahead), self._kept_stamp(stream, ahead))
+                for ahead in (False, True)
             )
-            newest[stream] = tuple(floor for floor in floors if floor)
+            newest[stream] = tuple(stamp for stamp in stamps if stamp)
         return newest
 
-    def _oldest(self, stream: Stream, ahead: bool, date: int) -> int:
+    def _lower_bound(self, stream: Stream, ahead: bool, date: int) -> int:
         """The stamp than which the next of this stream must be newer, ticks."""
         heard = self._heard.get((stream, ahead))
         if heard is not None:
             return heard
         newest = self._newest[ahead] if ahead else max(self._newest[ahead], date)
-        return max(self._floor(stream, ahead), newest - _MINUTE)
+        return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
-    def _floor(self, stream: Stream, ahead: bool) -> int:
+    def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
         """The newest stamp of that stream on disk, near the date or ahead of it; 0: none."""
         stamps = (s for s in self._kept.get(stream, ()) if (s > self._limit) == ahead)
         return max(stamps, default=0)

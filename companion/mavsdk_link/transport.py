@@ -111,7 +111,7 @@ class MavsdkTransport:
         except MavsdkError as error:
             self._mavsdk.destroy()
             os.close(self._wakeup)
-            raise EndpointError(_why(settings.endpoint, str(error))) from error
+            raise EndpointError(_open_error(settings.endpoint, str(error))) from error
         watch(self._loop, self._wakeup, self._read)
 
     def send(self, frame: bytes) -> bool:
@@ -144,6 +144,6 @@ class MavsdkTransport:
                 self._receive(frame, received_ns)
 
 
-def _why(endpoint: str, words: str) -> str:
+def _open_error(endpoint: str, words: str) -> str:
     known = (reason for name, reason in _REASONS.items() if name in words)
     return f"{endpoint} cannot be opened by MAVSDK: {next(known, words)}"

@@ -50,8 +50,8 @@ def coefficient_model(settings: Settings) -> Model:
             symbols.translation(settings), speed, turning[2], (turning[0:2] - speed) / settings.lag
         ),
         bounded=ca.vertcat(
-            _across_sides(symbols.control[0:2], longest),
-            _across_sides(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
+            _polygon_terms(symbols.control[0:2], longest),
+            _polygon_terms(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
             turning[2] / settings.max_yaw_rate,
         ),
         constants_of=constants_of,
@@ -135,7 +135,7 @@ def _cos_tilt(c: ca.SX) -> ca.SX:
     return ca.sqrt(ca.fmax(1.0 - ca.sumsqr(c), _LEAST_SQUARE))
 
 
-def _across_sides(vector: ca.SX, radius: Any) -> ca.SX:
+def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
     """(6,), component of a vector (2,) across each pair of sides, 1 or −1 on a side."""
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
     across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)

@@ -17,8 +17,8 @@ from companion.vehicle.clock_jumps import (
     MisfitRun,
     Reading,
     Stamp,
-    described,
-    wrapped,
+    describe_change,
+    has_wrapped,
 )
 
 _SETTLES_FOR = 2.0
@@ -154,9 +154,9 @@ class VehicleClock:
         else:
             # The answer may be a little older than the newest sample.
             back = time < self._newest - _CERTAINLY_BACK
-            self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
+            self._accept_jump(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
 
         Args:
@@ -197,7 +197,7 @@ class VehicleClock:
         self._misfits.stamps.clear()
         self._quickest = quickest
         self._newest = -inf
-        self._change(by, time_boot_ms, restarted=by < 0.0)
+        self._accept_jump(by, time_boot_ms, restarted=by < 0.0)
         return None
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
@@ -208,7 +208,7 @@ class VehicleClock:
         before them.
         """
         by = stamp.ahead - quickest
-        if by > self.delay.most(before=self._received - TOGETHER):
+        if by > self.delay.largest_possible(before=self._received - TOGETHER):
             return False
         self._quickest = quickest
         self.delay.shorten(by, stamp.received)
@@ -224,7 +224,7 @@ class VehicleClock:
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if stood_still and min(lasted, late) >= JUMP:
-            self._change(-late, time_boot_ms, restarted=False)
+            self._accept_jump(-late, time_boot_ms, restarted=False)
 
     def _drop_misfits(self) -> None:
         """Drop the misfits as outliers: the clock goes on as before them, or changes again."""
@@ -239,14 +239,14 @@ class VehicleClock:
         self.outliers += ahead
         self._misfits.stamps.clear()
 
-    def _change(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
+    def _accept_jump(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
         """Accept that the vehicle's clock jumped by `by` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= by
-        self.delay.retract(self._received - self.delay.seconds - TOGETHER)
+        self.delay.forget_after(self._received - self.delay.seconds - TOGETHER)
         if self._received - self._began < _SETTLES_FOR and by > -REBOOTED:
             return
         self.timeline += 1
-        self.restarts += restarted and not wrapped(by, before) and by < -REBOOTED
-        self.last_change = described(by, before, time_boot_ms / 1000.0, restarted=restarted)
+        self.restarts += restarted and not has_wrapped(by, before) and by < -REBOOTED
+        self.last_change = describe_change(by, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

@@ -150,7 +150,7 @@ class TelemetryDelay:
         self.forget(DelayUnknown.OTHER_CLOCK)
         return None
 
-    def most(self, before: float) -> float:
+    def largest_possible(self, before: float) -> float:
         """The largest delay possible by the exchanges until the event-loop time `before`, s."""
         earlier = [each for each in self._exchanges if each.at <= before]
         if not earlier:
@@ -171,7 +171,7 @@ class TelemetryDelay:
         )
         self.expire(now)
 
-    def retract(self, since: float) -> None:
+    def forget_after(self, since: float) -> None:
         """Forget the exchanges after event-loop time `since` (s), when the clock had changed."""
         while self._exchanges and self._exchanges[-1].at > since:
             self._exchanges.pop()

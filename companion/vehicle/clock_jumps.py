@@ -91,7 +91,7 @@ class MisfitRun:
         return self.stamps[0].time == self.stamps[-1].time == newest
 
 
-def wrapped(by: float, before: float) -> bool:
+def has_wrapped(by: float, before: float) -> bool:
     """Whether a clock has wrapped.
 
     Args:
@@ -101,7 +101,7 @@ def wrapped(by: float, before: float) -> bool:
     return by < 0.0 and before > _WRAP - _NEAR_WRAP and abs(by + _WRAP) < _NEAR_WRAP
 
 
-def described(by: float, before: float, now: float, *, restarted: bool) -> str:
+def describe_change(by: float, before: float, now: float, *, restarted: bool) -> str:
     """A change of the vehicle's clock in words.
 
     Args:
@@ -110,7 +110,7 @@ def described(by: float, before: float, now: float, *, restarted: bool) -> str:
         now: Time since boot after the change, s.
         restarted: True: the clock went back and goes on from there. False: it stood still.
     """
-    if wrapped(by, before):
+    if has_wrapped(by, before):
         return "the vehicle's time since boot wrapped around after 49.7 days"
     if by > 0.0:
         return f"the vehicle's clock jumped ahead by {by:.2f} s"

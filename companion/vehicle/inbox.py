@@ -136,7 +136,7 @@ class Inbox:
         """Whether another sender may become the peer."""
         return self._peer_rule.lapsed()
 
-    def stranger(self, who: str) -> None:
+    def note_stranger(self, who: str) -> None:
         """Tell the user that bytes of `who` were ignored, as the endpoint names other peers."""
         self._peer_rule.ignore(who)
 

@@ -139,7 +139,7 @@ def battery_scaling(value: float, _: Values, settings: CompanionSettings) -> Pro
     )
 
 
-def our_system(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check that `companion` uses the vehicle's system id, as a companion computer must."""
     if value == settings.source_system:
         return None

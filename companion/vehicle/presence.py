@@ -122,7 +122,7 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
     while True:
         timesync.ask()
         await asyncio.sleep(_PERIOD_S)
-        clock.look(now())
+        clock.update(now())
 
 
 def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:

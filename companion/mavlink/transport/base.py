@@ -31,7 +31,7 @@ class Receiver(Protocol):
     def claim_lapsed(self) -> bool:
         """Whether the peer's claim is so old that another sender may become the peer."""
 
-    def stranger(self, who: str) -> None:
+    def note_stranger(self, who: str) -> None:
         """Note that bytes of `who`, whom the endpoint does not name as a peer, were ignored."""
 
 

@@ -6,7 +6,7 @@ import socket
 import time
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, resolve, spelled
+from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
 from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
@@ -105,7 +105,7 @@ class TcpTransport:
             return False
         address = connection.get_extra_info("peername")
         if self._server is not None and not self._named.admit(address):
-            self._receiver.stranger(spelled(address))
+            self._receiver.note_stranger(host_and_port(address))
             return False
         if self._connection is not None:
             if not self._replaceable():
@@ -132,7 +132,7 @@ class TcpTransport:
         if self._claimed or self._server is None:
             self._receiver.receive(data, received)
         else:
-            who = spelled(connection.get_extra_info("peername"))
+            who = host_and_port(connection.get_extra_info("peername"))
             self._claimed = self._receiver.claim(data, received, who)
 
     def dropped(self, connection: asyncio.Transport | None, reason: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.peer import NamedPeers, resolve, spelled
+from companion.mavlink.peer import NamedPeers, host_and_port, resolve
 from companion.mavlink.transport.base import Receiver
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
@@ -100,7 +100,7 @@ class UdpTransport:
                 opened.connect(self._address)
         except OSError as error:
             opened.close()
-            raise EndpointError(_why(self._endpoint, error)) from error
+            raise EndpointError(_open_error(self._endpoint, error)) from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
             self._peer = opened.getpeername()
@@ -132,9 +132,9 @@ class UdpTransport:
 
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
         """Take a datagram; return whether its sender is the peer from now on."""
-        who = spelled(address)
+        who = host_and_port(address)
         if not self._named.admit(address):
-            self._receiver.stranger(who)
+            self._receiver.note_stranger(who)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
             taken = self._receiver.receive(data, received_ns)  # it was only silent
@@ -186,7 +186,7 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
     return now - age if 0 <= age < _OLDEST_NS else now
 
 
-def _why(endpoint: UdpIn | UdpOut, error: OSError) -> str:
+def _open_error(endpoint: UdpIn | UdpOut, error: OSError) -> str:
     where = f"UDP {endpoint.host}:{endpoint.port}"
     if error.errno == errno.EADDRINUSE:
         return (

@@ -14,10 +14,10 @@ from companion.vehicle.parameter_checks import (
     bit_set,
     forbidden,
     hover_thrust,
-    our_system,
     positive,
     rates_held,
     required,
+    system_id,
     thrust_curve,
 )
 from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
@@ -162,7 +162,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         _MEASURED,
     ),
     ParameterRule(
-        ("MAV_SYSID", "SYSID_THISMAV"), "the vehicle's system id", our_system, "MAVLink routing"
+        ("MAV_SYSID", "SYSID_THISMAV"), "the vehicle's system id", system_id, "MAVLink routing"
     ),
     ParameterRule(
         ("FS_THR_ENABLE",),

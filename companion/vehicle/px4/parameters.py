@@ -14,10 +14,10 @@ from companion.vehicle.parameter_checks import (
     bit_set,
     forbidden,
     hover_thrust,
-    our_system,
     positive,
     rates_held,
     required,
+    system_id,
     thrust_curve,
 )
 from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
@@ -190,7 +190,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
     ),
-    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
+    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", system_id, "MAVLink routing"),
     ParameterRule(
         ("MAV_SIGN_CFG",),
         "whether PX4 obeys only signed frames",
