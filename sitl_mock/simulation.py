@@ -146,7 +146,9 @@ class Simulation:
         rules.land_detector.step(contact=vehicle.on_ground)
         if rules.commander.under_setpoints and self.effects.offboard_us is None:
             self.effects.offboard_us = state.time_us
-        self.effects.apply(*self.faults.update(state.time_us, self.effects.offboard_us))
+        began, ended = self.faults.update(state.time_us, self.effects.offboard_us)
+        if began or ended:
+            self.effects.apply(began, ended)
         if state.time_us >= self._next_commander_us:
             self._next_commander_us += COMMANDER_PERIOD_US
             state.battery_remaining = vehicle.battery.remaining

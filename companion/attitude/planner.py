@@ -101,8 +101,12 @@ LAW_NAMES = tuple(_LAWS)
 PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
+PlannerFactory = Callable[[Constants], Planner]
+"""A class of planners; unlike a law it may have a memory."""
+
+
 def make_planner(
-    name: str | Law,
+    name: str | Law | type[Planner],
     gain: float = 5.0,
     yaw_gain: float = 2.0,
     limits: Limits = Limits(),  # noqa: B008  (frozen)
@@ -111,7 +115,8 @@ def make_planner(
     """Make a planner by its name, or of a law of your own.
 
     Args:
-        name: one of `PLANNER_NAMES`, or a function of the type `Law`.
+        name: one of `PLANNER_NAMES`, a function of the type `Law`, or a class of planners that is
+            made from `Constants`.
         gain: p in 1/s, the inverse of the wanted time constant.
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
@@ -127,6 +132,9 @@ def make_planner(
         TypeError: the planner does not take an option.
         ValueError: unknown name, or a value out of range.
     """
+    if isinstance(name, type):
+        made: PlannerFactory = name
+        return made(make_constants(gain, yaw_gain, limits, **options))
     if callable(name):
         return LawPlanner(name, make_constants(gain, yaw_gain, limits, **options))
     if name == MODEL_FOLLOWING:

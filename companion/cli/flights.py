@@ -6,13 +6,14 @@ from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
+from companion.recording.folder import flight_folder
 from companion.recording.summary import Summary
 
 
 def fly(options: argparse.Namespace) -> int:
     """Fly the vehicle that the configuration names."""
     config = flying.as_told(load(options.config), options)
-    folder = flying.flight_folder(config)
+    folder = flight_folder(config.recording.directory)
     return _ended(flying.fly(config, folder, _console(options)), options)
 
 

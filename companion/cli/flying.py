@@ -4,7 +4,6 @@ import argparse
 import shutil
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +14,13 @@ from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.control.outer_loop import predictive_settings
 from companion.extras import require
-from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
+from companion.recording.folder import flight_folder
 from companion.recording.report import flight_table
 from companion.recording.summary import Summary
 
@@ -58,27 +57,6 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     if told.link.backend == "mavsdk":
         require("mavsdk", "mavsdk", "link.backend: mavsdk")
     return told
-
-
-def flight_folder(config: Config) -> Path:
-    """A new folder for one flight, named by its start in UTC.
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
-    base = config.recording.directory / datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
-    for number in range(1, 100):
-        folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise ConfigError(
-                f"recording.directory: cannot make {folder}: {error.strerror}"
-            ) from error
-        return folder
-    raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
 
 
 def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
@@ -126,6 +104,6 @@ def fly_bundled(
         options.endpoint, options.arm = wire.endpoint, True
         config = as_told(config, options, planner)
         demo.check_mock(path)
-        folder = flight_folder(config)
+        folder = flight_folder(config.recording.directory)
         with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
             return fly(config, folder, console)

@@ -25,6 +25,7 @@ from companion.identification import (
     vehicle_fragment,
     vehicle_table,
 )
+from companion.recording.folder import flight_folder
 from companion.recording.summary import Summary
 from companion.vehicle.flight_log import read_flight_log
 
@@ -88,7 +89,7 @@ def _flown(options: argparse.Namespace, console: FlightConsole) -> Summary:
         path = None if options.bundled == SHIPPED else options.bundled
         return flying.fly_bundled(path, options, console, _PLANNER)
     config = flying.as_told(load(options.config), options, _PLANNER)
-    return flying.fly(config, flying.flight_folder(config), console)
+    return flying.fly(config, flight_folder(config.recording.directory), console)
 
 
 def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightConsole) -> int:

@@ -1,15 +1,24 @@
 """The attitude law, and the guidance above it."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
+from companion import plugins
 from companion.attitude import PLANNER_NAMES
 from companion.config.units import Si
 from companion.drag import Drag
 from companion.files.yaml_file import Section
 
 AUTO = "auto"
+LINEAR = "linear"
+GUIDANCE_NAMES = (LINEAR, "nmpc")
+
+
+def _require_known(what: str, name: str, own: tuple[str, ...], group: str) -> None:
+    """Raise `ValueError` unless the name is one of ours or of an installed plug-in."""
+    if name not in own and name not in (installed := plugins.names(group)):
+        raise ValueError(f"unknown {what} {name!r}; known: {', '.join((*own, *installed))}")
 
 
 class PlannerConfig(Section):
@@ -21,7 +30,8 @@ class PlannerConfig(Section):
     """auto: model-following where `vehicle` tells how the rate loop answers, else first-order.
     first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
     error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
-    needs `vehicle`. quaternion, so3, euler: what the paper compares with."""
+    needs `vehicle`. quaternion, so3, euler: what the paper compares with. Or a planner of another
+    package, by the name of its entry point in `companion.planners`."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
     """p: the acceleration approaches its target with time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
@@ -30,18 +40,19 @@ class PlannerConfig(Section):
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
-        if self.name not in (AUTO, *PLANNER_NAMES):
-            known = ", ".join((AUTO, *PLANNER_NAMES))
-            raise ValueError(f"unknown planner {self.name!r}; known: {known}")
+        _require_known("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
         return self
 
 
 class GuidanceConfig(Section):
     """Guidance: turns a reference into attitude targets, without lag."""
 
-    kind: Literal["linear", "nmpc"] = "linear"
+    kind: Annotated[str, Field(max_length=50, json_schema_extra={"enum": list(GUIDANCE_NAMES)})] = (
+        LINEAR
+    )
     """linear, or nmpc: nonlinear model predictive control follows trajectories, in a process of
-    its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing."""
+    its own (extra `nmpc`); linear guidance flies the rest, and wherever its answer is missing. Or
+    guidance of another package, by the name of its entry point in `companion.guidance`."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """Rate at which guidance computes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
@@ -74,6 +85,11 @@ class GuidanceConfig(Section):
     (drag_per_s + quadratic_drag_per_m·speed)·speed."""
 
     position_lateness = Si("position_lateness_ms")
+
+    @model_validator(mode="after")
+    def _known_kind(self) -> "GuidanceConfig":
+        _require_known("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
+        return self
 
     @property
     def drag(self) -> Drag | None:

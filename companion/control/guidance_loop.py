@@ -1,6 +1,5 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
-import asyncio
 from collections.abc import Callable
 from math import degrees, nan
 
@@ -13,16 +12,17 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
+from companion.control.ticker import Ticker
 from companion.guidance import (
     GRAVITY,
     GuidanceInput,
     HoverThrust,
     LinearCommand,
-    LinearGuidance,
     Pose,
     Reference,
     VehicleMotion,
 )
+from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock import VehicleClock
@@ -56,7 +56,7 @@ class GuidanceLoop:
     def __init__(
         self,
         loop: ControlLoop,
-        guidance: LinearGuidance,
+        guidance: Guidance,
         estimate: MotionEstimate,
         hover_thrust: HoverThrust,
         state: VehicleState,
@@ -88,6 +88,7 @@ class GuidanceLoop:
         self._clock = clock
         self._vehicle_clock = vehicle_clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
+        self._ticker = Ticker(period, clock)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Keep an attitude that is a unit quaternion and fits the vehicle's clock."""
@@ -117,6 +118,13 @@ class GuidanceLoop:
         position_ned = self._guidance_input(self._clock()).now.position_ned
         self.flown.pose = Pose(position_ned, self._heading())
 
+    def hold_reference(self) -> None:
+        """Hold the pose of the present reference, in which a maneuver has ended."""
+        now = self._clock()
+        reference = self.flown.reference(now, self.motion_now(), self._heading())(now)
+        self.stand_by()
+        self.flown.pose = Pose(reference.position_ned, reference.heading)
+
     def give_up(self) -> None:
         """Hold here, and fly no source any more."""
         self.bound_to_hold = True
@@ -138,11 +146,25 @@ class GuidanceLoop:
 
     async def run(self) -> None:
         """Make commands until cancelled; missed steps are not repeated."""
-        due = self._clock()
         while True:
             self.step()
-            due = max(due + self._period, self._clock())
-            await asyncio.sleep(due - self._clock())
+            await self._ticker.tick()
+
+    def step_soon(self) -> None:
+        """Make the next command at once: the source has a new reference."""
+        self._ticker.soon()
+
+    def motion_now(self) -> VehicleMotion:
+        """The estimated motion now, in the frame without resets.
+
+        Raises:
+            RuntimeError: no position came yet.
+        """
+        return self._guidance_input(self._clock()).now
+
+    def attitude(self) -> Quaternion:
+        """The newest attitude, in the frame without resets."""
+        return self._loop.resets.attitude(self._q)
 
     def step(self) -> None:
         """Make one command, unless the position is stale."""
@@ -202,7 +224,7 @@ class GuidanceLoop:
         return reference
 
     def _heading(self) -> float:
-        return heading(self._loop.resets.attitude(self._q))
+        return heading(self.attitude())
 
     def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
         """The command of predictive control while it flies a trajectory, else `linear`.

@@ -1,24 +1,47 @@
 """Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
 
-from companion.attitude import Limits, Planner, make_planner
+from typing import Any
+
+from companion import plugins
+from companion.attitude import PLANNER_NAMES, Limits, Planner, make_planner
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
+from companion.attitude.within_limits import WithinLimits
 from companion.config import Config
 from companion.config.known_drag import drag_prior
+from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
 
 
 def planner(config: Config) -> Planner:
-    """The configured planner with its limits; `model-following` gets the vehicle's response too."""
-    following = config.planner_name == MODEL_FOLLOWING
-    return make_planner(
-        config.planner_name,
+    """The configured planner with its limits; `model-following` gets the vehicle's response too.
+
+    Raises:
+        ConfigError: the planner of another package cannot be loaded.
+    """
+    name, limits = config.planner_name, rate_limits(config)
+    own = name in PLANNER_NAMES
+    made = make_planner(
+        name if own else plugin(plugins.PLANNERS, name),
         gain=config.planner.gain_per_s,
         yaw_gain=config.planner.yaw_gain_per_s,
-        limits=rate_limits(config),
+        limits=limits,
         recovery_angle=config.limits.recovery_angle,
-        **(config.vehicle.response if following else {}),
+        **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
     )
+    return made if own else WithinLimits(made, limits)
+
+
+def plugin(group: str, name: str) -> Any:
+    """A planner or guidance of another package.
+
+    Raises:
+        ConfigError: it is not installed or cannot be loaded.
+    """
+    try:
+        return plugins.load(group, name)
+    except plugins.PluginError as error:
+        raise ConfigError(str(error)) from error
 
 
 def rate_limits(config: Config) -> Limits:

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from math import tan
 
+from companion import plugins
 from companion.attitude.reference_model import model_lag
 from companion.config import Config
+from companion.config.guidance import GUIDANCE_NAMES
 from companion.config.known_drag import drag_prior
 from companion.control.inner_loop import (
     heading_response,
+    plugin,
     slower_tilt,
     thrust_limits,
     tilt_response,
@@ -28,6 +31,7 @@ from companion.guidance import (
     chain_gains,
 )
 from companion.guidance.follow import Follow
+from companion.guidance.linear import Guidance
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.nmpc import Settings, Solver
 
@@ -101,29 +105,40 @@ def _feedback_delay(config: Config) -> float:
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
-def linear_guidance(config: Config) -> LinearGuidance:
-    """Linear guidance; `limits.max_tilt` gives its largest horizontal acceleration."""
+def make_guidance(config: Config) -> Guidance:
+    """Linear guidance, or the guidance of another package that `guidance.kind` names.
+
+    Raises:
+        ConfigError: the guidance of another package cannot be loaded.
+    """
+    settings, kind = linear_settings(config), config.guidance.kind
+    if kind in GUIDANCE_NAMES:
+        return LinearGuidance(settings)
+    made: Guidance = plugin(plugins.GUIDANCE, kind)(settings)
+    return made
+
+
+def linear_settings(config: Config) -> LinearSettings:
+    """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
     drag = drag_prior(config).drag.linear
     weights = _CALM if _flies_identify(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
-    return LinearGuidance(
-        LinearSettings(
-            gains=chain_gains(weights, _feedback_delay(config), drag),
-            height=HeightGains(
-                height=guidance.height_gain_per_s,
-                climb=guidance.climb_gain_per_s,
-                max_climb=limits.max_climb_m_s,
-                max_descent=limits.max_descent_m_s,
-            ),
-            tilt=tilt,
-            heading=heading,
-            max_horizontal=GRAVITY * tan(limits.max_tilt),
-            thrust_lag=config.thrust.lag,
-            period=period,
-        )
+    return LinearSettings(
+        gains=chain_gains(weights, _feedback_delay(config), drag),
+        height=HeightGains(
+            height=guidance.height_gain_per_s,
+            climb=guidance.climb_gain_per_s,
+            max_climb=limits.max_climb_m_s,
+            max_descent=limits.max_descent_m_s,
+        ),
+        tilt=tilt,
+        heading=heading,
+        max_horizontal=GRAVITY * tan(limits.max_tilt),
+        thrust_lag=config.thrust.lag,
+        period=period,
     )
 
 

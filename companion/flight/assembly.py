@@ -10,17 +10,17 @@ from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
-from companion.control.outer_loop import linear_guidance, motion_estimate, predictive
+from companion.control.outer_loop import make_guidance, motion_estimate, predictive
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import Observer
+from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
-from companion.guidance import ManeuverSequence
 from companion.guidance.follow import Follow
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
@@ -134,10 +134,10 @@ def assemble(
     observer: Observer,
     ask_landing: AskLanding,
     folder: Path | None,
-    maneuvers: ManeuverSequence,
+    plan: Plan,
     environment: Environment = THIS_COMPUTER,
 ) -> Assembled:
-    """Assemble a flight of `maneuvers` over an open link.
+    """Assemble a flight by `plan` over an open link.
 
     Its records are written to `folder`; with None, nothing is written or remembered.
     """
@@ -149,14 +149,14 @@ def assemble(
     )
     same_vehicle = SameVehicle(link, clock)
     loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = PreflightChecks(config, link, same_vehicle, unbegun(maneuvers))
+    preflight = PreflightChecks(config, link, same_vehicle, unbegun(plan.maneuvers))
     context = FlightContext(
         config,
         link,
         loop,
         guidance_loop,
         snapshot_builder,
-        maneuvers,
+        plan.maneuvers,
         ground,
         preflight,
         same_vehicle,
@@ -165,7 +165,7 @@ def assemble(
     rate_requester = RateRequester(link, config.link)
     watch = Watch(context, ladder, rate_requester, clock)
     loop.ask_mode = watch.ask_mode
-    flight = Flight(context, watch, observer, ask_landing)
+    flight = Flight(context, plan, watch, observer, ask_landing)
     ladder.note = context.note = preflight.note = flight.note
     link.clock.on_event = rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None
@@ -209,7 +209,7 @@ def _control(
     ground = GroundContact(link.state, clock)
     guidance_loop = GuidanceLoop(
         loop,
-        linear_guidance(config),
+        make_guidance(config),
         motion_estimate(config, lambda: link.clock.offset),
         thrust,
         link.state,

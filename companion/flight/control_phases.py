@@ -1,6 +1,7 @@
 """The phases under our control and the endings, one coroutine each."""
 
 import asyncio
+from collections.abc import Callable
 from math import degrees
 
 from companion.flight.commands import (
@@ -12,8 +13,9 @@ from companion.flight.commands import (
     require_role,
 )
 from companion.flight.context import FlightContext
-from companion.guidance.source import ManeuverSource
-from companion.safety.actions import FlightEnded, internal
+from companion.guidance import ManeuverSequence
+from companion.guidance.source import CommandedSource, ManeuverSource, Source
+from companion.safety.actions import Exit, FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM = 8.0
@@ -26,21 +28,51 @@ _OURS = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 
 
 async def maneuvers(context: FlightContext) -> None:
-    """Fly the maneuvers to their end, or until they are given up."""
+    """Fly the flight's maneuvers to their end, or until they are given up."""
+    await fly_maneuvers(context, context.maneuvers)
+
+
+async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> None:
+    """Fly `sequence` to its end, or until it is given up."""
+    now = asyncio.get_running_loop().time
+    began = now()
+
+    def progress() -> str:
+        elapsed = now() - began
+        part, _ = sequence.part_at(elapsed)
+        return f"{part.name}, {elapsed:.0f} of {sequence.duration:.0f} s flown"
+
+    await _fly(context, ManeuverSource(sequence), progress)
+    context.guidance_loop.hold_reference()
+
+
+async def fly_commanded(context: FlightContext, source: CommandedSource) -> None:
+    """Fly what another program commands until it ends its control, then hold here."""
+    await _fly(context, source, lambda: f"commanded by {source.name}")
+    context.guidance_loop.hold_here()
+
+
+async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
+    """Fly a source until it is finished.
+
+    Raises:
+        FlightEnded: guidance gave it up, the source failed, or the thrust is too small to steer.
+    """
     now = asyncio.get_running_loop().time
     began, sent = now(), context.loop.record.setpoints
     tilt_margin = _TiltMargin(context)
     tilt_margin.check()
-    context.guidance_loop.follow(ManeuverSource(context.maneuvers))
+    context.guidance_loop.follow(source)
 
     def over() -> bool:
         elapsed = now() - began
         context.rate_hz = (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         if context.guidance_loop.given_up is not None:
             raise FlightEnded(context.guidance_loop.given_up)
+        if source.failure is not None:
+            raise FlightEnded(source.failure, Exit.HOLD)
         tilt_margin.check()
-        part, _ = context.maneuvers.part_at(elapsed)
-        context.detail = f"{part.name}, {elapsed:.0f} of {context.maneuvers.duration:.0f} s flown"
+        context.detail = progress()
         return context.guidance_loop.finished
 
     await context.until(over)

@@ -1,12 +1,15 @@
 """One flight from the first heartbeat to the last: runs the phases and the exit after a failure."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine, Iterator
+from collections.abc import Awaitable, Callable, Coroutine
+from contextlib import aclosing
+from math import inf
 from typing import Any
 
 from companion.flight.context import FlightContext, cancel
 from companion.flight.observer import Observer
-from companion.flight.phases import Phase, exit_phases, flight_phases, ground_phases
+from companion.flight.phases import Phase, exit_phases, ground_phases
+from companion.flight.plan import Plan
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
@@ -30,19 +33,25 @@ class Flight:
 
     Args:
         context: of the flight.
+        plan: tells the phases.
         watch: judges while the phases run.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
     """
 
     def __init__(
-        self, context: FlightContext, watch: Watch, observer: Observer, ask_landing: AskLanding
+        self,
+        context: FlightContext,
+        plan: Plan,
+        watch: Watch,
+        observer: Observer,
+        ask_landing: AskLanding,
     ) -> None:
-        self._ground = ground_phases(context.config.flight)
-        self.phase = self._ground[0]
+        self.phase = ground_phases(context.config.flight)[0]
         self.failed_in: Phase | None = None
         self.events: list[tuple[float, str]] = []
         self._context = context
+        self._plan = plan
         self._watch = watch
         self._observer = observer
         self._ask_landing = ask_landing
@@ -131,8 +140,9 @@ class Flight:
         """
         for _ in range(_ATTEMPTS):
             try:
-                for phase in self._phases():
-                    await self._fly(phase)
+                async with aclosing(self._plan.phases(self._context)) as phases:
+                    async for phase in phases:
+                        await self._fly(phase)
             except ChecksVoid as void:
                 self.note(f"{void.reason}; the checks are repeated")
                 self._context.release()
@@ -142,14 +152,6 @@ class Flight:
             else:
                 return
         raise FlightEnded(f"the vehicle changed {_ATTEMPTS} times before it was armed")
-
-    def _phases(self) -> Iterator[Phase]:
-        """All phases in order; those after the ground phases depend on the autopilot."""
-        yield from self._ground
-        context = self._context
-        yield from flight_phases(
-            context.config.flight, context.maneuvers.duration, context.link.autopilot
-        )
 
     async def _fly(self, phase: Phase) -> None:
         """Run one phase; every failure becomes a `FlightEnded`."""
@@ -162,12 +164,13 @@ class Flight:
         if self._end.done():
             raise self._end.result()
 
-    async def _race(self, work: Coroutine[Any, Any, Any], seconds: float | None) -> Any:
+    async def _race(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
         """Run `work` until it is done, the flight is ended, or `seconds` are over."""
         task = asyncio.create_task(work)
         either: set[asyncio.Future[Any]] = {task, self._end}
         try:
-            await asyncio.wait(either, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+            timeout = None if seconds == inf else seconds
+            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
             if self._end.done():
                 return None
             if not task.done():
@@ -214,7 +217,7 @@ class Flight:
         """Ask the user whether to land; somebody else may take over meanwhile."""
         self._asking = True
         try:
-            return bool(await self._race(self._ask_landing(), None))
+            return bool(await self._race(self._ask_landing(), inf))
         finally:
             self._asking = False
 

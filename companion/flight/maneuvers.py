@@ -22,8 +22,9 @@ from companion.guidance import (
     Steps,
 )
 from companion.guidance.fence import Place
-from companion.guidance.follow import Follow, circle, hover
+from companion.guidance.follow import Follow, HeldFigure, circle, hover
 from companion.guidance.predicted import predicted
+from companion.guidance.reference import Vector
 from companion.guidance.trajectory import (
     Envelope,
     Motion,
@@ -73,6 +74,30 @@ def require_inside(config: Config, parts: Iterable[Maneuver], origin: Place | No
     for part in parts:
         for motion in _motions(part, least_drag(config)):
             _refuse(part.name, check(motion))
+
+
+def require_followable(config: Config, maneuver: Maneuver, begin: Vector) -> None:
+    """Check a trajectory that begins in flight against all limits and the fence.
+
+    Args:
+        config: of the flight.
+        maneuver: `Follow` or `HeldFigure`.
+        begin: where it begins, NED from where control began, m.
+
+    Raises:
+        ConfigError: it cannot be flown within the limits and the fence.
+    """
+    envelope = _envelope(config)
+    check = envelope.fence
+    assert check is not None
+
+    def fence(motion: Motion) -> Violation | None:
+        return check(replace(motion, position=motion.position + np.array(begin)))
+
+    if isinstance(maneuver, Follow | HeldFigure):
+        broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
+        if broken:
+            raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
 
 
 def _part(config: Config, name: str) -> Maneuver:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from companion.config.flight import FlightConfig
@@ -12,10 +13,16 @@ from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
+_UNDER_CONTROL = frozenset({Role.OFFBOARD})
+_GRACE = 10.0
+"""Time allowed beyond the duration of maneuvers, s."""
 _SHORT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKE_OVER = 15.0
 """Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
+
+
+Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +33,7 @@ class Phase:
         name: shown to the user.
         waits_for: the condition it waits for, shown to the user.
         work: the coroutine of the phase.
-        timeout: after this time the phase has failed, s.
+        timeout: after this time the phase has failed, s; infinite for one without end.
         on_failure: the exit if the phase fails.
         on_failure_landed: the exit while the vehicle still stands on the ground, if it differs.
         modes: roles of the allowed modes; any other mode is a takeover, and an unknown mode counts
@@ -37,7 +44,7 @@ class Phase:
 
     name: str
     waits_for: str
-    work: Callable[[FlightContext], Coroutine[Any, Any, None]]
+    work: Work
     timeout: float
     on_failure: Exit = Exit.LEAVE
     on_failure_landed: Exit | None = None
@@ -64,6 +71,20 @@ def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
     """The phases from there on, in the autopilot's order; `maneuver_duration` in s."""
+    maneuvers = Phase(
+        "maneuvers",
+        "the maneuver to end",
+        control_phases.maneuvers,
+        maneuver_duration + _GRACE,
+        Exit.LAND,
+        modes=_UNDER_CONTROL,
+        monitored=True,
+    )
+    return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases(config))
+
+
+def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
+    """The phases from the ground until the autopilot obeys our rates, in the autopilot's order."""
     stream = Phase("stream", "setpoints to flow", preflight_phases.stream, _SHORT)
     return (
         *((stream,) if autopilot.control_entry is ControlEntry.BY_COMMAND else ()),
@@ -88,19 +109,34 @@ def flight_phases(
             modes=_RISING | {Role.OFFBOARD},
             monitored=True,
         ),
-        Phase(
-            "maneuvers",
-            "the maneuver to end",
-            control_phases.maneuvers,
-            maneuver_duration + 10.0,
-            Exit.LAND,
-            modes=frozenset({Role.OFFBOARD}),
-            monitored=True,
-        ),
-        _hand_back(),
-        _land(config),
-        _disarm(),
     )
+
+
+def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) -> Phase:
+    """A phase that a user's program asked for while the autopilot obeys our rates.
+
+    If it fails, the vehicle is handed back and holds: only the program or the pilot lands it.
+
+    Args:
+        name: shown to the user.
+        waits_for: shown to the user.
+        work: the coroutine of the phase.
+        duration: expected, s.
+    """
+    return Phase(
+        name,
+        waits_for,
+        work,
+        duration + _GRACE,
+        Exit.HOLD,
+        modes=_UNDER_CONTROL,
+        monitored=True,
+    )
+
+
+def landing_phases(config: FlightConfig) -> tuple[Phase, ...]:
+    """The phases from our control back to the ground."""
+    return hand_back_phase(), _land(config), _disarm()
 
 
 def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
@@ -109,12 +145,13 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
         Exit.LEAVE: (),
         Exit.RELEASE: (),
         Exit.DISARM: (_undo_arming(),),
-        Exit.HOLD: (_hand_back(),),
+        Exit.HOLD: (hand_back_phase(),),
         Exit.LAND: (_land(config), _disarm()),
     }[exit_]
 
 
-def _hand_back() -> Phase:
+def hand_back_phase() -> Phase:
+    """The autopilot holds by itself, and our setpoints stop."""
     return Phase(
         "hand back",
         "the autopilot to hold",

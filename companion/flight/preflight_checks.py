@@ -91,7 +91,8 @@ class PreflightChecks:
             self._same_vehicle.note_identity(evidence.identity)
         self._same_vehicle.require()
         self.on_identity(evidence.identity)
-        evidence = replace(evidence, stage=stage, maneuvers=self._maneuvers)
+        planned = self._maneuvers if self._maneuvers.parts else None
+        evidence = replace(evidence, stage=stage, maneuvers=planned)
         self._apply(run_checks(self._config, evidence, again=before is not None))
         return evidence
 

@@ -12,8 +12,8 @@ from companion.files import bounded_yaml
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Observer, StateLogger
+from companion.flight.plan import ConfiguredPlan, Plan
 from companion.realtime import Wishes
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
@@ -31,6 +31,7 @@ class Session:
         folder: an existing folder for this flight's files; None: nothing is recorded.
         observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
+        plan: of the flight; None: as configured.
         environment: what the flight gets from the computer.
     """
 
@@ -40,12 +41,14 @@ class Session:
         folder: Path | None,
         observer: Observer,
         ask_landing: AskLanding,
+        plan: Plan | None = None,
         environment: Environment = THIS_COMPUTER,
     ) -> None:
         self._config = config
         self._folder = folder
         self._observer = observer
         self._ask_landing = ask_landing
+        self._plan = plan
         self._environment = environment
         self._assembled: Assembled | None = None
         self._flying: asyncio.Task[str] | None = None
@@ -83,7 +86,7 @@ class Session:
             flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
             (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
-        maneuvers = configured_maneuvers(self._config)
+        plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         environment = self._environment
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
         with realtime.asked_for(wishes) as grants, self._recorder() as tlog:
@@ -94,7 +97,7 @@ class Session:
                     self._observer,
                     self._ask_landing,
                     self._folder,
-                    maneuvers,
+                    plan,
                     environment,
                 )
                 for text in (*self._early_notes, *map(str, grants)):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
 from companion.drag import Drag
@@ -74,6 +74,24 @@ class LinearCommand(NamedTuple):
     target: Target
     later: Target
     down: float
+
+
+class Guidance(Protocol):
+    """Turns a reference into a target and a vertical acceleration, once in each period."""
+
+    @property
+    def acts_after(self) -> float:
+        """Mean delay from computing a command until the vehicle responds to its feedback, s.
+
+        `GuidanceInput.acts` is predicted by it.
+        """
+        ...
+
+    def command(
+        self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
+    ) -> LinearCommand:
+        """One step; see `LinearGuidance.command`."""
+        ...
 
 
 class LinearGuidance:

@@ -17,6 +17,11 @@ class Source(Protocol):
         """Name to show to the user."""
         ...
 
+    @property
+    def failure(self) -> str | None:
+        """Why the source has nothing to fly any more although it is not finished, or None."""
+        ...
+
     def begin(self, now: float, pose: Pose) -> None:
         """Start at `now` from `pose`, which the vehicle has held so far."""
         ...
@@ -42,7 +47,10 @@ class ManeuverSource:
         maneuvers: the maneuvers to fly.
         begun_at: when they began, or None.
         pose: the pose at which they began, or None.
+        failure: None; a maneuver that is given up is held by guidance.
     """
+
+    failure: str | None = None
 
     def __init__(self, maneuvers: ManeuverSequence) -> None:
         self.maneuvers = maneuvers
@@ -83,25 +91,30 @@ class CommandedSource:
     Args:
         name: who gives the references.
         stale: age beyond which a reference is not flown, s.
+        begins_within: time allowed for the first reference, s.
 
     Attributes:
         name: who gives the references.
+        pose: the pose at which the source began, or None.
         silent_since: when the newest reference became too old, or None.
     """
 
-    def __init__(self, name: str, stale: float) -> None:
+    def __init__(self, name: str, stale: float, begins_within: float) -> None:
         self.name = name
+        self.pose: Pose | None = None
         self.silent_since: float | None = None
         self._stale = stale
+        self._begins_within = begins_within
         self._held = Reference((0.0, 0.0, 0.0))
-        self._heading = 0.0
         self._newest: Reference | None = None
         self._given_at = 0.0
         self._jerk = (0.0, 0.0, 0.0)
         self._ended = False
+        self._failure: str | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Hold `pose` until the first reference; it must come within `stale` seconds."""
+        """Hold `pose` until the first reference."""
+        self.pose = pose
         self._held = Reference(pose.position_ned, heading=pose.heading)
         self._given_at = now
 
@@ -137,7 +150,7 @@ class CommandedSource:
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, extrapolated; if it is too old, a hold of the present position."""
         newest, given_at = self._newest, self._given_at
-        if now - given_at > self._stale and self.silent_since is None:
+        if now - given_at > self._patience and self.silent_since is None:
             self.silent_since = now
             if newest is not None:
                 self._held = Reference(motion.position_ned, heading=newest.heading)
@@ -146,6 +159,21 @@ class CommandedSource:
             return lambda _: held
         jerk = self._jerk
         return lambda time: continued(newest, jerk, time - given_at)
+
+    @property
+    def _patience(self) -> float:
+        return self._begins_within if self._newest is None else self._stale
+
+    @property
+    def failure(self) -> str | None:
+        """Why control must end: told by `fail`, or the references have stopped."""
+        if self._failure is not None or self.silent_since is None or self._ended:
+            return self._failure
+        return f"{self.name} gave no new command for {self._patience:g} s"
+
+    def fail(self, reason: str) -> None:
+        """Give no more references, because of `reason`."""
+        self._failure = reason
 
     def finished(self, now: float) -> bool:
         """Whether `end` was called."""

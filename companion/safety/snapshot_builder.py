@@ -82,6 +82,11 @@ class SnapshotBuilder:
         self._timeline = self._link.clock.timeline
         self._counted.clear()
 
+    @property
+    def origin_ned(self) -> Vector | None:
+        """Where control began, m, or None before."""
+        return self._start
+
     def listen(self, now: float) -> None:
         """Take the counters at `now`; `flight.watch` calls this 50 times a second."""
         stats, loop, record = self._link.stats, self._loop, self._loop.record

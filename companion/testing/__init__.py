@@ -15,10 +15,15 @@ Nothing sleeps, no socket is opened, and equal inputs give equal flights to the 
 
 `MockVehicle` tells the true state and what setpoints it received, takes faults, and gives the
 pilot's sticks and another station's commands. `fly` takes a configuration and flies it; `run` runs
-any coroutine on the vehicle's clock, with links opened by `open_wire`.
+any coroutine on the vehicle's clock, with links opened by `open_wire`. A program of your own flies
+inside `run` by `connect`, which gives it the same `Vehicle` as `companion.connect`.
+
+`check_planner` and `check_guidance` tell whether a planner or guidance of your own may fly. In
+pytest the fixture `mock_vehicle` makes vehicles.
 """
 
-from companion.testing.flying import environment, fly, run, session
+from companion.testing.conformance import check_guidance, check_planner
+from companion.testing.flying import connect, environment, fly, run, session
 from companion.testing.vehicle import MockVehicle, ReceivedSetpoint
 from companion.testing.virtual_loop import VirtualEventLoop
 from companion.testing.wire import open_wire
@@ -29,6 +34,9 @@ __all__ = [
     "ReceivedSetpoint",
     "Truth",
     "VirtualEventLoop",
+    "check_guidance",
+    "check_planner",
+    "connect",
     "environment",
     "fly",
     "open_wire",

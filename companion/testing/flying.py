@@ -1,10 +1,13 @@
 """Flies a configuration against a mock vehicle in memory."""
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+from collections.abc import AsyncGenerator, Coroutine, Mapping
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
+from companion.api.connection import flying
+from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
@@ -73,14 +76,12 @@ def session(
     Raises:
         ConfigError: the configuration is wrong.
     """
-    known = _known(config)
-    if known.link.backend != "direct":
-        raise ConfigError(f"link.backend {known.link.backend} cannot reach a vehicle in memory")
-    if known.link.lockstep != vehicle.in_lockstep:
-        known = changed(known, {"link": {"lockstep": vehicle.in_lockstep}}, "the vehicle")
+    known = _in_memory(_known(config), vehicle)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    return Session(known, folder, observer or Silent(), ask_landing or _decline, environment)
+    return Session(
+        known, folder, observer or Silent(), ask_landing or _decline, environment=environment
+    )
 
 
 def fly(
@@ -107,6 +108,38 @@ def fly(
         UnseenError: a part of the program failed unseen.
     """
     return run(vehicle, session(config, vehicle, folder, observer, ask_landing).fly())
+
+
+@asynccontextmanager
+async def connect(
+    config: Configuration,
+    vehicle: MockVehicle,
+    folder: Path | None = None,
+    observer: Observer | None = None,
+) -> AsyncGenerator[Vehicle, None]:
+    """As `companion.connect`, to a mock vehicle in memory, inside `run`.
+
+    Args:
+        config: of the flight.
+        vehicle: the one that `run` was given.
+        folder: an existing one for the files of the flight; None: nothing is written.
+        observer: receives phases and events as they happen.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+        FlightEnded: as `companion.connect`.
+    """
+    known = _in_memory(_known(config), vehicle)
+    async with flying(known, folder, observer, environment) as connected:
+        yield connected
+
+
+def _in_memory(config: Config, vehicle: MockVehicle) -> Config:
+    if config.link.backend != "direct":
+        raise ConfigError(f"link.backend {config.link.backend} cannot reach a vehicle in memory")
+    if config.link.lockstep != vehicle.in_lockstep:
+        return changed(config, {"link": {"lockstep": vehicle.in_lockstep}}, "the vehicle")
+    return config
 
 
 def _known(config: Configuration) -> Config:

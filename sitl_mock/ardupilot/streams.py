@@ -67,14 +67,13 @@ class ArduPilotStreams:
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
         due = []
+        booting = slot_us < self._silent_until_us
+        last_us = self._last
         for message_id, interval in self._intervals.items():
-            if slot_us < self._silent_until_us and message_id not in self._defaults:
-                continue
-            last = self._last[message_id]
-            if slot_us - last < interval:
+            waited = slot_us - last_us[message_id]
+            if waited < interval or (booting and message_id not in self._defaults):
                 continue
             # More than one interval late, the phase restarts, so that no message is sent twice.
-            late = slot_us - last >= 2 * interval
-            self._last[message_id] = slot_us if late else last + interval
+            last_us[message_id] = slot_us if waited >= 2 * interval else slot_us - waited + interval
             due.append(message_id)
         return due

@@ -66,6 +66,8 @@ class FaultSchedule:
             now_us: vehicle time.
             offboard_us: when setpoints first controlled the vehicle, None if not yet.
         """
+        if not self._entries:
+            return [], []
         began: list[VehicleFault] = []
         ended: list[VehicleFault] = []
         changed = False

@@ -80,6 +80,8 @@ class ParameterProtocol:
 
     def step(self) -> None:
         """Send the next few parameters of every requested list."""
+        if not self._listing:
+            return
         for key, (link, index) in list(self._listing.items()):
             end = min(index + _SENT_PER_TICK, len(self._parameters))
             for position in range(index, end):

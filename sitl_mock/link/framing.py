@@ -1,21 +1,19 @@
 """Decodes and encodes MAVLink frames on the vehicle's side of a link.
 
-pymavlink is the codec. The dialect is ``development`` (a superset of ``common``), that of PX4 main.
+Messages are pymavlink's objects. The dialect is ``development`` (a superset of ``common``), that of
+PX4 main.
 """
 
 import struct
-from collections.abc import Callable, Iterable
-from itertools import chain
-from operator import attrgetter
 from typing import Any
 
 from fastcrc import crc16
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.link.event_messages import event_request
+from sitl_mock.link.payload import Message, pack, unpack
 
-Message = Any
-"""A pymavlink message object; the generated classes have no usable types."""
+__all__ = ["SIGNATURE_BYTES", "SIGNED", "Framer", "Message", "decode", "split"]
 
 _MAGIC_V1 = 0xFE
 _MAGIC_V2 = 0xFD
@@ -25,12 +23,12 @@ SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
 _OVERHEAD_V2 = 12
 _FLAGS_AT = 2
+_PAYLOAD_AT = 10
 _UNKNOWN_LENGTH = -1
 
 _HEADER = struct.Struct("<BBBBBBHB")
 _CRC = struct.Struct("<H")
 
-_wire_values: dict[Any, Callable[[Message], Iterable[Any]]] = {}
 _decoder = dialect.MAVLink(None)
 
 
@@ -46,17 +44,40 @@ def decode(datagram: bytes) -> list[Message]:
         if not 0 < length <= len(datagram) - start:
             start += 1
             continue
-        try:
-            message = _decoder.decode(bytearray(datagram[start : start + length]))
-        except dialect.MAVError:
-            start += 1
-            continue
-        start += length
-        if isinstance(message, dialect.MAVLink_unknown):
-            message = event_request(message)
+        frame = datagram[start : start + length]
+        known = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
+        valid, message = _decode_other(frame) if known is None else _decode_known(frame, known)
+        start += length if valid else 1
         if message is not None:
             messages.append(message)
     return messages
+
+
+def _message_id(frame: bytes) -> int:
+    return frame[7] | frame[8] << 8 | frame[9] << 16
+
+
+def _decode_known(frame: bytes, kind: Any) -> tuple[bool, Message | None]:
+    """Decode a MAVLink 2 frame of a message class; return whether it is valid, and the message."""
+    end = _PAYLOAD_AT + frame[1]
+    stated = frame[end] | frame[end + 1] << 8
+    if crc16.mcrf4xx(frame[1:end] + bytes((kind.crc_extra,))) != stated:
+        return False, None
+    message = unpack(kind, frame[_PAYLOAD_AT:end])
+    message._msgbuf = bytearray(frame)
+    header = message.get_header()
+    header.mlen, header.incompat_flags, header.compat_flags = frame[1:4]
+    header.seq, header.srcSystem, header.srcComponent = frame[4:7]
+    return True, message
+
+
+def _decode_other(frame: bytes) -> tuple[bool, Message | None]:
+    """Decode a frame of MAVLink 1, or of a message that the dialect lacks."""
+    try:
+        message = _decoder.decode(bytearray(frame))
+    except dialect.MAVError:
+        return False, None
+    return True, event_request(message) if isinstance(message, dialect.MAVLink_unknown) else message
 
 
 def split(data: bytes) -> tuple[list[bytes], bytes]:
@@ -111,12 +132,8 @@ class Framer:
 
     def frame(self, message: Message) -> bytes:
         """Return the message's frame."""
-        kind = type(message)
-        wire_values = _wire_values.get(kind)
-        if wire_values is None:
-            wire_values = _wire_values[kind] = _wire_order(kind)
-        payload = kind.unpacker.pack(*wire_values(message))
-        return self.frame_raw(kind.id, kind.crc_extra, payload)
+        kind = type(message)  # a message may have a field named `id`
+        return self.frame_raw(kind.id, kind.crc_extra, pack(message))
 
     def frame_raw(self, message_id: int, crc_extra: int, payload: bytes) -> bytes:
         """Return the frame of a message given as payload; trailing zeros are truncated."""
@@ -134,26 +151,3 @@ class Framer:
         self._sequence = (self._sequence + 1) & 0xFF
         body += payload
         return b"\xfd" + body + _CRC.pack(crc16.mcrf4xx(body + bytes((crc_extra,))))
-
-
-def _wire_order(kind: Any) -> Callable[[Message], Iterable[Any]]:
-    """Return the function that lists the field values of a message class in wire order.
-
-    pymavlink's own ``pack`` takes three times as long, too long for lockstep.
-    """
-    names = kind.ordered_fieldnames
-    texts = {
-        name for name, kept in zip(kind.fieldnames, kind.fieldtypes, strict=True) if kept == "char"
-    }
-    fields = attrgetter(*(f"_{name}_raw" if name in texts else name for name in names))
-    if len(names) == 1:
-        return lambda message: (fields(message),)
-    arrays = [
-        bool(length) and name not in texts
-        for name, length in zip(names, kind.array_lengths, strict=True)
-    ]
-    if not any(arrays):
-        return fields
-    return lambda message: chain.from_iterable(
-        value if array else (value,) for value, array in zip(fields(message), arrays, strict=True)
-    )

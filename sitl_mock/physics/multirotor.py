@@ -142,26 +142,28 @@ class Multirotor:
         else:
             self.mix = STOPPED
         thrust, torque_x, torque_y, torque_z = self.rotors.step(self.mix.throttles, thrust_factor)
-        return (thrust / self._mass, torque_x, torque_y, torque_z, *wind)
+        wind_n, wind_e, wind_d = wind
+        return (thrust / self._mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d)
 
     def sinks(self, load: Load) -> bool:
         """Whether the vertical acceleration under this load is not upward."""
-        return derivative(self.motion, load, self._body)[2] >= 0.0
+        return derivative(*self.motion, load, self._body)[2] >= 0.0
 
     def move(self, load: Load) -> Vector:
         """Integrate one step under this load; return the displacement, NED, m."""
-        before, rate_hz = self.motion, self._rate_hz
-        after, moved = advance(before, load, self._body, self.dt)
-        self.motion = after
+        vn, ve, vd, _, _, _, _, p, q, r = self.motion
+        self.motion, moved = advance(self.motion, load, self._body, self.dt)
+        new_vn, new_ve, new_vd, _, _, _, _, new_p, new_q, new_r = self.motion
+        rate_hz = self._rate_hz
         self.acceleration = (
-            (after[0] - before[0]) * rate_hz,
-            (after[1] - before[1]) * rate_hz,
-            (after[2] - before[2]) * rate_hz,
+            (new_vn - vn) * rate_hz,
+            (new_ve - ve) * rate_hz,
+            (new_vd - vd) * rate_hz,
         )
         self.angular_acceleration = (
-            (after[7] - before[7]) * rate_hz,
-            (after[8] - before[8]) * rate_hz,
-            (after[9] - before[9]) * rate_hz,
+            (new_p - p) * rate_hz,
+            (new_q - q) * rate_hz,
+            (new_r - r) * rate_hz,
         )
         return moved
 

@@ -62,7 +62,8 @@ class NavigationFilter:
         "_config",
         "_corrected",
         "_decay",
-        "_fixed",
+        "_fixed_speed",
+        "_fixed_way",
         "_gains",
         "_lead",
         "_level",
@@ -84,7 +85,7 @@ class NavigationFilter:
         self._random = Random(f"{seed}/navigation")
         self._yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         self._at = 0.0
-        self._fixed = start
+        self._fixed_way, self._fixed_speed = _horizontal(start.position), _horizontal(start.motion)
         self._corrected = self._sag = 0.0
         self._level, self._upright = self._initial(1.0), self._initial(config.vertical_share)
 
@@ -128,7 +129,8 @@ class NavigationFilter:
         sag = config.height_sag_s4_per_m * abs(pull) ** 2
         self._sag += (1.0 - exp(-elapsed / _SAG_S)) * (sag - self._sag)
         self._level, self._upright = level, upright
-        self._at, self._fixed, self._corrected = at, delayed, now
+        self._at, self._corrected = at, now
+        self._fixed_way, self._fixed_speed = _horizontal(delayed.position), speed
 
     def error(self, truth: Snapshot, now: float) -> NavigationError:
         """Return the error at ``now`` (s), at which the true motion is ``truth``."""
@@ -163,8 +165,8 @@ class NavigationFilter:
         """
         place, speed, tilt = _extrapolated(self._level.errors, elapsed)
         wrong = complex(self._config.acceleration_scale, self._yaw)
-        before = _horizontal(self._fixed.motion)
-        way = _horizontal(truth.position) - _horizontal(self._fixed.position)
+        before = self._fixed_speed
+        way = _horizontal(truth.position) - self._fixed_way
         return (
             place + wrong * (way - elapsed * before),
             speed + wrong * (_horizontal(truth.motion) - before),

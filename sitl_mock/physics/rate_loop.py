@@ -119,18 +119,18 @@ class SetpointDelay:
         dt: step, s.
     """
 
-    __slots__ = ("_pitch", "_roll", "_yaw")
+    __slots__ = ("_given", "_pitch", "_roll", "_yaw")
 
     def __init__(self, delays_ms: Vector, dt: float) -> None:
+        # Counted from the newest setpoint, which is at -1.
         self._roll, self._pitch, self._yaw = (
-            deque([0.0] * steps, maxlen=steps)
-            for steps in (1 + round(delay_ms * 1e-3 / dt) for delay_ms in delays_ms)
+            -1 - round(delay_ms * 1e-3 / dt) for delay_ms in delays_ms
         )
+        length = -min(self._roll, self._pitch, self._yaw)
+        self._given: deque[Vector] = deque([(0.0, 0.0, 0.0)] * length, maxlen=length)
 
     def step(self, setpoint: Vector) -> Vector:
         """Accept the setpoint of this step; return the delayed one."""
-        roll, pitch, yaw = self._roll, self._pitch, self._yaw
-        roll.append(setpoint[0])
-        pitch.append(setpoint[1])
-        yaw.append(setpoint[2])
-        return roll[0], pitch[0], yaw[0]
+        given = self._given
+        given.append(setpoint)
+        return given[self._roll][0], given[self._pitch][1], given[self._yaw][2]

@@ -39,13 +39,25 @@ def body_of(airframe: AirframeConfig) -> Body:
     )
 
 
-def derivative(motion: Motion, load: Load, body: Body) -> Motion:
-    """Return the time derivative of the motion (Newton, Euler, quaternion kinematics).
+def derivative(
+    vn: float,
+    ve: float,
+    vd: float,
+    w: float,
+    x: float,
+    y: float,
+    z: float,
+    p: float,
+    q: float,
+    r: float,
+    load: Load,
+    body: Body,
+) -> Motion:
+    """Return the time derivative of a `Motion` (Newton, Euler, quaternion kinematics).
 
     m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind);
     J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
-    vn, ve, vd, w, x, y, z, p, q, r = motion
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
     jx, jy, jz, drag, quadratic, damping, gravity = body
     air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
@@ -65,22 +77,54 @@ def derivative(motion: Motion, load: Load, body: Body) -> Motion:
     )
 
 
-def along(motion: Motion, rate: Motion, dt: float) -> Motion:
-    """Return motion + dt * rate."""
-    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = motion
-    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = rate
-    return (
-        a0 + dt * b0,
-        a1 + dt * b1,
-        a2 + dt * b2,
-        a3 + dt * b3,
-        a4 + dt * b4,
-        a5 + dt * b5,
-        a6 + dt * b6,
-        a7 + dt * b7,
-        a8 + dt * b8,
-        a9 + dt * b9,
+def _slopes(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, ...]:
+    """Return the four derivatives k1 to k4 of a classical Runge-Kutta step of `dt` seconds."""
+    half = 0.5 * dt
+    vn, ve, vd, w, x, y, z, p, q, r = motion
+    a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1 = derivative(*motion, load, body)
+    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2 = derivative(
+        vn + half * a0,
+        ve + half * a1,
+        vd + half * a2,
+        w + half * a3,
+        x + half * a4,
+        y + half * a5,
+        z + half * a6,
+        p + half * a7,
+        q + half * a8,
+        r + half * a9,
+        load,
+        body,
     )
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = k3 = derivative(
+        vn + half * b0,
+        ve + half * b1,
+        vd + half * b2,
+        w + half * b3,
+        x + half * b4,
+        y + half * b5,
+        z + half * b6,
+        p + half * b7,
+        q + half * b8,
+        r + half * b9,
+        load,
+        body,
+    )
+    k4 = derivative(
+        vn + dt * c0,
+        ve + dt * c1,
+        vd + dt * c2,
+        w + dt * c3,
+        x + dt * c4,
+        y + dt * c5,
+        z + dt * c6,
+        p + dt * c7,
+        q + dt * c8,
+        r + dt * c9,
+        load,
+        body,
+    )
+    return k1, k2, k3, k4
 
 
 def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, Vector]:
@@ -91,11 +135,7 @@ def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, 
         does not depend on the position, so the position's stages reduce to
         v dt + (k1 + k2 + k3) dt^2 / 6.
     """
-    half = 0.5 * dt
-    k1 = derivative(motion, load, body)
-    k2 = derivative(along(motion, k1, half), load, body)
-    k3 = derivative(along(motion, k2, half), load, body)
-    k4 = derivative(along(motion, k3, dt), load, body)
+    k1, k2, k3, k4 = _slopes(motion, load, body, dt)
     vn, ve, vd, w, x, y, z, p, q, r = motion
     a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2

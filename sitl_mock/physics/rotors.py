@@ -43,12 +43,14 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
         roll *= scale
         pitch *= scale
         demand = room
-    throttle = min(throttle, 1.0 - demand)
+    rest = 1.0 - demand
+    throttle = rest if rest < throttle else throttle
     # One diagonal has pitch - roll and +yaw, the other pitch + roll and -yaw.
     counter, clockwise = abs(pitch - roll), abs(pitch + roll)
     if yaw < 0.0:
         counter, clockwise = clockwise, counter
-    room = min(1.0 - throttle - counter, throttle - clockwise)
+    above, below = 1.0 - throttle - counter, throttle - clockwise
+    room = below if below < above else above
     yaw_saturated = abs(yaw) > room
     if yaw_saturated:
         room = max(room, 0.0)

@@ -1,7 +1,8 @@
 """The autopilot's estimate: the true motion with delay, noise, filter error, estimator resets."""
 
 from collections import deque
-from math import radians
+from collections.abc import Sequence
+from math import cos, log, pi, radians, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
@@ -23,6 +24,31 @@ class Estimate(NamedTuple):
     gyro: Vector  # rad/s, what the (bias-free) gyro measures
 
 
+class WhiteNoise:
+    """Standard normal numbers: the sequence of `Random.gauss` (Box-Muller), many at a time.
+
+    Args:
+        seed: of the sequence.
+    """
+
+    __slots__ = ("_next", "_random")
+
+    def __init__(self, seed: str) -> None:
+        self._random = Random(seed)
+        self._next: list[float] = []
+
+    def draw(self, count: int) -> list[float]:
+        """Return the next `count` numbers."""
+        drawn, random = self._next, self._random.random
+        while len(drawn) < count:
+            angle = random() * 2.0 * pi
+            radius = sqrt(-2.0 * log(1.0 - random()))
+            drawn.append(cos(angle) * radius)
+            drawn.append(sin(angle) * radius)
+        self._next = drawn[count:]
+        return drawn[:count]
+
+
 class Estimator:
     """Computes the estimate; one seeded generator draws its white noise.
 
@@ -32,15 +58,15 @@ class Estimator:
 
     __slots__ = (
         "_attitude_delay",
-        "_config",
+        "_deviations",
         "_dt",
         "_filter",
         "_gravity",
         "_history",
         "_horizon",
+        "_noise",
         "_offset",
         "_position_delay",
-        "_random",
         "_rotation",
         "_yaw",
         "reset_counter",
@@ -49,7 +75,17 @@ class Estimator:
     def __init__(
         self, config: SensorConfig, start: Snapshot, *, gravity: float, dt: float, seed: int
     ) -> None:
-        self._config = config
+        self._deviations = tuple(
+            deviation
+            for deviation in (
+                0.5 * radians(config.attitude_noise_deg),
+                config.rate_noise_rad_s,
+                config.position_noise_m,
+                config.velocity_noise_m_s,
+                config.acceleration_noise_m_s2,
+            )
+            for _ in range(3)
+        )
         self._gravity = gravity
         self._attitude_delay = round(config.attitude_delay_ms * 1e-3 / dt)
         self._position_delay = round(config.position_delay_ms * 1e-3 / dt)
@@ -58,7 +94,7 @@ class Estimator:
         length = 1 + max(self._attitude_delay, self._position_delay, self._horizon)
         self._history = deque([start] * length, maxlen=length)
         self._dt = dt
-        self._random = Random(f"{seed}/sensors")
+        self._noise = WhiteNoise(f"{seed}/sensors")
         self._yaw: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._rotation: Vector = (0.0, 0.0, 0.0)
         self._offset: Vector = (0.0, 0.0, 0.0)
@@ -84,25 +120,23 @@ class Estimator:
 
     def estimate(self, time: float) -> Estimate:
         """Return the estimate at ``time`` (s), which is now, with fresh noise."""
-        config = self._config
         error = self._error(time)
         self._rotation = error.rotation
-        attitude = self._history[-1 - self._attitude_delay]
-        _, _, _, w, x, y, z, *rates = attitude.motion
+        history = self._history
+        attitude, place = history[-1 - self._attitude_delay], history[-1 - self._position_delay]
+        _, _, _, w, x, y, z, p, q, r = attitude.motion
         n, e, d = attitude.acceleration
         force = to_body((w, x, y, z), (n, e, d - self._gravity))
-        place = self._history[-1 - self._position_delay]
-        n, e, d = _add(place.position, error.position)
-        off_n, off_e, off_d = self._offset
-        turn_x, turn_y, turn_z = self._noise(0.5 * radians(config.attitude_noise_deg))
+        noise = [0.0 + z * s for z, s in zip(self._noise.draw(15), self._deviations, strict=True)]
+        turn_x, turn_y, turn_z, p_noise, q_noise, r_noise, *rest = noise
         turned = multiply(self.as_estimated((w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
-        gyro = _add((rates[0], rates[1], rates[2]), self._noise(config.rate_noise_rad_s))
+        gyro = (p + p_noise, q + q_noise, r + r_noise)
         return Estimate(
             normalise(turned),
             gyro,
-            _add((n + off_n, e + off_e, d + off_d), self._noise(config.position_noise_m)),
-            _add(_add(place.motion[:3], error.velocity), self._noise(config.velocity_noise_m_s)),
-            _add(force, self._noise(config.acceleration_noise_m_s2)),
+            _sum(place.position, error.position, self._offset, rest[0:3]),
+            _sum(place.motion, error.velocity, rest[3:6]),
+            _sum(force, rest[6:9]),
             gyro,
         )
 
@@ -115,10 +149,10 @@ class Estimator:
         age = self._position_delay * self._dt
         return self._filter.error(self._history[-1 - self._position_delay], time - age)
 
-    def _noise(self, deviation: float) -> Vector:
-        gauss = self._random.gauss
-        return (gauss(0.0, deviation), gauss(0.0, deviation), gauss(0.0, deviation))
 
-
-def _add(left: Vector, right: Vector) -> Vector:
-    return (left[0] + right[0], left[1] + right[1], left[2] + right[2])
+def _sum(first: Sequence[float], *others: Sequence[float]) -> Vector:
+    """Return the sum of the first three components of vectors, added from left to right."""
+    x, y, z = first[0], first[1], first[2]
+    for other in others:
+        x, y, z = x + other[0], y + other[1], z + other[2]
+    return x, y, z

@@ -24,12 +24,14 @@ NEW_EVERY_US = {LOCAL_POSITION_NED: 8000}
 
 
 class _Stream:
-    __slots__ = ("in_slot_before", "interval_us", "last_us", "status_us")
+    __slots__ = ("due_us", "interval_us", "message_id", "sent_us", "status_us")
 
-    def __init__(self, interval_us: int, last_us: int) -> None:
+    def __init__(self, message_id: int, interval_us: int, due_us: int) -> None:
+        self.message_id = message_id
         self.interval_us = interval_us
-        self.last_us = last_us
-        self.in_slot_before = False
+        self.due_us = due_us
+        self.sent_us: int | None = None
+        """The latest slot in which it was sent."""
         self.status_us = -1
 
 
@@ -45,8 +47,9 @@ class Px4Streams:
     def __init__(self, rates: Mapping[int, float], *, random: Random | None) -> None:
         self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
         self._random = random
+        self._slot_before_us: int | None = None
         self._streams = {
-            message: _Stream(interval, -interval) for message, interval in self._defaults.items()
+            message: _Stream(message, interval, 0) for message, interval in self._defaults.items()
         }
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
@@ -63,7 +66,7 @@ class Px4Streams:
         if interval < 0:
             self._streams.pop(message_id, None)
         else:
-            self._streams[message_id] = _Stream(interval, now_us)
+            self._streams[message_id] = _Stream(message_id, interval, now_us + interval)
         return None
 
     def interval(self, message_id: int) -> int:
@@ -78,24 +81,28 @@ class Px4Streams:
         was at ``status_us`` (measured: 2 Hz of 20 Hz requested).
         """
         due = []
-        for message_id, stream in self._streams.items():
-            waited = slot_us - stream.last_us
+        for stream in self._streams.values():
+            late_us = slot_us - stream.due_us
+            if late_us < 0:
+                continue
+            message_id = stream.message_id
             nothing_new = message_id == CURRENT_MODE and stream.status_us == status_us
-            if waited < stream.interval_us or nothing_new or self._missed(message_id, slot_us):
-                stream.in_slot_before = False
+            if nothing_new or self._missed(stream, slot_us):
                 continue
             # Keep the phase while the stream is nearly on time, else restart it.
-            on_time = 2 * waited < 3 * stream.interval_us
-            stream.last_us = stream.last_us + stream.interval_us if on_time else slot_us
-            stream.in_slot_before = True
+            on_time = 2 * late_us < stream.interval_us
+            stream.due_us = (stream.due_us if on_time else slot_us) + stream.interval_us
+            stream.sent_us = slot_us
             stream.status_us = status_us
             due.append(message_id)
+        self._slot_before_us = slot_us
         return due
 
-    def _missed(self, message_id: int, slot_us: int) -> bool:
+    def _missed(self, stream: _Stream, slot_us: int) -> bool:
         """Whether a due message misses this slot."""
         if self._random is None:
             return False
-        if slot_us % NEW_EVERY_US.get(message_id, 1):
+        if slot_us % NEW_EVERY_US.get(stream.message_id, 1):
             return True
-        return self._streams[message_id].in_slot_before and self._random.random() < BUSY_SHARE
+        in_slot_before = stream.sent_us is not None and stream.sent_us == self._slot_before_us
+        return in_slot_before and self._random.random() < BUSY_SHARE

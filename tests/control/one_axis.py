@@ -14,7 +14,7 @@ from companion.attitude import BodyRates
 from companion.config import Config
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.inner_loop import planner
-from companion.control.outer_loop import linear_guidance, motion_estimate
+from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import GRAVITY, Reference
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -43,7 +43,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
         noise: standard deviation of the measured position (m) and velocity (m/s), white.
         seed: of the noise.
     """
-    rng, law, guidance = np.random.default_rng(seed), planner(config), linear_guidance(config)
+    rng, law, guidance = np.random.default_rng(seed), planner(config), make_guidance(config)
     estimate = motion_estimate(config, lambda: 0.0)
     late = round(vehicle.dead_time / DT)
     asked, fade = deque([0.0] * (late + 1), maxlen=late + 1), exp(-DT / vehicle.lag)

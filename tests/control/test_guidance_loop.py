@@ -9,7 +9,7 @@ from companion.attitude import BodyRates
 from companion.config import Config
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_loop import GuidanceLoop
-from companion.control.outer_loop import linear_guidance, motion_estimate
+from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import Doublets, ManeuverSequence
 from companion.guidance.source import ManeuverSource
 from companion.recording.trace import FlightTrace
@@ -53,7 +53,7 @@ class Bench:
         self.ground = SimpleNamespace(standing=False, may_idle=True)
         self.guidance_loop = GuidanceLoop(
             self.loop,
-            linear_guidance(Config()),
+            make_guidance(Config()),
             motion_estimate(Config()),
             self.hover,
             self.state,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.config import Config
-from companion.control.outer_loop import disturbance_bandwidth, delay_of_hold, hold_weights
+from companion.control.outer_loop import delay_of_hold, disturbance_bandwidth, hold_weights
 from companion.files import bounded_yaml
 from companion.files.yaml_file import parse
 from tests.control.one_axis import Airframe, hold, settled

@@ -17,10 +17,14 @@ class Bench:
 
     def __init__(self, monkeypatch, judge):
         self.done, self.begun = [], 0
-        ground = (self.phase("checks"),)
-        flying = (self.phase("maneuvers", Exit.LAND),)
-        monkeypatch.setattr("companion.flight.flight.ground_phases", lambda _: ground)
-        monkeypatch.setattr("companion.flight.flight.flight_phases", lambda *_: flying)
+        first, second = self.phase("checks"), self.phase("maneuvers", Exit.LAND)
+
+        async def phases(_):
+            yield first
+            yield second
+
+        self.plan = SimpleNamespace(phases=phases)
+        monkeypatch.setattr("companion.flight.flight.ground_phases", lambda _: (first,))
         landing = (self.phase("land"),)
         monkeypatch.setattr(
             "companion.flight.flight.exit_phases",
@@ -28,7 +32,6 @@ class Bench:
         )
         self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),
-            maneuvers=SimpleNamespace(duration=1.0),
             link=SimpleNamespace(autopilot=None, state=SimpleNamespace(forget=lambda: None)),
             guidance_loop=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
             ground=SimpleNamespace(standing=False),
@@ -49,7 +52,7 @@ class Bench:
 
     def fly(self):
         async def run():
-            flight = Flight(self.context, self.watch, Silent(), None)
+            flight = Flight(self.context, self.plan, self.watch, Silent(), None)
             return await flight.run(), [text for _, text in flight.events]
 
         return asyncio.run(run())

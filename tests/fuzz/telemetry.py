@@ -97,7 +97,7 @@ async def _flown(case: Case, outcome: Outcome) -> None:
             vehicle, judge, case["events"], lambda: session.interrupt("the user (Ctrl-C)")
         )
         environment = Environment(channel.wire.open, realtime=False)
-        session = Session(config, Path(name), outcome, _no, environment)
+        session = Session(config, Path(name), outcome, _no, environment=environment)
         outcome.channel = channel
         living = asyncio.create_task(channel.run())
         pilot = asyncio.create_task(_pilot(vehicle, outcome)) if not case["arm"] else None

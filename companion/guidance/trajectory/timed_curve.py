@@ -110,6 +110,17 @@ class HeldHeading:
 
 
 @dataclass(frozen=True, slots=True)
+class FixedHeading:
+    """Keeps one heading all along, rad."""
+
+    heading: float
+
+    def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
+        """The heading, which does not change."""
+        return self.heading, 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class TangentHeading:
     """Faces along the curve, whose first derivative must never be vertical or zero.
 

@@ -1,0 +1,121 @@
+"""A flight whose phases a program asks for, one after the other."""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncGenerator, Callable, Sequence
+from dataclasses import dataclass, field
+from math import inf
+
+from companion.flight.context import FlightContext
+from companion.flight.phases import Phase, ground_phases, program_phase
+from companion.guidance import ManeuverSequence
+from companion.recording.summary import Summary
+from companion.safety.actions import FlightEnded
+
+_NEXT_CALL = "the program's next call"
+
+
+@dataclass(slots=True, eq=False)
+class Request:
+    """Phases that the program asked for.
+
+    Attributes:
+        phases: returns them; they depend on the autopilot.
+        last: whether the flight ends with them.
+        done: set when the last one has ended.
+    """
+
+    phases: Callable[[FlightContext], Sequence[Phase]]
+    last: bool = False
+    done: asyncio.Future[None] = field(
+        default_factory=lambda: asyncio.get_running_loop().create_future()
+    )
+
+
+class Program:
+    """The plan of a flight that runs what a program requests; between requests it waits.
+
+    In the air under our control it holds the position while it waits, and the safety monitors
+    judge.
+
+    Attributes:
+        maneuvers: none are known before the flight.
+        connected: set with the context when the checks have passed.
+        summary: of the flight, once it has ended.
+        over: whether the last request is done, or the flight has ended without it.
+    """
+
+    def __init__(self) -> None:
+        self.maneuvers = ManeuverSequence(())
+        self.connected: asyncio.Future[FlightContext] = asyncio.get_running_loop().create_future()
+        self.summary: Summary | None = None
+        self.over = False
+        self._waiting: deque[Request] = deque()
+        self._running: Request | None = None
+        self._wake = asyncio.Event()
+        self._ended: Exception | None = None
+
+    async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
+        """The phases on the ground, then the requested ones, until the last request is done."""
+        if self._running is not None:  # the checks are repeated, and what was begun after them
+            self._waiting.appendleft(self._running)
+        for phase in ground_phases(context.config.flight):
+            yield phase
+        if not self.connected.done():
+            self.connected.set_result(context)
+        while True:
+            if not self._waiting:
+                yield self._wait(context)
+            self._running = request = self._waiting.popleft()
+            for phase in request.phases(context):
+                yield phase
+            self._running, self.over = None, request.last
+            if not request.done.done():
+                request.done.set_result(None)
+            if request.last:
+                return
+
+    async def request(
+        self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
+    ) -> None:
+        """Run phases, and wait until they have ended.
+
+        Args:
+            phases: returns them for the flight's context.
+            last: whether the flight ends with them.
+
+        Raises:
+            FlightEnded: the flight ended before or meanwhile; the vehicle is handed back.
+        """
+        if self._ended is not None:
+            raise self._ended
+        request = Request(phases, last)
+        self._waiting.append(request)
+        self._wake.set()
+        await request.done
+
+    def end(self, reason: Exception) -> None:
+        """Note that the flight has ended: raise `reason` where the program waits for it."""
+        self._ended, self.over = reason, True
+        if not self.connected.done():
+            self.connected.set_exception(reason)
+        for request in (self._running, *self._waiting):
+            if request is not None and not request.done.done():
+                request.done.set_exception(reason)
+                request.done.exception()  # nobody may wait for it any more
+
+    def _wait(self, context: FlightContext) -> Phase:
+        if context.loop.offboard_active:
+            return program_phase("hold", _NEXT_CALL, self._next_request, inf)
+        return Phase("stand by", _NEXT_CALL, self._next_request, inf)
+
+    async def _next_request(self, context: FlightContext) -> None:
+        context.detail = _NEXT_CALL
+        while not self._waiting:
+            self._wake.clear()
+            await self._wake.wait()
+
+
+def ended_by(result: str) -> FlightEnded:
+    """The exception for a flight that has ended with `result`."""
+    return FlightEnded("the flight is over" if result == "ok" else result)

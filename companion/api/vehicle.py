@@ -1,0 +1,199 @@
+"""A vehicle that a program flies: each call runs phases of the flight and waits for their end."""
+
+import asyncio
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from companion.api.control import Control
+from companion.api.program import Program
+from companion.api.state import State, state_of
+from companion.config import trajectory_file
+from companion.flight.context import FlightContext
+from companion.flight.control_phases import fly_commanded, fly_maneuvers
+from companion.flight.maneuvers import require_followable
+from companion.flight.phases import hand_back_phase, landing_phases, program_phase, takeoff_phases
+from companion.guidance import Maneuver, ManeuverSequence, Pose
+from companion.guidance.follow import Follow, HeldFigure, hover
+from companion.guidance.reference import Vector
+from companion.guidance.source import CommandedSource
+from companion.guidance.trajectory import Trajectory, line
+from companion.guidance.trajectory.timed_curve import FixedHeading
+from companion.recording.summary import Summary
+from companion.safety.actions import Exit, FlightEnded
+
+_BEGINS_WITHIN = 1.0
+"""Time allowed from control's beginning to the first command, s."""
+
+
+class Vehicle:
+    """One vehicle for one flight; `companion.connect` gives it.
+
+    Every method raises `FlightEnded` once the flight has ended early: a pilot took over, a safety
+    monitor ended it, or the vehicle refused. The vehicle is then handed back already.
+    """
+
+    def __init__(self, program: Program, context: FlightContext) -> None:
+        self._program = program
+        self._context = context
+        self._clock = asyncio.get_running_loop().time
+
+    @property
+    def state(self) -> State:
+        """The newest state of the vehicle.
+
+        Raises:
+            RuntimeError: no position or no attitude has come yet.
+        """
+        return state_of(self._context, self._clock())
+
+    @property
+    def summary(self) -> Summary | None:
+        """What was flown and measured, after the block of `connect`; None before."""
+        return self._program.summary
+
+    async def take_off(self) -> None:
+        """Arm where `flight.arm` allows it (else wait for the pilot), climb, and take over.
+
+        The height is `flight.takeoff_height_m`. The preflight checks run before each step.
+        """
+        await self._program.request(
+            lambda context: takeoff_phases(context.config.flight, context.link.autopilot)
+        )
+
+    async def hold(self, seconds: float) -> None:
+        """Hold the position and the heading for a time, s."""
+        await self._fly(hover(seconds))
+
+    async def go_to(
+        self,
+        position_ned: Vector,
+        *,
+        heading: float | None = None,
+        speed: float = 2.0,
+        acceleration: float = 2.0,
+        jerk: float = 4.0,
+    ) -> None:
+        """Fly a straight line to a position, rest to rest, as fast as the limits given here allow.
+
+        Args:
+            position_ned: m, in the frame of `State.position_ned`.
+            heading: at the end, rad; None: as it is. The vehicle turns before it leaves.
+            speed: largest, m/s.
+            acceleration: largest, m/s².
+            jerk: largest, m/s³.
+
+        Raises:
+            ConfigError: the configured limits or the fence do not allow it; nothing was flown.
+            TrajectoryError: a limit given here is not positive, or the vehicle is there already.
+        """
+        here = self._pose()
+        north, east, down = (
+            there - begin for there, begin in zip(position_ned, here.position_ned, strict=True)
+        )
+        way = line((north, east, down), speed, acceleration, jerk)
+        if heading is None:
+            await self._fly(HeldFigure(way))
+        else:
+            await self.follow(replace(way, heading=FixedHeading(heading)))
+
+    async def follow(self, trajectory: Trajectory | Path | str) -> None:
+        """Follow a trajectory from where the vehicle is; it turns to its heading first.
+
+        Args:
+            trajectory: or its file, as of `flight.trajectory`.
+
+        Raises:
+            ConfigError: the file cannot be read, or the limits or the fence do not allow it;
+                nothing was flown.
+        """
+        if isinstance(trajectory, Path | str):
+            trajectory = await asyncio.to_thread(trajectory_file.load, Path(trajectory))
+        await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
+
+    @asynccontextmanager
+    async def control(self, name: str = "the program") -> AsyncGenerator[Control, None]:
+        """Command the vehicle from this coroutine while the block runs.
+
+        After the block the vehicle is held under our control. If the commands stop for longer than
+        `deadman.target_stale_ms` or the block raises, it is handed back and the flight ends.
+
+        Args:
+            name: of the one who commands, for the events.
+
+        Raises:
+            FlightEnded: control has ended before the block did.
+        """
+        source = CommandedSource(name, self._context.config.deadman.target_stale, _BEGINS_WITHIN)
+        work = partial(fly_commanded, source=source)
+        phase = program_phase("control", f"{name} to end its control", work)
+        flown = asyncio.create_task(self._program.request(lambda _: (phase,)))
+        try:
+            await self._begun(source, flown)
+            yield Control(self._context, source, flown)
+        except BaseException as error:
+            if not isinstance(error, FlightEnded):
+                source.fail(f"{name} raised {error!r}")
+            raise
+        finally:
+            source.end()
+            await asyncio.wait({flown})
+            if not flown.cancelled():
+                flown.exception()
+        flown.result()
+
+    async def land(self) -> None:
+        """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
+        await self._program.request(
+            lambda context: landing_phases(context.config.flight), last=True
+        )
+
+    async def hand_back(self) -> None:
+        """Let the autopilot hold the vehicle; the flight ends."""
+        await self._program.request(lambda _: (hand_back_phase(),), last=True)
+
+    async def leave(self) -> None:
+        """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
+        if self._context.loop.offboard_active:
+            await self.hand_back()
+        else:
+            await self._program.request(lambda _: (), last=True)
+
+    async def _begun(self, source: CommandedSource, flown: asyncio.Task[None]) -> None:
+        """Wait until guidance flies the source.
+
+        Raises:
+            FlightEnded: the flight ended before.
+        """
+        while source.pose is None:
+            done, _ = await asyncio.wait({flown}, timeout=0.01)
+            if done:
+                flown.result()
+
+    async def _fly(self, maneuver: Maneuver) -> None:
+        self._require_control()
+        self._require_followable(maneuver)
+        sequence = ManeuverSequence((maneuver,))
+        work = partial(fly_maneuvers, sequence=sequence)
+        await self._program.request(
+            lambda _: (program_phase("maneuvers", "the maneuver to end", work, sequence.duration),)
+        )
+
+    def _require_followable(self, maneuver: Maneuver) -> None:
+        origin = self._context.snapshot_builder.origin_ned or (0.0, 0.0, 0.0)
+        north, east, down = (
+            here - begin for here, begin in zip(self._pose().position_ned, origin, strict=True)
+        )
+        require_followable(self._context.config, maneuver, (north, east, down))
+
+    def _require_control(self) -> None:
+        if not self._context.loop.offboard_active:
+            raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
+
+    def _pose(self) -> Pose:
+        self._require_control()
+        pose = self._context.guidance_loop.flown.pose
+        assert pose is not None
+        return pose

@@ -1,0 +1,47 @@
+"""A planner of another package, whose body rates are checked and limited."""
+
+from math import isfinite
+
+from companion.attitude.limits import Limits
+from companion.attitude.planner import Planner
+from companion.attitude.rotation import limit_rates
+from companion.attitude.types import AttitudeError, BodyRates, Quaternion, Target
+
+
+class InvalidRatesError(AttitudeError):
+    """A planner of another package returned rates that are not finite."""
+
+
+class WithinLimits:
+    """Limits another planner's rates to the largest tilt rate and yaw rate.
+
+    Args:
+        planner: whose rates are limited.
+        limits: of the rates.
+    """
+
+    def __init__(self, planner: Planner, limits: Limits) -> None:
+        self._planner = planner
+        self._tilt_rate, self._yaw_rate = limits.tilt_rate, limits.yaw_rate
+
+    def rates(
+        self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
+    ) -> BodyRates:
+        """The planner's body rates within the limits, rad/s.
+
+        Raises:
+            InvalidRatesError: they are not finite.
+            AttitudeError: the planner has no answer to this attitude or target.
+        """
+        roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
+        if not (isfinite(roll) and isfinite(pitch) and isfinite(yaw)):
+            raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}")
+        return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
+
+    def note_attitude_target(self, q: Quaternion, age: float) -> None:
+        """Pass it on."""
+        self._planner.note_attitude_target(q, age)
+
+    def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
+        """Pass it on."""
+        self._planner.reset(q, body_rates)

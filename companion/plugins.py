@@ -1,0 +1,49 @@
+"""Planners and guidance of other packages, found by their entry points."""
+
+from collections.abc import Sequence
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+PLANNERS = "companion.planners"
+"""Entry points of planners: a law (`companion.attitude.Law`), or a class of planners that is made
+of `companion.attitude.Constants`."""
+GUIDANCE = "companion.guidance"
+"""Entry points of guidance: a class by the Protocol `companion.guidance.linear.Guidance`, made of
+`LinearSettings`."""
+
+
+class PluginError(Exception):
+    """A plug-in is not installed or cannot be loaded; the message says which and why."""
+
+
+def names(group: str) -> tuple[str, ...]:
+    """The names of the installed plug-ins of a group, sorted."""
+    return tuple(sorted({each.name for each in entry_points(group=group)}))
+
+
+def load(group: str, name: str) -> Any:
+    """The object that an entry point names.
+
+    Raises:
+        PluginError: there is no such plug-in, two packages give it, or its package fails.
+    """
+    found = tuple(entry_points(group=group, name=name))
+    if len(found) != 1:
+        raise PluginError(_not_one(group, name, found))
+    try:
+        return found[0].load()
+    except Exception as error:
+        raise PluginError(
+            f"the plug-in {name!r} ({_origin(found[0])}) cannot be loaded: {error!r}"
+        ) from error
+
+
+def _not_one(group: str, name: str, found: Sequence[EntryPoint]) -> str:
+    if found:
+        return f"{' and '.join(map(_origin, found))} both give a plug-in {name!r}; uninstall one"
+    return f"no plug-in {name!r} in {group}; installed: {', '.join(names(group)) or 'none'}"
+
+
+def _origin(entry_point: EntryPoint) -> str:
+    package = entry_point.dist.name if entry_point.dist is not None else "an unknown package"
+    return f"{entry_point.value} of {package}"

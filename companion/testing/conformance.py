@@ -1,0 +1,130 @@
+"""Checks for planners and guidance of other packages, to be called from their own tests."""
+
+import random
+from collections.abc import Sequence
+from math import cos, hypot, inf, isfinite, radians, sin, sqrt, tau
+from typing import Any
+
+from companion import plugins
+from companion.attitude import (
+    BodyRates,
+    Coefficients,
+    Law,
+    Limits,
+    Planner,
+    Quaternion,
+    Target,
+    attitude,
+    coefficients,
+    make_planner,
+)
+from companion.attitude.rotation import turned
+from companion.testing.flying import fly
+from companion.testing.vehicle import MockVehicle
+
+_LIMITS = Limits(max_tilt=radians(40.0), max_tilt_rate=radians(200.0), max_yaw_rate=radians(90.0))
+_GAIN = 5.0
+_DT = 0.004
+_CASES = 200
+_SETTLES = 3.0
+"""Time allowed for a step, s: 15 time constants of `_GAIN`."""
+_CLOSE = 0.02
+"""Largest error of the coefficients that remains after a step."""
+_WORST = 1.5
+"""Largest distance from the reference of a hover and a circle, m."""
+
+
+def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
+    """Check that a planner may fly: finite, within limits, q and −q alike, and it converges.
+
+    Args:
+        planner: a law, a class of planners, or the name of one, installed plug-ins included.
+        seed: of the attitudes and targets.
+
+    Raises:
+        AssertionError: it may not fly; says for which attitude and target.
+        PluginError: there is no planner of that name.
+    """
+    if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
+        planner = plugins.load(plugins.PLANNERS, planner)
+    rng = random.Random(seed)
+    for _ in range(_CASES):
+        q, target = _any_attitude(rng), _any_target(rng)
+        rates = _first_rates(planner, q, target)
+        case = f"at q = {q} towards {target}"
+        assert all(map(isfinite, rates)), f"rates {rates} are not finite, {case}"
+        tilt_rate = hypot(rates.roll, rates.pitch)
+        assert tilt_rate <= (_LIMITS.max_tilt_rate or inf) * (1.0 + 1e-9), (
+            f"a roll-pitch rate of {tilt_rate} rad/s exceeds the limit, {case}"
+        )
+        assert abs(rates.yaw) <= (_LIMITS.max_yaw_rate or inf) * (1.0 + 1e-9), (
+            f"a yaw rate of {rates.yaw} rad/s exceeds the limit, {case}"
+        )
+        w, x, y, z = q
+        other = _first_rates(planner, (-w, -x, -y, -z), target)
+        apart = max(abs(a - b) for a, b in zip(rates, other, strict=True))
+        assert apart < 1e-6, f"q and −q give rates that differ by {apart} rad/s, {case}"
+    for _ in range(_CASES // 20):
+        _check_convergence(planner, _any_target(rng), _any_target(rng))
+
+
+def check_guidance(name: str) -> None:
+    """Check installed guidance by flights on both mock vehicles: a hover and a circle.
+
+    Args:
+        name: of its entry point in `companion.guidance`.
+
+    Raises:
+        AssertionError: a flight ended early, or strayed too far from its reference.
+        ConfigError: there is no guidance of that name, or it cannot be loaded.
+    """
+    told: dict[str, dict[str, Any]] = {
+        "guidance": {"kind": name},
+        "flight": {"arm": True, "maneuvers": ["hover", "circle"]},
+    }
+    for autopilot, hover in (("px4", 0.49), ("ardupilot", 0.364)):
+        vehicle = MockVehicle(autopilot, parameters=_SAFE.get(autopilot, {}))
+        summary = fly({**told, "thrust": {"hover_thrust": hover}}, vehicle)
+        assert summary.result == "ok", f"{autopilot}: {summary.result}"
+        strayed = summary.tracking()["position_max_m"]
+        assert strayed < _WORST, f"{autopilot}: {strayed:.2f} m away from its reference"
+
+
+_SAFE = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
+"""Parameters without which the preflight checks refuse the vehicle."""
+
+
+def _made(planner: str | Law | type[Planner]) -> Planner:
+    return make_planner(planner, gain=_GAIN, limits=_LIMITS)
+
+
+def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Target) -> BodyRates:
+    made, still = _made(planner), BodyRates(0.0, 0.0, 0.0)
+    made.reset(q, still)
+    return BodyRates(*made.rates(q, target, _DT, still))
+
+
+def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: Target) -> None:
+    made, rates = _made(planner), BodyRates(0.0, 0.0, 0.0)
+    q = attitude(Coefficients(begin.north, begin.east), begin.heading)
+    made.reset(q, rates)
+    for _ in range(round(_SETTLES / _DT)):
+        rates = BodyRates(*made.rates(q, end, _DT, rates))
+        q = turned(q, rates, _DT)
+    reached = coefficients(q)
+    left = hypot(reached.north - end.north, reached.east - end.east)
+    assert left < _CLOSE, (
+        f"after {_SETTLES:g} s its coefficients are {left:.3f} away from {end}; it began at {begin}"
+    )
+
+
+def _any_attitude(rng: random.Random) -> Quaternion:
+    values: Sequence[float] = [rng.gauss(0.0, 1.0) for _ in range(4)]
+    length = sqrt(sum(value * value for value in values))
+    w, x, y, z = (value / length for value in values)
+    return w, x, y, z
+
+
+def _any_target(rng: random.Random) -> Target:
+    length, direction = sin(_LIMITS.max_tilt or 0.0) * rng.random(), tau * rng.random()
+    return Target(length * cos(direction), length * sin(direction), tau * rng.random())

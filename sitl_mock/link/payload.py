@@ -1,0 +1,89 @@
+"""Payloads of pymavlink's message classes: message to bytes and back.
+
+Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take
+three times as long, because they find out at every frame what depends on the class only.
+"""
+
+from collections.abc import Callable, Iterable
+from functools import cache
+from itertools import accumulate, chain
+from operator import attrgetter, itemgetter
+from typing import Any
+
+Message = Any
+"""A pymavlink message object; the generated classes have no usable types."""
+
+
+def pack(message: Message) -> bytes:
+    """Return the payload of a message, with its trailing zeros."""
+    kind: Any = type(message)
+    payload: bytes = kind.unpacker.pack(*_wire_values(kind)(message))
+    return payload
+
+
+def unpack(kind: Any, payload: bytes) -> Message:
+    """Return the message of a class with this payload.
+
+    Missing bytes are zero (MAVLink 2 truncates them); bytes after the last known field are ignored.
+    """
+    layout = kind.unpacker
+    size = layout.size
+    return kind(*_arguments(kind)(layout.unpack(payload.ljust(size, b"\0")[:size])))
+
+
+@cache
+def _wire_values(kind: Any) -> Callable[[Message], Iterable[Any]]:
+    """Return the function that lists the field values of a message class in wire order."""
+    names = kind.ordered_fieldnames
+    texts = _texts(kind)
+    fields = attrgetter(*(f"_{name}_raw" if name in texts else name for name in names))
+    if len(names) == 1:
+        return lambda message: (fields(message),)
+    arrays = [
+        bool(length) and name not in texts
+        for name, length in zip(names, kind.array_lengths, strict=True)
+    ]
+    if not any(arrays):
+        return fields
+    if sum(arrays) == 1:
+        at = arrays.index(True)
+
+        def flat(message: Message) -> Iterable[Any]:
+            values = fields(message)
+            return (*values[:at], *values[at], *values[at + 1 :])
+
+        return flat
+    return lambda message: chain.from_iterable(
+        value if array else (value,) for value, array in zip(fields(message), arrays, strict=True)
+    )
+
+
+@cache
+def _arguments(kind: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
+    """Return the function that turns values in wire order into constructor arguments."""
+    lengths = kind.lengths
+    starts = (0, *accumulate(lengths))
+    if sum(lengths) == len(lengths) > 1 and not _texts(kind):
+        return itemgetter(*kind.orders)
+    picks = [
+        starts[order] if lengths[order] == 1 else slice(starts[order], starts[order + 1])
+        for order in kind.orders
+    ]
+    texts = [kind.fieldnames.index(name) for name in _texts(kind)]
+
+    def arguments(values: tuple[Any, ...]) -> Iterable[Any]:
+        picked = [list(values[pick]) if isinstance(pick, slice) else values[pick] for pick in picks]
+        for index in texts:
+            picked[index] = picked[index].rstrip(b"\0")
+        return picked
+
+    return arguments
+
+
+def _texts(kind: Any) -> set[str]:
+    """Return the names of the text fields of a message class."""
+    return {
+        name
+        for name, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+        if type_ == "char"
+    }

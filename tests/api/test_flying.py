@@ -1,0 +1,244 @@
+"""Programs that fly by `companion.connect`, against the mock vehicle in memory."""
+
+import asyncio
+from math import dist, hypot, pi
+
+import numpy as np
+import pytest
+
+import companion
+from companion.config import trajectory_file
+from companion.files.yaml_file import ConfigError
+from companion.guidance import Pose
+from companion.guidance.follow import HeldFigure
+from companion.testing import MockVehicle, connect, run
+from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QUICK_PARAMETERS, merged
+from tests.flight.test_tracking import FAST
+
+BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+
+
+class Told:
+    """An observer that keeps the events."""
+
+    def __init__(self):
+        self.events = []
+
+    def phase(self, name, waits_for):
+        self.events.append(f"phase {name}")
+
+    def waiting(self, *_):
+        pass
+
+    def event(self, _, text):
+        self.events.append(text)
+
+
+def flown(program, mock, folder=None, **changes):
+    """Run `program(vehicle)` on the mock's clock; returns the summary and what was told."""
+    told = Told()
+    usual = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(mock.autopilot, {}))
+
+    async def main():
+        async with connect(merged(usual, changes), mock, folder, told) as vehicle:
+            await program(vehicle)
+        return vehicle.summary
+
+    return run(mock, main()), told.events
+
+
+def mock_vehicle(autopilot="px4"):
+    """A mock that takes off and lands quickly."""
+    return MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+
+
+@BOTH
+def test_it_takes_off_flies_to_places_and_lands(autopilot):
+    at = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        north, east, down = vehicle.state.position_ned
+        for place in ((north + 4.0, east, down), (north + 4.0, east + 3.0, down - 1.0)):
+            await vehicle.go_to(place, speed=3.0)
+            at.append(dist(vehicle.state.position_ned, place))
+        await vehicle.go_to((north, east, down), heading=0.5 * pi)
+        at.append(dist(vehicle.state.position_ned, (north, east, down)))
+        at.append(abs(vehicle.state.heading - 0.5 * pi))
+        await vehicle.land()
+
+    mock = mock_vehicle(autopilot)
+    summary, _ = flown(program, mock)
+    state = mock.state()
+    assert summary.result == "ok"
+    assert (state["armed"], state["crashed"]) == (False, False)
+    assert max(at) < 0.1, at
+
+
+@BOTH
+def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(autopilot):
+    errors = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        start = np.array(vehicle.state.position_ned)
+        there = start + np.array([3.0, -2.0, -1.0])
+        async with vehicle.control() as control:
+            async for state in control.states(seconds=8.0):
+                error = there - state.position_ned
+                wanted = 1.2 * error - 2.0 * np.array(state.velocity_ned)
+                control.accelerate(tuple(np.clip(wanted, -3.0, 3.0)))
+        errors.append(np.abs(there - vehicle.state.position_ned).max())
+        await vehicle.land()
+
+    mock = mock_vehicle(autopilot)
+    summary, _ = flown(program, mock)
+    assert summary.result == "ok"
+    assert errors[0] < 0.15
+
+
+@pytest.mark.parametrize(("period", "with_jerk"), [(0.02, False), (0.04, True)])
+def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
+    tmp_path, period, with_jerk
+):
+    """A figure-eight up to 5 m/s: by `follow`, and streamed by a coroutine every `period` s."""
+    eight = trajectory_file.load(CONFIGS / "trajectories" / "figure8.yaml")
+    quick = {key: FAST[key] for key in ("limits", "guidance", "thrust")}
+
+    async def built_in(vehicle):
+        await vehicle.take_off()
+        await vehicle.follow(eight)
+        await vehicle.land()
+
+    async def streamed(vehicle):
+        await vehicle.take_off()
+        start = Pose(vehicle.state.position_ned, vehicle.state.heading)
+        maneuver, clock = HeldFigure(eight), asyncio.get_running_loop().time
+        async with vehicle.control() as control:
+            began = clock()
+            while clock() - began < eight.duration:
+                now = clock() - began
+                jerk = eight.at(now).jerk if with_jerk else None
+                control.follow(maneuver.at(now, start), jerk)
+                await asyncio.sleep(period)
+        await vehicle.land()
+
+    error = {}
+    for program in (built_in, streamed):
+        mock = mock_vehicle()
+        summary, _ = flown(program, mock, **quick)
+        assert summary.result == "ok"
+        error[program.__name__] = summary.tracking()["position_rms_m"]
+    assert error["built_in"] < 0.1
+    assert error["streamed"] < 1.2 * error["built_in"] + 0.005, error
+
+
+async def stops(control):
+    """Commands nothing any more, and goes on."""
+    control.accelerate((0.5, 0.0, 0.0))
+    await asyncio.sleep(5.0)
+
+
+async def raises(control):
+    """Fails."""
+    control.accelerate((0.5, 0.0, 0.0))
+    await asyncio.sleep(0.1)
+    raise ZeroDivisionError("mine")
+
+
+async def returns_nan(control):
+    """Commands what is no number."""
+    control.accelerate((0.5, 0.0, 0.0))
+    await asyncio.sleep(0.1)
+    control.accelerate((float("nan"), 0.0, 0.0))
+
+
+async def returns_infinity(control):
+    """Commands what no vehicle does."""
+    control.rotate((0.0, float("inf"), 0.0))
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("fault", "error", "reason"),
+    [
+        (stops, companion.FlightEnded, "the program gave no new command for"),
+        (raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
+        (returns_nan, ValueError, "a command must be finite"),
+        (returns_infinity, ValueError, "a command must be finite"),
+    ],
+)
+def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(
+    tmp_path, autopilot, fault, error, reason
+):
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            await fault(control)
+
+    mock = mock_vehicle(autopilot)
+    with pytest.raises(error):
+        flown(program, mock, tmp_path)
+    state = mock.until(lambda state: hypot(*state["velocity"][:2]) < 0.3)
+    events = (tmp_path / "summary.json").read_text()
+    assert reason in events
+    assert state["mode"] in ("LOITER", "BRAKE")
+    assert (state["armed"], state["crashed"]) == (True, False)
+
+
+def test_a_pilot_who_takes_over_ends_the_program_at_once(tmp_path):
+    seen = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            mock.take_over("POSCTL")
+            async for _ in control.states(seconds=20.0):
+                control.accelerate((0.0, 0.0, 0.0))
+                seen.append(1)
+
+    mock = mock_vehicle()
+    with pytest.raises(companion.FlightEnded, match="took over: mode POSCTL"):
+        flown(program, mock, tmp_path)
+    assert mock.state()["mode"] == "POSCTL"
+    assert len(seen) < 500
+
+
+def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_path):
+    async def program(vehicle):
+        await vehicle.take_off()
+        north, east, down = here = vehicle.state.position_ned
+        with pytest.raises(ConfigError, match="fence"):
+            await vehicle.go_to((north + 500.0, east, down))
+        with pytest.raises(ConfigError, match="limits"):
+            await vehicle.go_to((north + 20.0, east, down), speed=15.0, acceleration=30.0, jerk=1e3)
+        await vehicle.hold(2.0)
+        assert dist(here, vehicle.state.position_ned) < 0.1
+        await vehicle.land()
+
+    mock = mock_vehicle()
+    summary, _ = flown(program, mock)
+    assert summary.result == "ok"
+
+
+def test_a_program_that_ends_in_the_air_hands_back(tmp_path):
+    async def program(vehicle):
+        await vehicle.take_off()
+
+    mock = mock_vehicle()
+    summary, told = flown(program, mock)
+    state = mock.state()
+    assert summary.result == "ok"
+    assert state["mode"] == "LOITER"
+    assert "phase hand back" in told
+
+
+def test_before_take_off_nothing_flies(tmp_path):
+    async def program(vehicle):
+        with pytest.raises(companion.FlightEnded, match="take off first"):
+            await vehicle.hold(1.0)
+
+    mock = mock_vehicle()
+    summary, _ = flown(program, mock)
+    assert mock.state()["armed"] is False
+    assert summary.result == "ok"

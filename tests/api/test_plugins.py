@@ -1,0 +1,181 @@
+"""Planners and guidance of another package: found, checked, flown, limited."""
+
+import sys
+from importlib import invalidate_caches
+from math import hypot, nan
+
+import pytest
+
+from companion.attitude import BodyRates, InvalidTargetError, Limits, Target
+from companion.attitude.within_limits import InvalidRatesError, WithinLimits
+from companion.config import Config
+from companion.control.inner_loop import planner
+from companion.control.outer_loop import make_guidance
+from companion.files.yaml_file import ConfigError, parse
+from companion.testing import MockVehicle, check_guidance, check_planner, fly
+from tests.flight.fly import QUICK_FLIGHT, QUICK_PARAMETERS, merged
+
+CODE = """
+from companion.attitude.first_order import first_order
+from companion.guidance.linear import LinearGuidance
+
+def mine(q, target, dt, constants):
+    return first_order(q, target, dt, constants)
+
+def nothing(q, target, dt, constants):
+    return float("nan"), 0.0, 0.0
+
+def wild(q, target, dt, constants):
+    roll, pitch, yaw = first_order(q, target, dt, constants)
+    return 100.0 * roll, 100.0 * pitch, yaw
+
+def lazy(q, target, dt, constants):
+    return 0.0, 0.0, 0.0
+
+def one_sided(q, target, dt, constants):
+    return q[0], 0.0, 0.0
+
+class Remembering:
+    def __init__(self, constants):
+        self.constants, self.made = constants, 0
+    def rates(self, q, target, dt, body_rates=None):
+        self.made += 1
+        return first_order(q, target, dt, self.constants)
+    def note_attitude_target(self, q, age):
+        pass
+    def reset(self, q, body_rates=None):
+        self.made = 0
+
+class Calm(LinearGuidance):
+    pass
+
+class Drifting(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        def aside(at):
+            reference = reference_at(at)
+            north, east, down = reference.position_ned
+            return reference._replace(position_ned=(north + 3.0, east, down))
+        return super().command(aside, time, inputs)
+"""
+ENTRY_POINTS = """
+[companion.planners]
+mine = theirs:mine
+nothing = theirs:nothing
+wild = theirs:wild
+lazy = theirs:lazy
+one-sided = theirs:one_sided
+remembering = theirs:Remembering
+missing = theirs:not_there
+
+[companion.guidance]
+calm = theirs:Calm
+drifting = theirs:Drifting
+"""
+
+
+@pytest.fixture(autouse=True)
+def installed(tmp_path, monkeypatch):
+    """A package with plug-ins, installed as pip does."""
+    (tmp_path / "theirs.py").write_text(CODE)
+    info = tmp_path / "their_package-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: their-package\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    invalidate_caches()
+    yield
+    sys.modules.pop("theirs", None)
+
+
+def config(text):
+    return parse(text, "test", Config)
+
+
+@pytest.mark.parametrize("name", ["mine", "remembering"])
+def test_a_planner_of_another_package_flies_by_its_name(name):
+    vehicle = MockVehicle("px4", prearm_delay_s=0.2, parameters=QUICK_PARAMETERS["px4"])
+    summary = fly(merged(QUICK_FLIGHT, {"planner": {"name": name}}), vehicle)
+    assert (summary.result, summary.planner) == ("ok", name)
+    assert summary.tracking()["position_max_m"] < 0.5
+
+
+def test_what_it_commands_is_limited():
+    told = config("planner: {name: wild}\nlimits: {max_tilt_rate_deg_s: 60}")
+    rates = planner(told).rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
+    assert hypot(rates.roll, rates.pitch) == pytest.approx(told.limits.max_tilt_rate)
+
+
+def test_rates_that_are_not_finite_are_refused():
+    made = planner(config("planner: {name: nothing}"))
+    with pytest.raises(InvalidRatesError):
+        made.rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
+    with pytest.raises(InvalidTargetError):
+        planner(config("planner: {name: mine}")).rates(
+            (1.0, 0.0, 0.0, 0.0), Target(nan, 0.0, 0.0), 0.004
+        )
+
+
+def test_the_rest_of_a_planner_is_passed_on():
+    class Spy:
+        def rates(self, *_):
+            return BodyRates(0.0, 0.0, 0.0)
+
+        def reset(self, *arguments):
+            self.was_reset = arguments
+
+        def note_attitude_target(self, *arguments):
+            self.noted = arguments
+
+    spy = Spy()
+    made = WithinLimits(spy, Limits())
+    made.reset((1.0, 0.0, 0.0, 0.0), None)
+    made.note_attitude_target((1.0, 0.0, 0.0, 0.0), 0.1)
+    assert spy.was_reset == ((1.0, 0.0, 0.0, 0.0), None)
+    assert spy.noted == ((1.0, 0.0, 0.0, 0.0), 0.1)
+
+
+def test_guidance_of_another_package_flies_by_its_name():
+    assert type(make_guidance(config("guidance: {kind: calm}"))).__name__ == "Calm"
+    check_guidance("calm")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("planner: {name: their}", "unknown planner 'their'; known: auto, .*, lazy, mine"),
+        ("guidance: {kind: their}", "unknown guidance 'their'; known: linear, nmpc, calm"),
+    ],
+)
+def test_an_unknown_name_is_answered_with_those_that_are_installed(text, message):
+    with pytest.raises(ConfigError, match=message):
+        config(text)
+
+
+def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
+    told = config("planner: {name: missing}")
+    with pytest.raises(ConfigError, match=r"'missing' \(theirs:not_there of their-package\)"):
+        planner(told)
+
+
+@pytest.mark.parametrize("name", ["first-order", "exact", "quaternion", "mine", "remembering"])
+def test_good_planners_conform(name):
+    check_planner(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("nothing", "are not finite"),
+        ("wild", "exceeds the limit"),
+        ("lazy", "away from"),
+        ("one-sided", "q and −q"),
+    ],
+)
+def test_bad_planners_do_not(name, why):
+    with pytest.raises(AssertionError, match=why):
+        check_planner(name)
+
+
+def test_guidance_that_strays_does_not_conform():
+    with pytest.raises(AssertionError, match="away from its reference"):
+        check_guidance("drifting")
