@@ -119,7 +119,7 @@ class GuidanceLoop:
         self.flown.pose = Pose(position_ned, self._heading())
 
     def hold_reference(self) -> None:
-        """Hold the pose of the present reference, in which a maneuver has ended."""
+        """Hold the pose of the present reference, at which a maneuver has ended."""
         now = self._clock()
         reference = self.flown.reference(now, self.motion_now(), self._heading())(now)
         self.stand_by()
@@ -151,19 +151,19 @@ class GuidanceLoop:
             await self._ticker.tick()
 
     def step_soon(self) -> None:
-        """Make the next command at once: the source has a new reference."""
+        """Make the next command at once, because the source has a new reference."""
         self._ticker.soon()
 
     def motion_now(self) -> VehicleMotion:
-        """The estimated motion now, in the frame without resets.
+        """The estimated motion now, in the frame without estimator resets.
 
         Raises:
-            RuntimeError: no position came yet.
+            RuntimeError: no position has come yet.
         """
         return self._guidance_input(self._clock()).now
 
     def attitude(self) -> Quaternion:
-        """The newest attitude, in the frame without resets."""
+        """The newest attitude, in the frame without estimator resets."""
         return self._loop.resets.attitude(self._q)
 
     def step(self) -> None:

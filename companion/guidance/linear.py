@@ -83,7 +83,7 @@ class Guidance(Protocol):
     def acts_after(self) -> float:
         """Mean delay from computing a command until the vehicle responds to its feedback, s.
 
-        `GuidanceInput.acts` is predicted by it.
+        `GuidanceInput.acts` is predicted for this time.
         """
         ...
 

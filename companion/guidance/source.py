@@ -19,7 +19,7 @@ class Source(Protocol):
 
     @property
     def failure(self) -> str | None:
-        """Why the source has nothing to fly any more although it is not finished, or None."""
+        """Why the source cannot continue although it is not finished; None: it can."""
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -47,7 +47,7 @@ class ManeuverSource:
         maneuvers: the maneuvers to fly.
         begun_at: when they began, or None.
         pose: the pose at which they began, or None.
-        failure: None; a maneuver that is given up is held by guidance.
+        failure: always None; guidance itself holds when a maneuver is given up.
     """
 
     failure: str | None = None
@@ -150,7 +150,7 @@ class CommandedSource:
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, extrapolated; if it is too old, a hold of the present position."""
         newest, given_at = self._newest, self._given_at
-        if now - given_at > self._patience and self.silent_since is None:
+        if now - given_at > self._longest_silence and self.silent_since is None:
             self.silent_since = now
             if newest is not None:
                 self._held = Reference(motion.position_ned, heading=newest.heading)
@@ -161,18 +161,18 @@ class CommandedSource:
         return lambda time: continued(newest, jerk, time - given_at)
 
     @property
-    def _patience(self) -> float:
+    def _longest_silence(self) -> float:
         return self._begins_within if self._newest is None else self._stale
 
     @property
     def failure(self) -> str | None:
-        """Why control must end: told by `fail`, or the references have stopped."""
+        """Why control must end: the reason given to `fail`, or that references have stopped."""
         if self._failure is not None or self.silent_since is None or self._ended:
             return self._failure
-        return f"{self.name} gave no new command for {self._patience:g} s"
+        return f"{self.name} gave no new command for {self._longest_silence:g} s"
 
     def fail(self, reason: str) -> None:
-        """Give no more references, because of `reason`."""
+        """Note that no more references will come, because of `reason`."""
         self._failure = reason
 
     def finished(self, now: float) -> bool:

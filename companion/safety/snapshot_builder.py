@@ -84,7 +84,7 @@ class SnapshotBuilder:
 
     @property
     def origin_ned(self) -> Vector | None:
-        """Where control began, m, or None before."""
+        """Position where control began, m NED, or None before."""
         return self._start
 
     def listen(self, now: float) -> None:
