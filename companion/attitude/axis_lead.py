@@ -44,7 +44,7 @@ class AxisLead:
 
         Args:
             dt: time between the two plans, s.
-            heading: of the body, less the turn that is predicted since the plans began, rad.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
         """
         rate, slope = self._planned_rate(heading)
         self.advance()

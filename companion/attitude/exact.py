@@ -23,7 +23,7 @@ LONGEST_SAMPLE = 1.0
 _SETTLED = 1e-14
 """The fixed-point iteration ends when its factor changes by less than this."""
 _MAX_ITERATIONS = 20
-"""Of the fixed point; 4 are usual, as each reduces the error to about θ²/12 of it."""
+"""Largest number of fixed-point iterations; 4 are usual, each leaves about θ²/12 of the error."""
 
 
 def exact(

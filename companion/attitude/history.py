@@ -170,8 +170,8 @@ class SampleHold:
 
     Each plan reaches ahead by the expected sample period, and the vehicle holds its rates until the
     next sample. If that comes late or early (PX4: after 4 or 8 ms, ArduPilot: some in pairs), the
-    vehicle has turned too far or not far enough, which would bend the line of a step. The next
-    rates correct this, for a delay of one period at most.
+    vehicle has turned too far or not far enough, and a step would not be straight. The next rates
+    correct this, for a delay of one period at most.
 
     Attributes:
         late: how much later than expected the sample came, s.

@@ -215,7 +215,7 @@ class ModelFollowingPlanner:
 
         Args:
             target: an admissible target.
-            heading: of the body, less the turn that is predicted since the plans began, rad.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
             yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: s.
         """

@@ -164,7 +164,7 @@ class TargetFrame:
         It is computed from the newest attitude target, or without one from `RateResponse.lead`.
 
         Args:
-            heading: of the body, less the turn that is predicted since the plans began, rad.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
             plans: plans of tilt and heading.
         """
         reported = self.heading()

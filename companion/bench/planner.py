@@ -211,9 +211,9 @@ def _show(figures: dict[str, Any]) -> None:
 
 
 def _cell(ns: float, ratio: float | None) -> str:
-    shown = _short(ns)
+    shown = _short_number(ns)
     return shown if ratio is None else f"{shown} {ratio:.0f}×"
 
 
-def _short(number: float) -> str:
+def _short_number(number: float) -> str:
     return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"

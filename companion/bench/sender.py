@@ -105,7 +105,7 @@ class Sender:
             if time.monotonic() > beat:
                 beat = time.monotonic() + 0.5
                 self.heartbeat()
-            self._sample()
+            self._send_sample()
             answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
 
     def play(self, rate_hz: float, seconds: float) -> None:
@@ -116,26 +116,26 @@ class Sender:
         """
         self._contestant.check_running()
         self.heartbeat()
-        due = self._samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
+        due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._under_way.clear()
         self._recording = True
         cpu, began = self._contestant.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
-        self._samples(count, rate_hz, due)
+        self._send_samples(count, rate_hz, due)
         self.sent += count
         self.cpu_ns += self._contestant.cpu_ns() - cpu
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 
-    def _samples(self, count: int, rate_hz: float, due: int) -> int:
+    def _send_samples(self, count: int, rate_hz: float, due: int) -> int:
         period_ns = round(1e9 / rate_hz)
         for _ in range(count):
-            self._sample()
+            self._send_sample()
             due += period_ns
             self._listen_until(due)
         return due
 
-    def _sample(self) -> None:
+    def _send_sample(self) -> None:
         # The stamp follows real time, and is unique because it identifies the answer.
         self._time_ms = max(self._time_ms + 1, (time.perf_counter_ns() - self._boot) // 1_000_000)
         frame = self._pack(

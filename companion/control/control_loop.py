@@ -58,7 +58,7 @@ class ControlLoop:
     Attributes:
         command: the newest command, written by guidance; None before the first.
         on: whether samples are answered at all.
-        taking_over: whether offboard was requested, so that it may become active at any moment.
+        taking_over: whether offboard was requested and may become active at any moment.
         offboard_active: whether the autopilot obeys the setpoints.
         awaiting_mode: whether the loop waits for `resume` after a gap.
         resets: estimator resets, which the planner does not see.

@@ -7,7 +7,7 @@ work in a frame without these jumps:
 
 - All position jumps are subtracted from a position.
 - Poses, references and targets have headings without jumps. An attitude is turned back by all
-  heading jumps before its heading is compared with theirs.
+  heading jumps before its heading is compared with these headings.
 
 Horizontal accelerations stay in the estimator's frame, in which position is measured, so a
 corrected heading improves them at once.
@@ -24,9 +24,9 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 _LONGEST = 0.1
 """Attitudes further apart than this are not compared, s: the rates between them are unknown."""
 _ANGLE = radians(4.0)
-"""Smallest attitude jump that is told from noise, rad; the controller follows smaller ones."""
+"""Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _DISTANCE = 0.2
-"""Smallest position jump that is told from noise, m."""
+"""Smallest position jump that is recognised, m; smaller ones count as noise."""
 _LONGEST_POSITIONS = 0.5
 """Positions further apart than this are not compared, s."""
 _ACCELERATION_CHANGE = 10.0

@@ -129,7 +129,7 @@ class MotionEstimate:
         return now + (position.vehicle_time - position.received if offset is None else offset)
 
     def mismatch_warning(self) -> str | None:
-        """Advice to change the drag keys if the learned drag differs from theirs; else None."""
+        """Advice to change the drag keys if the learned drag differs from them; else None."""
         assumed, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
         error = learned.per_velocity(speed) - assumed.per_velocity(speed)
         if not self.drag.certain or abs(error) <= _MISMATCH:

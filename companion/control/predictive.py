@@ -24,8 +24,8 @@ class Following(NamedTuple):
 
     Attributes:
         part: the trajectory as a maneuver.
-        time: since the maneuver began, s.
-        pose: where the maneuver began.
+        time: time since the maneuver began, s.
+        pose: pose at which the maneuver began.
         turn: sum of the heading resets, rad; the solver works in the estimator's own frame.
     """
 

@@ -73,8 +73,8 @@ class Fence:
         """How a place breaches the fence; None: it does not.
 
         Args:
-            offset: of the place from where control began, m NED.
-            height: of the place above home, m; None: home is not known.
+            offset: position of the place relative to where control began, m NED.
+            height: height of the place above home, m; None: home is not known.
             origin: the place where control began; None: it is not known.
             margin: how far inside the fence the place must lie, m.
         """
@@ -101,12 +101,13 @@ class Fence:
         return None
 
     def stop(self, offset: Components, velocity: Components) -> Components:
-        """Where the vehicle stops if it brakes now, m NED: v·t + v²/(2a) further on.
+        """Where the vehicle stops if it brakes now, m NED from where control began.
 
-        The formula is applied to the horizontal and to the vertical speed.
+        The stopping distance is v·t + v²/(2a), for the horizontal and for the vertical speed v.
 
         Args:
-            offset: of the vehicle from where control began, m NED; numbers, or arrays of them.
+            offset: position of the vehicle relative to where control began, m NED; numbers, or
+                arrays of them.
             velocity: m/s NED; numbers, or arrays of them.
         """
         north, east, down = velocity

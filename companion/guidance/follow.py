@@ -106,7 +106,7 @@ class Follow:
 
 
 def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:
-    """The reference of a sample whose position counts from `start`, and heading from `heading`."""
+    """The reference of a sample, moved to `start` and with `heading` (rad) added to its heading."""
     north, east, down = start.position_ned
     return Reference(
         (north + sample.position[0], east + sample.position[1], down + sample.position[2]),

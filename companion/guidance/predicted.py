@@ -20,7 +20,7 @@ class Moment(NamedTuple):
     """The vehicle at one time of a maneuver, NED.
 
     Attributes:
-        time: since the maneuver began, s.
+        time: time since the maneuver began, s.
         offset: position from where the maneuver began, m.
         velocity: m/s.
         acceleration: m/s².

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[Any]
-"""Real or complex."""
+"""An array of real or complex numbers."""
 
 _LONGEST_PART = 500.0
 """Largest exponent used, so that `exp` does not overflow."""

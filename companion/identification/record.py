@@ -15,7 +15,7 @@ _LONGEST_HOLD = 0.5
 _MOST_ROWS = 16_000
 """Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
 _WINDOW = 10.0
-"""Length of the windows of which the most excited are kept, s; it holds several doublets."""
+"""Length of a window, s; of a long record only the most excited windows are used."""
 _LEAD = 1.5
 """Time before a window from which commands are kept, s: the longest dead time and ramp."""
 

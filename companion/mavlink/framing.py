@@ -32,7 +32,7 @@ class Frame(NamedTuple):
         system: Source system id.
         component: Source component id.
         sequence: The sender's sequence number, 0..255.
-        payload: As sent, without trailing zeros; pad it before unpacking.
+        payload: Payload as sent, without trailing zeros; pad it before unpacking.
         raw: The whole frame with header, checksum and signature.
         signed: Whether the frame carries a signature; it has not been checked.
     """

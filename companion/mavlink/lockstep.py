@@ -160,7 +160,7 @@ class LockstepEventLoop(LinkEventLoop):
     wall time, its time advances by that. So the usual timeouts end if the vehicle is gone.
 
     Args:
-        clock: another clock instead of this one; needs `selector` too.
+        clock: clock to use instead of the one described above; needs `selector` too.
         selector: the selector that advances `clock`.
     """
 

@@ -165,7 +165,7 @@ class StampJudge:
         return newest
 
     def _lower_bound(self, stream: Stream, ahead: bool, date: int) -> int:
-        """The stamp than which the next of this stream must be newer, ticks."""
+        """Lower bound of the next stamp of this stream, exclusive, ticks."""
         heard = self._heard.get((stream, ahead))
         if heard is not None:
             return heard

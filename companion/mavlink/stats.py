@@ -20,10 +20,10 @@ class LinkStats:
         lost: Missing in the vehicle's sequence numbers.
         repeated: Received twice or late.
         bad_crc: Bytes that begin like a frame and have a wrong checksum.
-        unknown: Of messages that the dialect does not know.
+        unknown: Frames of messages that the dialect does not know.
         bad_signature: Unsigned, wrongly signed or replayed while signing is on.
-        ignored_foreign: From other systems or components than the vehicle's.
-        unclaimed: With the vehicle's ids, from a sender that is not the peer (see `peer.PeerRule`).
+        ignored_foreign: Frames of other systems or components than the vehicle's.
+        unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.

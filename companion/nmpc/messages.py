@@ -90,7 +90,7 @@ class Answer(NamedTuple):
 
     Attributes:
         number: number of the request.
-        status: how the solve ended; only if it is `SOLVED` has the rest a meaning.
+        status: how the solve ended; unless it is `SOLVED`, the other fields mean nothing.
         given_at: when the answer was computed, on the computer's monotonic clock, s.
         time: when to use the answer, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.

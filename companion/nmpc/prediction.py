@@ -48,7 +48,7 @@ def motion_of(vehicle: Vehicle) -> Motion:
 
 
 class Predictor:
-    """Integrates the motion with the inputs that take effect meanwhile, by `coefficient_model`.
+    """Integrates the motion to a later time by `coefficient_model`, with the inputs until then.
 
     Args:
         settings: settings of the vehicle.

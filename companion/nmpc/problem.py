@@ -167,7 +167,7 @@ class SqpSolver:
         """Solve from a guess; its first state is the start of the plan and stays.
 
         Args:
-            guess: in the order of `Program.unknown`.
+            guess: first guess, in the order of `Program.unknown`.
             parameters: numbers from `parameters_of`.
         """
         program, start = self._program, self._start

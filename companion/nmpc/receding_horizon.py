@@ -18,7 +18,7 @@ class Plan(NamedTuple):
     """The first control of a solve.
 
     Attributes:
-        solved: whether the plan may be flown; only if so has the rest a meaning.
+        solved: whether the plan may be flown; if not, the other fields mean nothing.
         converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
         iterations: number of SQP iterations.
         seconds: processor time of the solver alone, s.

@@ -60,7 +60,7 @@ def node_of(
     Args:
         sample: sample of the trajectory.
         start: start of the trajectory.
-        near: heading, rad, within π of which the node's heading lies.
+        near: a heading, rad; that of the node is at most π from it.
         drag: drag of the vehicle.
         gravity: m/s².
         disturbance: w, acceleration by wind and other unmodelled forces, m/s².

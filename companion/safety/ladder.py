@@ -57,7 +57,7 @@ class SafetyLadder:
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """The verdict once the hold has ended its breach or its time is over."""
+        """The verdict when the hold has ended its breach, or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
             return Verdict(Action.LAND, self._held_for)

@@ -38,7 +38,7 @@ class VehicleClock:
     If the clock jumps, the vehicle times that are returned here go on without the jump.
 
     Args:
-        lockstep: Whether the vehicle's clock is also the loop's, so that ages are known without
+        lockstep: Whether the event loop runs on the vehicle's clock, so that ages are known without
             TIMESYNC.
 
     Attributes:

@@ -189,11 +189,11 @@ class Inbox:
         known = self._clock.age_known
         sample = AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
         if self.lockstep is None:
-            self._control(sample)
+            self._call_on_attitude(sample)
         else:
             self._samples.append(sample)
 
-    def _control(self, sample: AttitudeSample) -> None:
+    def _call_on_attitude(self, sample: AttitudeSample) -> None:
         if self.on_attitude is not None:
             self._router.guard(self.on_attitude, sample)
 
@@ -207,4 +207,4 @@ class Inbox:
         """In lockstep: pass the samples of a step to the control loop, after its tasks have run."""
         samples, self._samples = self._samples, []
         for sample in samples:
-            self._control(sample)
+            self._call_on_attitude(sample)

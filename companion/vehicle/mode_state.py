@@ -25,7 +25,7 @@ class ModeState:
     Attributes:
         heartbeat: See `Heartbeat`.
         current_mode: See `CurrentMode`. The property `mode` takes the newer of the two messages.
-        heartbeat_is_newest: Whether the newer one is HEARTBEAT, so that `armed` is as new as
+        heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
         armings: How often a heartbeat showed that the vehicle had become armed.
         autopilot: How to command the vehicle; known from its first heartbeat.

@@ -71,7 +71,7 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     responses = example.free[_AT_HZ]
     _draw_paths(panels["path"], responses)
     _draw_distance(panels["time"], responses)
-    dead_times, lags = _axes_of(grid)
+    dead_times, lags = _grid_values(grid)
     over_dead_time = [Cell(_AT_HZ, dead_time, _AT_LAG_MS) for dead_time in dead_times]
     _draw_cut(panels["dead time"], grid, over_dead_time, dead_times, "dead time")
     over_lag = [Cell(_AT_HZ, _AT_DEAD_TIME_MS, lag) for lag in lags]
@@ -87,7 +87,7 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     return figure
 
 
-def _axes_of(grid: Grid) -> tuple[list[int], list[int]]:
+def _grid_values(grid: Grid) -> tuple[list[int], list[int]]:
     """The dead times and the lags of the grid, ms."""
     return sorted({cell.dead_time_ms for cell in grid}), sorted({cell.lag_ms for cell in grid})
 
@@ -123,7 +123,7 @@ def _draw_cut(axes: Axes, grid: Grid, cells: list[Cell], values_ms: list[int], w
 
 def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
     """Draw the cross-track with the worst error over that of the best other method, by cell."""
-    dead_times, lags = _axes_of(grid)
+    dead_times, lags = _grid_values(grid)
     ratios = np.array(
         [[grid[Cell(rate_hz, dead_time, lag)].ratio for dead_time in dead_times] for lag in lags]
     )

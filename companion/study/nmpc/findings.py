@@ -43,7 +43,7 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
 def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
     """Whether the proposed model is solved faster than `others`, with one and all iterations."""
     shares = {
-        (model, most): _typical(model, most, flown) / _typical("proposed", most, flown)
+        (model, most): _median_ms(model, most, flown) / _median_ms("proposed", most, flown)
         for model in others
         for most in (1, MAX_ITERATIONS)
     }
@@ -61,7 +61,7 @@ def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) 
     )
 
 
-def _typical(model: ModelName, iterations: int, flown: Flights) -> float:
+def _median_ms(model: ModelName, iterations: int, flown: Flights) -> float:
     return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 

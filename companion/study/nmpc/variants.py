@@ -53,7 +53,7 @@ class Variant(NamedTuple):
 
     @property
     def settings(self) -> Settings:
-        """The true values of the vehicle; the dead time is 0 if it is not known."""
+        """Solver settings with the true values of the vehicle; an unknown dead time is 0."""
         return Settings(
             gain=GAIN,
             yaw_gain=YAW_GAIN,

@@ -100,7 +100,7 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
 
 
 def _tables(flown: Flown) -> tuple[Table, ...]:
-    """Every planner in still air by telemetry and by true position; lead and wind."""
+    """Tables of all planners in still air, by telemetry and by true position; of lead and wind."""
     return (
         _planners_table(
             "track",

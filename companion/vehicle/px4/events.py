@@ -59,7 +59,7 @@ class _Text(NamedTuple):
     Attributes:
         text: The text with ``{}`` for each value.
         layout: `struct` format of the values in the event's arguments.
-        meanings: For each value, what its numbers mean; None: the value is shown as it is.
+        meanings: For each value, a text for each number; None: the number itself is shown.
     """
 
     text: str
