@@ -29,13 +29,13 @@ _MAX_ITERATIONS = 20
 def exact(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """The constant body rate that ends the sample where the first-order model ends it, rad/s.
+    """The constant body rate that takes the vehicle in `dt` s to the state of the linear model.
 
-    At the end of the sample the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that
-    line as the limits allow. The heading error has shrunk by e^(−k·dt), and the heading rate of the
-    target is added. The vehicle moves there by the shortest rotation, so at the samples the
-    response is exact at any sample rate. Beyond the recovery angle the law is faded into a
-    rotation towards level, as in `first-order`.
+    In that state the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that line as the
+    limits allow. The heading error has shrunk by e^(−k·dt), and the heading rate of the target is
+    added. The vehicle moves there by the shortest rotation, so at the samples the response is exact
+    at any sample rate. Beyond the recovery angle the law is faded into a rotation towards level, as
+    in `first-order`. Rates are in rad/s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE

@@ -141,7 +141,7 @@ class PlanHistory:
         self.tilt.add(self.time, tilt)
         self.yaw.add(self.time, yaw)
 
-    def acting(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
+    def in_effect(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
         """The plans in effect at a sample that came `late` seconds after it was expected."""
         now = self.time + late
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)

@@ -173,7 +173,7 @@ class ModelFollowingPlanner:
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         dt = self._hold.step
-        by_tilt, by_yaw = self._plans.acting(self._hold.late)
+        by_tilt, by_yaw = self._plans.in_effect(self._hold.late)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed

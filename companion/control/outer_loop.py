@@ -61,13 +61,13 @@ _LARGEST_CORRECTION = 0.2
 def hold_weights(config: Config) -> Weights:
     """The weights of the position hold; those not configured follow from the delay T.
 
-    T is the delay of the attitude behind its target (`delay_of_hold`).
+    T is the delay of the attitude behind its target (`attitude_delay`).
 
     The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
     position weight. `tests/control/test_margins.py` checks the stability margins against errors of
     T and of the thrust.
     """
-    guidance, delay = config.guidance, delay_of_hold(config)
+    guidance, delay = config.guidance, attitude_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
         (1.0 + _rate_loop_quickness(config)) / delay**4 if position is None else position,
@@ -91,10 +91,10 @@ def _position_pull(config: Config) -> float:
 def disturbance_bandwidth(config: Config) -> float:
     """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
     configured = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / delay_of_hold(config) if configured is None else configured
+    return 1.5 / attitude_delay(config) if configured is None else configured
 
 
-def delay_of_hold(config: Config) -> float:
+def attitude_delay(config: Config) -> float:
     """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified."""
     delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP

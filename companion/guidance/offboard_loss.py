@@ -27,7 +27,7 @@ _SMALLEST_DRAG = 0.2
 """Smallest linear drag of any multirotor, 1/s (measured: 0.25 and more); it ends a level drift."""
 
 
-class Flown(NamedTuple):
+class MotionAtLoss(NamedTuple):
     """Motion and thrust at the moment when the setpoints end.
 
     Attributes:
@@ -43,7 +43,7 @@ class Flown(NamedTuple):
     turn: Vector
 
 
-class Loss(NamedTuple):
+class LossFailsafe(NamedTuple):
     """The vehicle and its offboard-loss failsafe.
 
     Attributes:
@@ -102,7 +102,7 @@ class _HeldResult(NamedTuple):
     tilt: float
 
 
-def reach(flown: Flown, loss: Loss) -> Reach:
+def reach(flown: MotionAtLoss, loss: LossFailsafe) -> Reach:
     """How far the vehicle can move if the setpoints end now."""
     held = _held_motion(flown, loss)
     size = hypot(*flown.thrust)
@@ -118,7 +118,7 @@ def reach(flown: Flown, loss: Loss) -> Reach:
     return Reach((north, east), held.extra_way + farthest - stop, up, _fall_distance(held, size))
 
 
-def _held_motion(flown: Flown, loss: Loss) -> _HeldResult:
+def _held_motion(flown: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     """Integrate the motion while rates and thrust are held: the thrust axis turns steadily."""
     duration = loss.held + _FAILSAFE_DELAY
     step = duration / _STEPS
@@ -146,7 +146,7 @@ def _held_motion(flown: Flown, loss: Loss) -> _HeldResult:
     return _HeldResult(way, velocity, extra_way, extra_speed, highest, min(pi, tilt))
 
 
-def _stopping_distance(speed: float, tilt: float, size: float, loss: Loss) -> float:
+def _stopping_distance(speed: float, tilt: float, size: float, loss: LossFailsafe) -> float:
     """Horizontal distance from the end of the held rates to the stop, m."""
     if loss.brakes:
         return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])

@@ -23,7 +23,7 @@ The initial variance is large because the rotors still change from the thrust be
 """
 
 _NOISE_TIME = 2.0
-"""Time constant with which that variance is learned, s."""
+"""Time constant with which the variance of the measurements is learned, s."""
 
 _REJECTION_TIME = 1.0
 """Time constant of the low-pass filter on rejections, s."""

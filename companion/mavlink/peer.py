@@ -134,7 +134,7 @@ class PeerRule:
             return False
         return now - self._claimed_at > CLAIM_LASTS_S
 
-    def fix(self, who: str) -> None:
+    def set_peer(self, who: str) -> None:
         """Make `who` the peer."""
         before, self._peer = self._peer, who
         self.renew()

@@ -13,7 +13,7 @@ from enum import Enum
 from threading import Event
 
 EPOCH_UNIX_S = 1420070400
-"""Stamps count 10 us since 2015-01-01 UTC."""
+"""2015-01-01 UTC as Unix time, s; time stamps count 10 us since then."""
 TICKS_PER_S = 100_000
 _DAY = 86_400 * TICKS_PER_S
 _MINUTE = 60 * TICKS_PER_S

@@ -109,7 +109,7 @@ def _running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
 
 
 def _final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
-    """Contribution of the state x at the end of the horizon."""
+    """Contribution of the state x at the end of the horizon to the residual r."""
     weights = settings.weights
     residual: ca.SX = ca.vertcat(
         sqrt(weights.final * weights.position) * (x[0:3] - node[0:3]),

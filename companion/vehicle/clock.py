@@ -90,7 +90,7 @@ class VehicleClock:
         return None if offset is None else max(0.0, now + offset - vehicle_time)
 
     def is_ahead(self, vehicle_time: float, now: float) -> bool:
-        """Whether a stamp (s) is too far ahead of the clock for drift, at event-loop time `now`."""
+        """Whether a stamp (s) is further ahead of the clock at time `now` than drift explains."""
         if self._began == inf:
             return False
         spread = self.rate.spread(max(0.0, now - self._received))

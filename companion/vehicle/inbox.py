@@ -96,7 +96,7 @@ class Inbox:
                 if self._admit(frame):
                     accepted = True
                     if self._candidate is not None:
-                        self._peer_rule.fix(self._candidate)
+                        self._peer_rule.set_peer(self._candidate)
                         self._candidate = None
                     self._accept(frame, received_ns)
         except Exception as error:  # from the tap; subscribers are guarded one by one
@@ -114,7 +114,7 @@ class Inbox:
             self._stats.unclaimed += len(admitted)
             return False
         self._candidate = None
-        self._peer_rule.fix(who)
+        self._peer_rule.set_peer(who)
         try:
             for frame in admitted:
                 self._accept(frame, received_ns)

@@ -117,7 +117,7 @@ def test_a_claim_lapses_on_the_ground_and_not_in_control():
         lambda: at["setpoint"],
         every_frame_claims=False,
     )
-    rule.fix("vehicle")
+    rule.set_peer("vehicle")
     for now, setpoint, lapsed in (
         (104.9, -inf, False),
         (105.1, -inf, True),

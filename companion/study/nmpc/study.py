@@ -157,7 +157,7 @@ def _process_table(times: ProcessTimes) -> Table:
 
 
 def _series(flown: Flights) -> Table:
-    """Every period of every flight."""
+    """Table of every period of every flight."""
     return Table(
         "nmpc-flights",
         "All flights.",

@@ -122,7 +122,7 @@ def _tables(flown: Flown) -> tuple[Table, ...]:
 
 
 def _series(flown: Flown) -> Table:
-    """Every flight."""
+    """Table of every flight."""
     return Table(
         "track-flights",
         "Every flight.",

@@ -125,7 +125,7 @@ class ArduPilot:
         return Command(MAV_CMD_NAV_TAKEOFF, p7=height_m)
 
     def hold(self) -> Command:
-        """Enter BRAKE, which stops and holds; LOITER would obey a transmitter that is off."""
+        """Enter BRAKE, which stops and holds; LOITER would follow the transmitter's sticks."""
         return self.set_mode("BRAKE")
 
     def land(self) -> Command:
