@@ -20,8 +20,8 @@ class Limits:
             "paper" bounds the coefficient rate by W_M·cos(max_tilt) (equation 33), which is slower.
 
     Raises:
-        ValueError: a limit that is not positive and finite, a tilt of 90° or more, or the paper's
-            shape without the tilt limit that it is computed from.
+        ValueError: a limit is not positive and finite, `max_tilt` is 90° or more, or the shape
+            "paper" limits the tilt rate without `max_tilt`.
     """
 
     max_tilt: float | None = None

@@ -139,7 +139,7 @@ class ReferenceModel:
 
     def _step(self, target: Target, dt: float) -> None:
         north, east = self.north, self.east
-        self._aim(target, dt)
+        self._choose_v(target, dt)
         lag = self._lag
         moved, self.speed_north, self._slope_north = lag.after(
             self.speed_north, self._slope_north, self._v_north, dt
@@ -151,7 +151,7 @@ class ReferenceModel:
         self.east += moved
         self._stay_inside(north, east, dt)
 
-    def _aim(self, target: Target, dt: float) -> None:
+    def _choose_v(self, target: Target, dt: float) -> None:
         """Choose v for the next step from the reference predicted for the middle of the step."""
         constants = self._constants
         ahead, half = 0.5 * dt + self._braking, 0.5 * dt * self._braking

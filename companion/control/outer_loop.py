@@ -53,7 +53,7 @@ is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for se
 _CORRECTS_WITHIN = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_WINDOW = 0.1
-"""Time constant of the two low-pass filters on these corrections, s."""
+"""Time constant of the two low-pass filters on the position correction, s."""
 _LARGEST_CORRECTION = 0.2
 """Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
 

@@ -126,7 +126,7 @@ class Fence:
         origin: Place | None,
         margin: float = 0.0,
     ) -> Breach | None:
-        """How the place where the vehicle stops if it brakes now breaches the fence.
+        """The breach of the fence at the place of `stop`; None: the vehicle stops inside.
 
         The arguments are those of `breach` and `stop`.
         """

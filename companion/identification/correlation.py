@@ -8,7 +8,7 @@ with a delay of 40 ms, and steps with 87 ms. At high frequencies the rate loop i
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.identification.lags import held, lagged, slewed, value_at
+from companion.identification.lags import held_commands, lagged, slewed, value_at
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,7 @@ def _filtered(
         return None
     at = last - _GRID * np.arange(count + _DELAYS)[::-1]
     at = np.maximum(at, part.time[0])
-    knots = held(part.time, part.commanded)
+    knots = held_commands(part.time, part.commanded)
     if slew is not None:
         knots = slewed(knots, slew)
     commands = lagged(knots, lag, at) if lag > 0.0 else value_at(knots, at)

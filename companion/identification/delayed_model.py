@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from companion.identification.lags import (
     Knots,
-    held,
+    held_commands,
     lagged,
     second_order,
     second_order_decay,
@@ -140,7 +140,9 @@ class DelayedModel:
         self.model, self.gain, self.thinning = model, gain, thinning
         self._delay = model.lowest.size
         span = max(float(np.ptp(part.commanded)) for part in record)
-        self.commands = [held(part.time, part.commanded, _SAME_COMMAND * span) for part in record]
+        self.commands = [
+            held_commands(part.time, part.commanded, _SAME_COMMAND * span) for part in record
+        ]
         self.times = [part.measured_time[::thinning] for part in record]
         self.measured = np.concatenate([part.measured[::thinning] for part in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]

@@ -32,7 +32,7 @@ class Knots(NamedTuple):
     slope: Floats
 
 
-def held(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Knots:
+def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Knots:
     """Commands (n,), each held from its time (n,) until the next.
 
     A command begins a new piece only if it differs by more than `tolerance` from the latest piece.

@@ -139,7 +139,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only until the vehicle answers a TIMESYNC request."""
+        """Whether an answer to a TIMESYNC request would make frames like the last one acceptable."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:

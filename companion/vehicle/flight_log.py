@@ -21,7 +21,7 @@ _STANDARD_GRAVITY = 9.80665
 _RECENT = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _ONE_CLOCK = 1.0
-"""An accelerometer stamp further from the attitude's than this, s, counts another clock."""
+"""If stamps of accelerometer and attitude differ by more than this, s, their clocks differ."""
 _NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",

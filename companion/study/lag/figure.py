@@ -65,7 +65,7 @@ _PANELS: list[Any] = [  # Any, because matplotlib has its own type for nested li
 
 
 def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
-    """All panels, as `CAPTION` describes them."""
+    """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
     responses = example.free[_AT_HZ]

@@ -34,7 +34,7 @@ def find(
         *_on_the_example(example),
         _over_the_grid(grid),
         _wrong_over_the_grid(grid),
-        _rather_too_long(grid, complete),
+        _too_long_or_too_short(grid, complete),
         *_with_the_complete_loop(complete, from_fit),
     )
 
@@ -103,7 +103,7 @@ def _wrong_over_the_grid(grid: Grid) -> Finding:
     )
 
 
-def _rather_too_long(grid: Grid, complete: Complete) -> Finding:
+def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
     short, long = TimesError(-0.5, -0.5), TimesError(0.5, 0.5)
     pairs = [
         (place.wrong[long], place.wrong[short])

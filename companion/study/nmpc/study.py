@@ -189,7 +189,7 @@ def _series(flown: Flights) -> Table:
 
 
 def _draw_figure(flown: Flights) -> Figure:
-    """All panels, as `_CAPTION` describes them."""
+    """Draw the figure that `_CAPTION` describes."""
     figure, ((path, eight), (circle, times)) = new_figure(2, 2)
     _draw_paths(path, flown)
     _draw_errors(circle, flown, CIRCLE, "Error after the standing start")

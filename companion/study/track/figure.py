@@ -39,7 +39,7 @@ _MARKERS = ("o", "s")
 
 
 def draw_figure(flown: Flown) -> Figure:
-    """All panels, as `CAPTION` describes them."""
+    """Draw the figure that `CAPTION` describes."""
     telemetry = {task: 1e3 * tracked.telemetry.rms for task, tracked in flown.items()}
     truth = {task: 1e3 * tracked.truth.rms for task, tracked in flown.items()}
     figure, panels = new_figure(4, 2)
