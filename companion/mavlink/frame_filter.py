@@ -41,7 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether an answer to a TIMESYNC request would make frames like the last one acceptable."""
+        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
         return self._signing is not None and self._signing.awaits_answer
 
     def from_vehicle(self, frame: Frame) -> bool:

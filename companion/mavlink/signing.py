@@ -139,7 +139,7 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether an answer to a TIMESYNC request would make frames like the last one acceptable."""
+        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
