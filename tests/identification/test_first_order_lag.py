@@ -36,10 +36,16 @@ def test_running_sums_are_the_recursion_however_long_the_record(lag, slew):
 
 def test_commands_that_hardly_differ_make_no_piece_of_their_own():
     time = np.arange(6.0)
-    commands = held_commands(time, np.array([0.0, 0.004, -0.004, 0.02, 0.024, 0.0]), tolerance=0.005)
+    commands = held_commands(
+        time, np.array([0.0, 0.004, -0.004, 0.02, 0.024, 0.0]), tolerance=0.005
+    )
     assert commands.time.tolist() == [0.0, 3.0, 5.0]
     assert value_at(commands, np.array([2.5, 4.5])).tolist() == [0.0, 0.02]
-    assert held_commands(time, np.array([0.0, 0.0, 1e-9, 1e-9, 0.0, 0.0])).time.tolist() == [0.0, 2.0, 4.0]
+    assert held_commands(time, np.array([0.0, 0.0, 1e-9, 1e-9, 0.0, 0.0])).time.tolist() == [
+        0.0,
+        2.0,
+        4.0,
+    ]
 
 
 @pytest.mark.parametrize("slew", [0.5, 5.0, 500.0])
