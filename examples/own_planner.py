@@ -11,11 +11,11 @@ from math import sqrt
 
 import numpy as np
 
-from companion import batch
-from companion.attitude import Coefficients, Constants, Quaternion, Target, attitude, make_planner
+from companion import attitude, batch
+from companion.attitude import Constants, Quaternion, Target, limit_rates, make_planner
 
-START, END = Coefficients(-0.4, -0.5), Coefficients(0.4, -0.5)
-q = np.reshape(attitude(START, heading=0.0), (4, 1))  # one vehicle
+START, END = attitude.Coefficients(-0.4, -0.5), attitude.Coefficients(0.4, -0.5)
+q = np.reshape(attitude.attitude(START, heading=0.0), (4, 1))  # one vehicle
 targets = np.reshape((*END, 0.0, 0.0), (4, 1))
 
 
@@ -27,7 +27,8 @@ def thrust_axis(
     d = -sqrt(1.0 - n * n - e * e)  # (n, e, d) is the wanted axis in NED, a unit vector
     forward = (1 - 2 * (y * y + z * z)) * n + 2 * (x * y + w * z) * e + 2 * (x * z - w * y) * d
     right = 2 * (x * y - w * z) * n + (1 - 2 * (x * x + z * z)) * e + 2 * (y * z + w * x) * d
-    return constants.gain * right, -constants.gain * forward, 0.0
+    roll, pitch = constants.gain * right, -constants.gain * forward
+    return limit_rates(roll, pitch, 0.0, constants.max_tilt_rate, constants.max_yaw_rate)
 
 
 for name, law in {"first-order": "first-order", "thrust-axis": thrust_axis}.items():

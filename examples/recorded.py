@@ -1,24 +1,22 @@
 """The folder of a recorded flight, for the examples that read one.
 
 It is the folder named on the command line, else the newest under `flights`, else one that is flown
-now on the mock vehicle: body-rate doublets, from which `companion identify` also reads.
+now on the mock vehicle: body-rate doublets, from which a vehicle can be identified.
 """
 
-import subprocess
 import sys
 from pathlib import Path
 
-FLY = ("demo", "--lockstep", "--maneuvers", "identify", "--set", "planner.name=first-order")
+from companion.config.files import changed, load, shipped
+from companion.testing import MockVehicle, fly
 
 
 def flight() -> Path:
-    """The folder of a flight.
-
-    Raises:
-        CalledProcessError: none was recorded, and the flight of now failed.
-    """
+    """The folder of a flight."""
     if len(sys.argv) > 1:
         return Path(sys.argv[1])
     if not list(Path("flights").glob("*/flight.tlog")):
-        subprocess.run([sys.executable, "-m", "companion", *FLY], check=True, stdout=sys.stderr)
+        doublets = {"flight": {"maneuvers": ["identify"]}, "planner": {"name": "first-order"}}
+        config = changed(load(shipped("mock-px4.yaml")), doublets, "doublets")
+        fly(config, MockVehicle("px4"), Path("flights/doublets"))
     return max(Path("flights").glob("*/flight.tlog")).parent

@@ -7,9 +7,9 @@ import yaml
 from pydantic import ValidationError, ValidationInfo, field_validator, model_validator
 
 from sitl_mock.autopilot.parameters import ParameterRefusedError, ParameterTable
-from sitl_mock.config.section import ConfigError, explain, suggestion
+from sitl_mock.config.section import ConfigError, error_path, explain, suggestion
 from sitl_mock.config.settings import VehicleSettings
-from sitl_mock.config.yaml_file import load_yaml
+from sitl_mock.config.yaml_file import Document, explain_yaml, load_yaml
 from sitl_mock.personalities import PERSONALITIES
 
 SMOOTH = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
@@ -65,28 +65,37 @@ def load_settings(path: Path | None, overrides: dict[str, Any]) -> MockSettings:
         ConfigError: the file cannot be read, or a key or value is invalid.
     """
     where = "the command line" if path is None else str(path)
-    section = {} if path is None else _mock_section(path)
+    document = Document(None, None) if path is None else _document(path)
+    section = {} if path is None else _mock_section(document.value, path)
     lockstep = {**section.get("lockstep", {}), **overrides.pop("lockstep", {})}
     merged = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
     try:
         return MockSettings.model_validate(merged)
     except ValidationError as error:
-        raise ConfigError(f"{where}: {explain(error, MockSettings)}") from error
+        line = document.line(error_path(error))
+        at = where if line is None else f"{where}, line {line}"
+        raise ConfigError(f"{at}: {explain(error, MockSettings)}") from error
 
 
-def _mock_section(path: Path) -> dict[str, Any]:
+def _document(path: Path) -> Document:
     try:
-        document = load_yaml(path)
+        return load_yaml(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, ValueError, TypeError, OverflowError) as error:
-        problem = " ".join(str(error).split())
-        raise ConfigError(f"{path}: is not valid YAML: {problem:.300}") from error
+        raise ConfigError(f"{path}: {explain_yaml(error)}") from error
+
+
+def _mock_section(document: object, path: Path) -> dict[str, Any]:
     section = document.get("mock") if isinstance(document, dict) else document
     if section is None:
         section = {}
     if not isinstance(section, dict):
         raise ConfigError(f"{path}: the `mock` section must be a mapping of keys to values")
+    signing = section.get("signing")
+    if isinstance(signing, dict) and isinstance(signing.get("passphrase_file"), str):
+        file = path.parent / signing["passphrase_file"]
+        section = {**section, "signing": {**signing, "passphrase_file": str(file)}}
     lockstep = section.get("lockstep")
     if lockstep is None:
         return {**section, "lockstep": {}}

@@ -43,7 +43,7 @@ def test_the_unit_waits_longer_for_the_end_than_handing_back_and_landing_may_tak
 
 
 def test_the_configuration_on_the_page_is_one():
-    snippet = PAGE.split("    realtime:\n")[1].split("\n\n")[0]
+    snippet = PAGE.split("```yaml\nrealtime:\n")[1].split("```")[0]
     config = parse("realtime:\n" + snippet, "the page", Config)
     assert list(yaml.safe_load("realtime:\n" + snippet)["realtime"]) == list(
         RealtimeConfig.model_fields
@@ -61,4 +61,4 @@ def test_the_bytes_on_the_page_are_those_on_the_wire():
     )
     sizes = tuple(len(message.pack(mav)) for message in (sample, setpoint))
     assert sizes == (44, 51)
-    assert "A sample is 44 bytes on the wire and a setpoint 51" in PAGE
+    assert "A sample has 44 bytes and a setpoint 51" in PAGE

@@ -3,6 +3,9 @@
 import ast
 import re
 import shlex
+import shutil
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
@@ -16,11 +19,12 @@ from companion.cli import command_line
 from companion.config import Config
 from companion.mavlink.stats import LinkStats
 from companion.preflight.finding import Key
+from companion.safety import monitors
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 INDEX = ROOT / "docs/index.md"
-PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [README, ROOT / "examples/README.md", *sorted((ROOT / "docs").glob("*.md"))]
 MOST_WORDS = 900  # of README.md: it is read in five minutes
 
 FENCE = re.compile(r"^[ \t]*```(\w*)\n(.*?)^[ \t]*```$", re.MULTILINE | re.DOTALL)
@@ -131,7 +135,7 @@ def test_make_targets_exist() -> None:
 
 def test_every_page_is_in_the_index() -> None:
     listed = {link.partition("#")[0] for link in LINK.findall(INDEX.read_text("utf-8"))}
-    pages = {page.name for page in PAGES if page not in (README, INDEX)}
+    pages = {page.name for page in PAGES if page.parent.name == "docs" and page != INDEX}
     assert pages <= listed, f"docs/index.md does not list {sorted(pages - listed)}"
 
 
@@ -140,7 +144,8 @@ def test_the_site_has_every_page_in_the_order_of_the_index() -> None:
     first, *sections = site["nav"]
     pages = [page for section in sections for group in section.values() for page in group]
     assert list(first.values()) == ["index.md"]
-    assert pages == LINK.findall(INDEX.read_text("utf-8"))
+    linked = [link for link in LINK.findall(INDEX.read_text("utf-8")) if link.endswith(".md")]
+    assert pages == linked
 
 
 @cache
@@ -157,11 +162,125 @@ def texts_of_the_program() -> str:
     return "\n".join(found)
 
 
+TROUBLESHOOTING = (ROOT / "docs/troubleshooting.md").read_text("utf-8")
+
+
+def pattern(message: str) -> str:
+    """A message of a page as a regular expression; `…` stands for what is filled in."""
+    return r"[^\n]*".join(re.escape(part) for part in message.split("…"))
+
+
 def test_messages_of_troubleshooting_are_said() -> None:
-    """Each heading there quotes a message; `…` stands for what is filled in."""
-    page = (ROOT / "docs/troubleshooting.md").read_text("utf-8")
-    messages = re.findall(r"^### `(.+)`$", page, re.MULTILINE)
-    assert len(messages) >= 20
-    for message in messages:
-        pattern = r"[^\n]*".join(re.escape(part) for part in message.split("…"))
-        assert re.search(pattern, texts_of_the_program()), f"nothing says {message!r}"
+    """Each heading there quotes a message, and so does each row of its tables of messages."""
+    headings = re.findall(r"^### `(.+)`$", TROUBLESHOOTING, re.MULTILINE)
+    findings = TROUBLESHOOTING.index("## Every finding of the doctor")
+    rows = re.findall(r"^\| `(.+?)` \|", TROUBLESHOOTING[:findings], re.MULTILINE)
+    assert len(headings) >= 20
+    assert len(rows) >= 60
+    for message in (*headings, *rows):
+        found = re.search(pattern(message), texts_of_the_program())
+        assert found, f"nothing says {message!r}"
+
+
+ENDINGS = {"FlightEnded", "EndpointError", "LinkError", "UnsupportedAutopilot", "CommandTimeout"}
+NOT_FOR_USERS = (
+    "lockstep needs the event loop",
+    "a signing key",
+    "mock vehicle",  # of companion.testing
+    "…: mode …",  # who took over; its two beginnings have rows of their own
+)
+
+
+def texts(node: ast.AST | None) -> Iterator[str]:
+    """The text of an expression; values in it stand as `…`."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        parts = (getattr(part, "value", "…") for part in node.values)
+        yield "".join(part if isinstance(part, str) else "…" for part in parts)
+
+
+def raised_and_judged() -> Iterator[str]:
+    """What ends a flight: texts of its exceptions, and what the judges of monitors return."""
+    for file in (ROOT / "companion").rglob("*.py"):
+        judge = file.name.endswith("_judges.py")
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+                if getattr(node.exc.func, "id", "") in ENDINGS and node.exc.args:
+                    yield from texts(node.exc.args[0])
+            elif judge and isinstance(node, ast.Return):
+                value = node.value
+                for one in (value.body, value.orelse) if isinstance(value, ast.IfExp) else (value,):
+                    yield from texts(one)
+
+
+def test_whatever_ends_a_flight_is_in_troubleshooting() -> None:
+    quoted = re.findall(r"^(?:### |\| )`(.+?)`(?: \||$)", TROUBLESHOOTING, re.MULTILINE)
+    patterns = [re.compile(pattern(message)) for message in quoted]
+    messages = {text for text in raised_and_judged() if text.strip("… :")}
+    assert len(messages) > 40
+    missing = [
+        message
+        for message in sorted(messages)
+        if not any(one.search(message) for one in patterns)
+        and not any(part in message for part in NOT_FOR_USERS)
+    ]
+    assert not missing, "\n".join(missing)
+
+
+def test_every_finding_is_in_troubleshooting() -> None:
+    listed = set(re.findall(r"^\| `([\w.]+)` \|", TROUBLESHOOTING, re.MULTILINE))
+    assert {key.value for key in Key} <= listed
+
+
+SAFETY = (ROOT / "docs/safety.md").read_text("utf-8")
+
+
+def test_the_monitors_of_the_safety_page_are_those_of_the_table() -> None:
+    """Name, how long a breach lasts, and the action; the watch itself judges the first two."""
+    rows = re.findall(
+        r"^\| ([a-z ]+?) \| .+ \| (at once|[\d.]+ s) \| ([a-z_]+)", SAFETY, re.MULTILINE
+    )
+    shown = {
+        name: (0.0 if lasts == "at once" else float(lasts[:-2]), action)
+        for name, lasts, action in rows
+    }
+    assert shown.pop("takeover") == shown.pop("mode unknown") == (0.0, "release")
+    assert shown == {one.name: (one.lasts, one.action.value) for one in monitors(Config())}
+
+
+def test_the_tests_that_pages_name_exist() -> None:
+    files = list((ROOT / "tests").rglob("*.py"))
+    for page in PAGES:
+        for name, cases in re.findall(
+            r"`((?:tests/[\w/]*)?test_\w+\.py)`( [\w, ]+(?= \|))?", page.read_text("utf-8")
+        ):
+            (path,) = [one for one in files if one.as_posix().endswith(f"/{name}")] or [None]
+            assert path, f"{named(page)}: there is no {name}"
+            for case in filter(None, cases.replace(" ", "").split(",")):
+                assert case in path.read_text("utf-8"), f"{named(page)}: {name} has no {case}"
+
+
+def test_formulas_are_closed() -> None:
+    for page in PAGES:
+        text = INLINE.sub("", prose(page))
+        assert text.count("$$") % 2 == 0, named(page)
+        assert text.replace("$$", "").count("$") % 2 == 0, named(page)
+
+
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    """As `make docs` builds it, from a copy; each formula of the law becomes MathML."""
+    for module in ("zensical", "l2m4m"):  # of the extra `docs`, which `make test` installs
+        pytest.importorskip(module)
+    shutil.copytree(ROOT / "docs", tmp_path / "docs")
+    shutil.copy(ROOT / "zensical.toml", tmp_path)
+    command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in (done.stdout + done.stderr).lower()
+    page = (tmp_path / "site/the-law/index.html").read_text("utf-8")
+    formulas = (ROOT / "docs/the-law.md").read_text("utf-8").count("$$") // 2
+    assert formulas > 10
+    assert page.count('<math display="block"') == formulas
+    assert "$$" not in page
+    assert not re.search(r'(src|href)="https?://(?!zensical\.org)', page), "loads from elsewhere"

@@ -90,6 +90,30 @@ def test_the_configuration_is_written_and_mistakes_are_named(
     assert "fence_radius_m: 3" in capsys.readouterr().out
 
 
+def test_the_csv_path_is_flown(folder: Path) -> None:
+    (line,) = output(folder, "fly_csv.py").splitlines()
+    assert line.startswith("result: ok, ")
+    assert 0.001 < numbers(line)[0] < 0.1
+    assert len((folder / "heart.csv").read_text().splitlines()) == 402
+
+
+def test_the_injected_fault_makes_the_vehicle_land(folder: Path) -> None:
+    said = output(folder, "inject_fault.py")
+    assert "safety: gps: GPS position lost → land" in said
+    result, state = said.splitlines()[-2:]
+    assert result == "result: GPS position lost"
+    assert "armed: False" in state
+    assert numbers(state)[-1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_model_following_is_straighter_behind_a_rate_loop(folder: Path) -> None:
+    lines = [line.split() for line in output(folder, "compare_planners.py").splitlines()]
+    straightness = {name: float(figure) for name, figure, result in lines if result == "ok"}
+    assert list(straightness) == ["first-order", "model-following"]
+    assert straightness["model-following"] < 0.01
+    assert straightness["first-order"] > 0.04
+
+
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which a flight of doublets was recorded, by the example that identifies."""

@@ -17,6 +17,7 @@ Planners
     PLANNER_NAMES   all planners; LAW_NAMES: those without memory, which `companion.batch` maps
     Law, Constants  a law of your own: a function on plain floats, and its gains and limits
     LawPlanner      the planner that applies a law
+    limit_rates     body rates within their limits, for a law of your own
 
 In and out
     Quaternion      (w, x, y, z), a tuple of floats
@@ -56,6 +57,7 @@ from companion.attitude.representation import decompose as decompose
 from companion.attitude.representation import heading as heading
 from companion.attitude.representation import is_unit as is_unit
 from companion.attitude.representation import wrap_angle as wrap_angle
+from companion.attitude.rotation import limit_rates as limit_rates
 from companion.attitude.types import AttitudeError as AttitudeError
 from companion.attitude.types import BodyRates as BodyRates
 from companion.attitude.types import Coefficients as Coefficients

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.attitude.kinematics import tilt_products
-from companion.attitude.planner import LawPlanner
+from companion.attitude.planner import LAW_NAMES, LawPlanner
 from companion.batch.checks import admissible_targets, as_rows, compiled_check, unit_quaternions
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
 from companion.extras import require
@@ -65,6 +65,7 @@ def rates(
         InvalidQuaternionError: an attitude is not a unit quaternion.
         InvalidTargetError: a value of a target is not finite.
         MissingExtraError: `compiled` is True and numba is not installed.
+        TypeError: the planner has a memory; a batch maps laws only.
         ValueError: the shapes do not fit.
     """
     q, targets, loops = _prepared(planner, q, targets, 1, compiled)
@@ -129,6 +130,12 @@ def _prepared(
     planner: LawPlanner, q: ArrayLike, targets: ArrayLike, steps: int, compiled: bool | None
 ) -> tuple[Array, Array, Loops]:
     """The arrays as the law accepts them, and the loops to use."""
+    if not isinstance(planner, LawPlanner):
+        raise TypeError(
+            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}), and "
+            f"{type(planner).__name__} remembers its plan; make one planner for each vehicle, and "
+            "call its rates() for each sample"
+        )
     q, targets = as_rows(q, "q"), as_rows(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")

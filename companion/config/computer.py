@@ -15,8 +15,9 @@ class LinkConfig(Section):
     """direct: our own connection. mavsdk: MAVSDK holds the connection and carries our frames (extra
     `mavsdk`)."""
     endpoint: Annotated[str, Field(max_length=300)] = "udpin://0.0.0.0:14540"
-    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD; udpin and
-    tcpin also take ?peer=HOST[:PORT], to hear no other."""
+    """udpin://, udpout://, tcp://, tcpin:// with host:port, or serial://DEVICE:BAUD. udpin and
+    tcpin also take ?peer=HOST[:PORT], to hear no other. udp://:PORT of other programs is taken as
+    udpin://0.0.0.0:PORT."""
     target_system: Annotated[int, Field(ge=1, le=255)] = 1
     """System id of the autopilot; every other system is ignored."""
     target_component: Annotated[int, Field(ge=1, le=255)] = 1
@@ -26,8 +27,8 @@ class LinkConfig(Section):
     source_component: Annotated[int, Field(ge=1, le=255)] = 191
     """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
     signing_key_file: PathKey | None = None
-    """File whose first line is the signing passphrase. With it we sign every message and refuse
-    unsigned ones."""
+    """File whose first line is the signing passphrase, relative to the file that names it. With it
+    we sign every message and refuse unsigned ones."""
     lockstep: StrictBool = False
     """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
@@ -76,4 +77,4 @@ class RecordingConfig(Section):
     """Recording of flights."""
 
     directory: PathKey = Path("flights")
-    """Folder in which each flight makes its own folder."""
+    """Folder in which each flight makes its own folder; relative to the working folder."""

@@ -10,9 +10,17 @@ from typing import Any
 from companion.config import Config
 from companion.config.root import MOST_INCLUDED
 from companion.files import bounded_yaml, yaml_file
-from companion.files.yaml_file import ConfigError, UnreadableFileError
+from companion.files.bounded_yaml import Where
+from companion.files.yaml_faults import shortened
+from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
+FILES_READ: tuple[tuple[str, ...], ...] = (
+    ("flight", "trajectory"),
+    ("link", "signing_key_file"),
+    ("mock", "signing", "passphrase_file"),
+)
+"""Keys that name a file to read: relative to the file that names it, as an include is."""
 _DEEPEST = 4
 """Largest depth of nested includes."""
 
@@ -26,26 +34,35 @@ def load(path: Path) -> Config:
         ConfigError: a file is missing, includes itself, is not YAML, or holds an unknown key or a
             bad value.
     """
-    own = yaml_file.read(path, Config)
-    data: dict[str, Any] = {}
-    sources: dict[tuple[str, ...], str] = {}
-    reading = _Reading(data, sources)
-    reading.add_included((path,), own)
-    _merge(data, own, sources, str(path))
-    return yaml_file.validated(data, str(path), Config, sources)
+    own = _read(path)
+    merged = Contents({}, {})
+    _Reading(merged).add_included((path,), own.keys)
+    _merge(merged, own)
+    return yaml_file.validated(merged.keys, str(path), Config, merged.places)
+
+
+def _read(path: Path) -> Contents:
+    """A file, its paths resolved against its own folder."""
+    contents = yaml_file.read(path, Config)
+    for *sections, key in FILES_READ:
+        values: Any = contents.keys
+        for section in sections:
+            values = values.get(section) if isinstance(values, dict) else None
+        name = values.get(key) if isinstance(values, dict) else None
+        if isinstance(name, str) and yaml_file.is_path(name):
+            values[key] = str(path.parent / name)
+    return contents
 
 
 class _Reading:
     """Reads included files; an including file overrides them.
 
     Args:
-        data: receives their keys.
-        sources: receives the file of each key.
+        merged: receives their keys.
     """
 
-    def __init__(self, data: dict[str, Any], sources: dict[tuple[str, ...], str]) -> None:
-        self._data = data
-        self._sources = sources
+    def __init__(self, merged: Contents) -> None:
+        self._merged = merged
         self._count = 0
 
     def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
@@ -72,12 +89,12 @@ class _Reading:
         if len(chain) - 1 > _DEEPEST:
             raise ConfigError(f"{by}: an include must not be deeper than {_DEEPEST} files")
         try:
-            part = yaml_file.read(path, Config)
+            part = _read(path)
         except UnreadableFileError as error:
             raise ConfigError(f"{error} (included by {by})") from error
-        _check_part(path, part)
-        self.add_included(chain, part)
-        _merge(self._data, part, self._sources, str(path))
+        _check_part(path, part.keys)
+        self.add_included(chain, part.keys)
+        _merge(self._merged, part)
 
 
 def _included(path: Path, own: dict[str, Any]) -> list[Path]:
@@ -86,7 +103,7 @@ def _included(path: Path, own: dict[str, Any]) -> list[Path]:
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
     ):
-        told = yaml_file.shortened(names)
+        told = shortened(names)
         raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {told}")
     return [path.parent / name for name in names]
 
@@ -101,22 +118,24 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
         if section == _INCLUDE:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
-            told = yaml_file.shortened(values)
+            told = shortened(values)
             raise ConfigError(f"{included}: `{section}` must hold keys, not {told}")
 
 
-def _merge(
-    data: dict[str, Any], part: dict[str, Any], sources: dict[tuple[str, ...], str], name: str
-) -> None:
-    """Let a file's keys override earlier ones, and note the file of each key."""
-    for section, values in part.items():
-        sources[(section,)] = name
+def _merge(merged: Contents, part: Contents) -> None:
+    """Let a file's keys override earlier ones, and note where each key stands."""
+    data = merged.keys
+    for section, values in part.keys.items():
         data.setdefault(section, {})
         if isinstance(values, dict) and isinstance(data[section], dict):
-            sources.update({(section, key): name for key in values})
+            replaced: set[Where] = {(section, key) for key in values}
             data[section] = {**data[section], **values}
         else:
+            replaced = {where for where in merged.places if where[:1] == (section,)}
             data[section] = values
+        for where in [where for where in merged.places if where[:2] in replaced]:
+            del merged.places[where]
+    merged.places.update(part.places)
 
 
 def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:

@@ -25,7 +25,9 @@ class FlightConfig(Section):
     )
     """Maneuvers in the order in which they are flown."""
     trajectory: PathKey | None = None
-    """File of the maneuver `trajectory`, such as configs/trajectories/figure8.yaml."""
+    """File of the maneuver `trajectory`, such as trajectories/figure8.yaml, relative to the file
+    that names it. --trajectory and --set flight.trajectory=FILE are relative to the working
+    folder."""
     slow_down: bool = False
     """Slow down a trajectory that exceeds the limits, instead of refusing it."""
     arm: StrictBool = False

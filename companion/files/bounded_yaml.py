@@ -7,7 +7,7 @@ lines of aliases stand for gigabytes.
 
 import re
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -50,7 +50,32 @@ class YamlError(Exception):
         self.line = line
 
 
+Where = tuple[str | int, ...]
+"""The keys and positions in lists that lead to a value."""
+
+
+class Document(NamedTuple):
+    """A YAML document.
+
+    Attributes:
+        root: its value.
+        lines: the line on which each key and each item of a list stands, from 1.
+    """
+
+    root: Any
+    lines: dict[Where, int]
+
+
 def parse(text: str) -> Any:
+    """The value of `read`.
+
+    Raises:
+        YamlError: as `read`.
+    """
+    return read(text).root
+
+
+def read(text: str) -> Document:
     """The one document in a YAML text as dicts with texts as keys, lists and scalars.
 
     Raises:
@@ -62,13 +87,25 @@ def parse(text: str) -> Any:
             builder.take(event)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
-        raise YamlError(f"not valid YAML: {error.problem}", line) from error
+        raise YamlError(_explained(error, text), line) from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise YamlError(f"not valid YAML: {error.reason}", line) from error
     except (ValueError, OverflowError) as error:  # an escape beyond all characters, say
         raise YamlError(f"not valid YAML: {error}") from error
-    return builder.root
+    return Document(builder.root, builder.lines)
+
+
+def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
+    """What is wrong and how to mend it, for the mistakes that are made most."""
+    problem = str(error.problem)
+    lines, mark = text.splitlines(), error.problem_mark
+    line = lines[mark.line] if mark and mark.line < len(lines) else ""
+    if "\t" in line[: len(line) - len(line.lstrip())] or "'\\t'" in problem:
+        return "a tab stands where YAML wants spaces; indent with two spaces for each level"
+    if problem.startswith("mapping values are not allowed"):
+        problem += "; a key is indented too far, or a line before it lacks its colon"
+    return f"not valid YAML: {problem}"
 
 
 def dump(data: dict[str, Any]) -> str:
@@ -101,10 +138,13 @@ class _Builder:
 
     Attributes:
         root: the document so far.
+        lines: of its keys and items.
     """
 
     def __init__(self) -> None:
         self.root: Any = None
+        self.lines: dict[Where, int] = {}
+        self._path: list[str | int] = []
         self._open: list[dict[str, Any] | list[Any]] = []
         self._keys: list[str | None] = []
         self._nodes = 0
@@ -129,11 +169,18 @@ class _Builder:
             case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
                 self._open.pop()
                 self._keys.pop()
+                if self._path:
+                    self._path.pop()
 
     def _begin(
         self, node: dict[str, Any] | list[Any], event: yaml.CollectionStartEvent, line: int
     ) -> None:
+        step: list[str | int] = []
+        if self._open:
+            into, key = self._open[-1], self._keys[-1]
+            step = [len(into) if isinstance(into, list) else key or ""]
         self._add(node, event, line)
+        self._path += step
         self._open.append(node)
         self._keys.append(None)
         if len(self._open) > DEEPEST:
@@ -152,9 +199,11 @@ class _Builder:
             return
         into, key = self._open[-1], self._keys[-1]
         if isinstance(into, list):
+            self.lines[(*self._path, len(into))] = line
             into.append(value)
         elif key is None:
             self._keys[-1] = _new_key(value, into, line)
+            self.lines[(*self._path, value)] = line
         else:
             into[key] = value
             self._keys[-1] = None

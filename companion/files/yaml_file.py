@@ -1,21 +1,20 @@
 """Reading YAML into a typed model, with errors that say what, where and how to mend it."""
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
-from companion.files.bounded_yaml import MOST_BYTES, YamlError
+from companion.files.bounded_yaml import MOST_BYTES, Where, YamlError
+from companion.files.yaml_faults import explained, kinds_in, without_consequences
 
 Model = TypeVar("Model", bound="Section")
 
 _LONGEST_PATH = 1000
 _FAULTS_TOLD = 5
-_LONGEST_TOLD = 60
 
 PathKey = Annotated[Path, Field(json_schema_extra={"maxLength": _LONGEST_PATH})]
 """A key that names a file or a folder; `Section` checks its length."""
@@ -45,7 +44,7 @@ class Section(BaseModel):
     @classmethod
     def _no_boolean_number(cls, value: Any, field: ValidationInfo) -> Any:
         """Refuse booleans as numbers and words as booleans: pydantic would accept both."""
-        wanted = bool in _kinds(cls.model_fields[str(field.field_name)].annotation)
+        wanted = bool in kinds_in(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, bool) and not wanted:
             raise ValueError("must not be true or false")
         if wanted and not isinstance(value, bool):
@@ -54,17 +53,21 @@ class Section(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
+    def _no_quoted_number(cls, value: Any, field: ValidationInfo) -> Any:
+        """Refuse texts as numbers: pydantic would accept "20" and " 1_0 "."""
+        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
+        if isinstance(value, str) and kinds & {int, float} and not kinds & {str, Path}:
+            raise ValueError("must be a number")
+        return value
+
+    @field_validator("*", mode="before")
+    @classmethod
     def _no_impossible_path(cls, value: Any, field: ValidationInfo) -> Any:
         """Refuse empty paths (they would name the folder itself) and null characters."""
-        kinds = _kinds(cls.model_fields[str(field.field_name)].annotation)
+        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
         if isinstance(value, str) and Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
         return value
-
-
-def _kinds(annotation: Any) -> set[Any]:
-    """A type and the types inside it, for unions and annotated types."""
-    return {annotation}.union(*(_kinds(part) for part in get_args(annotation)))
 
 
 class ConfigError(Exception):
@@ -75,17 +78,45 @@ class UnreadableFileError(ConfigError):
     """The file is missing or cannot be read."""
 
 
+class Place(NamedTuple):
+    """Where a key stands.
+
+    Attributes:
+        file: its name.
+        line: from 1; None where unknown.
+    """
+
+    file: str
+    line: int | None = None
+
+    def __str__(self) -> str:
+        return self.file if self.line is None else f"{self.file}, line {self.line}"
+
+
+class Contents(NamedTuple):
+    """A YAML file that was read and not yet checked against a model.
+
+    Attributes:
+        keys: keys and values.
+        places: where each key and each item of a list stands.
+    """
+
+    keys: dict[str, Any]
+    places: dict[Where, Place]
+
+
 def load(path: Path, model: type[Model]) -> Model:
     """Read and check a YAML file.
 
     Raises:
         ConfigError: the file is missing, not YAML, or holds an unknown key or a bad value.
     """
-    return validated(read(path, model), str(path), model)
+    contents = read(path, model)
+    return validated(contents.keys, str(path), model, contents.places)
 
 
-def read(path: Path, model: type[Section]) -> dict[str, Any]:
-    """The keys and values of a YAML file, not yet checked against `model`.
+def read(path: Path, model: type[Section]) -> Contents:
+    """A YAML file, not yet checked against `model`.
 
     Raises:
         UnreadableFileError: the file is missing, no regular one, too large, or not UTF-8.
@@ -95,7 +126,7 @@ def read(path: Path, model: type[Section]) -> dict[str, Any]:
         text = read_text(path, MOST_BYTES)
     except FileRefusedError as error:
         raise UnreadableFileError(f"{path}: {error}") from error
-    return _keys(text, str(path), model)
+    return _contents(text, str(path), model)
 
 
 def parse(text: str, name: str, model: type[Model]) -> Model:
@@ -104,21 +135,22 @@ def parse(text: str, name: str, model: type[Model]) -> Model:
     Raises:
         ConfigError: as `load`.
     """
-    return validated(_keys(text, name, model), name, model)
+    contents = _contents(text, name, model)
+    return validated(contents.keys, name, model, contents.places)
 
 
-def _keys(text: str, name: str, model: type[Section]) -> dict[str, Any]:
+def _contents(text: str, name: str, model: type[Section]) -> Contents:
     try:
-        data = bounded_yaml.parse(text)
+        data, lines = bounded_yaml.read(text)
     except YamlError as error:
-        where = name if error.line is None else f"{name}, line {error.line}"
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(f"{Place(name, error.line)}: {error}") from error
     if data is None:
         data = {}
     if not isinstance(data, dict):
         first = next(iter(model.model_fields))
         raise ConfigError(f"{name}: expected keys such as `{first}:` at the top level")
-    return {key: _filled(key, value, model) for key, value in data.items()}
+    keys = {key: _filled(key, value, model) for key, value in data.items()}
+    return Contents(keys, {where: Place(name, line) for where, line in lines.items()})
 
 
 def _filled(key: Any, value: Any, model: type[Section]) -> Any:
@@ -136,7 +168,7 @@ def validated(
     data: dict[str, Any],
     name: str,
     model: type[Model],
-    sources: Mapping[tuple[str, ...], str] | None = None,
+    places: Mapping[Where, Place] | None = None,
 ) -> Model:
     """Check data already read; `name` stands for it in errors.
 
@@ -144,7 +176,7 @@ def validated(
         data: keys and values.
         name: of the file.
         model: to check against.
-        sources: the file of each section or key that stands in another file.
+        places: where the keys stand.
 
     Raises:
         ConfigError: an unknown key or a bad value.
@@ -152,62 +184,25 @@ def validated(
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        details = _without_consequences(error.errors(include_url=False))
-        faults: dict[str, list[str]] = {}
-        for detail in details:
-            place = detail["loc"]
-            file = (sources or {}).get(place[:2]) or (sources or {}).get(place[:1]) or name
-            told = faults.setdefault(file, [])
-            told.append(_explain(place, detail, model) if len(told) < _FAULTS_TOLD else "")
-        sentences = [f"{file}: " + _joined(lines) for file, lines in faults.items()]
-        raise ConfigError("; ".join(sentences)) from error
+        details = without_consequences(error.errors(include_url=False))
+        told, before = [], Place("")
+        for detail in details[:_FAULTS_TOLD]:
+            place = _place(detail["loc"], places or {}, name)
+            repeats = place.file == before.file
+            where = (
+                ""
+                if place == before
+                else f"line {place.line}: "
+                if repeats and place.line
+                else f"{place}: "
+            )
+            told.append(where + explained(detail, model, model.former_keys))
+            before = place
+        more = len(details) - _FAULTS_TOLD
+        raise ConfigError("; ".join(told) + (f"; and {more} more" if more > 0 else "")) from error
 
 
-def _joined(faults: list[str]) -> str:
-    """The first faults of a file as one sentence, and how many more there are."""
-    more = len(faults) - _FAULTS_TOLD
-    return "; ".join(faults[:_FAULTS_TOLD]) + (f"; and {more} more" if more > 0 else "")
-
-
-def shortened(value: Any) -> str:
-    """A value as an error message shows it."""
-    text = repr(value)
-    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
-
-
-def _without_consequences(details: list[Any]) -> list[Any]:
-    """Drop "too short" for a list that is short only because an item was refused."""
-    places = [detail["loc"] for detail in details]
-    return [
-        detail
-        for detail in details
-        if detail["type"] != "too_short"
-        or not any(
-            len(p) > len(detail["loc"]) and p[: len(detail["loc"])] == detail["loc"] for p in places
-        )
-    ]
-
-
-def _explain(location: tuple[int | str, ...], detail: Any, model: type[Section]) -> str:
-    where = ".".join(str(part) for part in location)
-    if detail["type"] != "extra_forbidden":
-        message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
-        if not where:
-            return str(message)
-        value = "" if isinstance(detail["input"], dict) else f" (got {shortened(detail['input'])})"
-        return f"`{where}`: {message[:1].lower()}{message[1:]}{value}"
-    if where in model.former_keys:
-        return f"`{where}` {model.former_keys[where]}"
-    known = _keys_beside(location, model)
-    near = difflib.get_close_matches(str(location[-1]), known, n=1, cutoff=0.5)
-    hint = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
-    return f"`{where}` is not a known key; {hint}"
-
-
-def _keys_beside(location: tuple[int | str, ...], model: type[BaseModel]) -> list[str]:
-    for part in location[:-1]:
-        field = model.model_fields[str(part)].annotation
-        for kind in (field, *get_args(field)):
-            if isinstance(kind, type) and issubclass(kind, BaseModel):
-                model = kind
-    return list(model.model_fields)
+def _place(where: Where, places: Mapping[Where, Place], name: str) -> Place:
+    """The place of a key, or of what it is part of."""
+    ends = range(len(where), 0, -1)
+    return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.files import bounded_yaml
+from companion.flight import flown_config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
@@ -76,17 +76,18 @@ class Session:
     async def fly(self) -> Summary:
         """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
 
+        `companion fly --config FOLDER/config.yaml` flies the same again, from any working folder.
+
         Raises:
             ConfigError: a maneuver cannot be flown; nothing was sent.
             LinkError: the link could not be opened; nothing was sent.
             OSError: the folder cannot be written; nothing was sent.
             RealtimeError: the system refused a required `realtime` setting; nothing was sent.
         """
-        if self._folder is not None:
-            flown = bounded_yaml.dump(self._config.model_dump(mode="json"))
-            (self._folder / "config.yaml").write_text(flown, encoding="utf-8")
         # This takes up to a second, during which an open link would not be read.
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
+        if self._folder is not None:
+            flown_config.record(self._config, self._folder, follows=self._plan is None)
         environment = self._environment
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
         with realtime.asked_for(wishes) as grants, self._recorder() as tlog:

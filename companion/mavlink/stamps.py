@@ -182,7 +182,7 @@ class StampJudge:
             self._remark(
                 f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
                 f"at {_date(kept)}, and that date is used; {SET_CLOCK}; if the clock was ahead "
-                "then, delete the file of time stamps (docs/companion-computer.md)"
+                "then, delete the file of time stamps (docs/signing.md)"
             )
         elif start < _PROGRAM_DATE:
             self._remark(

@@ -1,6 +1,7 @@
 """Base class and number types of every configuration section, and its error messages."""
 
 import difflib
+import re
 import typing
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _LISTED = 20
 """A message shows the list of known words up to this length."""
+_NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
 class Section(BaseModel):
@@ -59,12 +61,45 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     where = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
         owner = _model_at(model, path[:-1])
-        hint = suggestion(path[-1], owner.model_fields) if owner else ""
+        beside = owner.model_fields if owner else ()
+        elsewhere = [place for place in _places_of(path[-1], model) if place != where]
+        if elsewhere and not any(key.startswith(f"{path[-1]}_") for key in beside):
+            return f"{where} stands in the wrong place; write {' or '.join(elsewhere)}"
+        hint = suggestion(path[-1], beside) if owner else ""
         return f"unknown key {where}{hint}"
+    if detail["type"] in ("float_parsing", "int_parsing"):
+        return f"{where} must be a number: {_number_in(str(detail['input']))}"
     message = detail["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     return f"{where}: {message} (got {detail['input']!r:.60})"
+
+
+def error_path(error: ValidationError) -> list[str]:
+    """Return the keys that lead to the first error, the section ``mock`` before them."""
+    return ["mock", *(str(part) for part in error.errors()[0]["loc"])]
+
+
+def _number_in(text: str) -> str:
+    """Return what to write instead of a text."""
+    found = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if found is None:
+        return f"write digits, not {text!r:.60}"
+    number, unit = found[1].replace(",", "."), found[2].strip()
+    why = f" without {unit!r:.20}, for the key's name says the unit" if unit else ""
+    return f"write {number}{why} (got {text!r:.60})"
+
+
+def _places_of(key: str, model: type[BaseModel]) -> list[str]:
+    """Return where a key of this name may stand: at the top of ``mock``, or in its sections."""
+    places = [f"mock.{key}"] if key in model.model_fields else []
+    for section, field in model.model_fields.items():
+        sections = [
+            each for each in _models_of(field.annotation) if "kind" not in each.model_fields
+        ]
+        if any(key in each.model_fields for each in sections):
+            places.append(f"mock.{section}.{key}")
+    return places
 
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None:

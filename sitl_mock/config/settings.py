@@ -44,7 +44,8 @@ class SigningConfig(Section):
     """MAVLink 2 signing on every link of the vehicle."""
 
     passphrase_file: Path
-    """The first line is the passphrase. The key is its SHA-256, as in ground stations."""
+    """The first line is the passphrase. The key is its SHA-256, as in ground stations. A relative
+    path is relative to the file that names it."""
     accept_unsigned: bool | None = None
     """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
     autopilot does. ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link."""

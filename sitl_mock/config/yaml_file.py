@@ -6,8 +6,9 @@ The mock has its own reader because it shares no code with the program it tests.
 import os
 import re
 import stat
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -61,7 +62,34 @@ for _name, _pattern in _PLAIN.items():
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_decimal)
 
 
-def load_yaml(path: Path) -> Any:
+class Document(NamedTuple):
+    """A YAML document.
+
+    Attributes:
+        value: as plain Python values.
+        node: the same as YAML nodes, which know their lines.
+    """
+
+    value: Any
+    node: yaml.Node | None
+
+    def line(self, path: Sequence[str]) -> int | None:
+        """Return the line of the deepest key of this path that the document has, from 1."""
+        node, line = self.node, None
+        for part in path:
+            if isinstance(node, yaml.MappingNode):
+                found = {key.value: (key, value) for key, value in node.value}.get(part)
+            elif isinstance(node, yaml.SequenceNode) and part.isdigit():
+                item = node.value[int(part)] if int(part) < len(node.value) else None
+                found = None if item is None else (item, item)
+            else:
+                break
+            if found is not None:  # a part may name the member of a union instead
+                line, node = found[0].start_mark.line + 1, found[1]
+        return line
+
+
+def load_yaml(path: Path) -> Document:
     """Return the document in a file.
 
     Raises:
@@ -75,4 +103,22 @@ def load_yaml(path: Path) -> Any:
         content = file.read(_MOST_BYTES + 1)
     if len(content) > _MOST_BYTES:
         raise ValueError(f"is larger than {_MOST_BYTES // 1000} kB")
-    return yaml.load(content.decode("utf-8-sig"), _Loader)
+    loader = _Loader(content.decode("utf-8-sig"))
+    try:
+        node = loader.get_single_node()
+        value = None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
+    return Document(value, node)
+
+
+def explain_yaml(error: Exception) -> str:
+    """Return what is wrong with a file that cannot be read as YAML, on one line."""
+    mark = getattr(error, "problem_mark", None)
+    if mark is not None and "'\\t'" in str(getattr(error, "problem", "")):
+        return (
+            f"line {mark.line + 1}: a tab stands where YAML wants spaces; indent with two spaces "
+            "for each level"
+        )
+    problem = " ".join(str(error).split())
+    return f"is not valid YAML: {problem:.300}"

@@ -203,3 +203,15 @@ def test_the_loop_over_first_order_is_vectorised():
     assert "divpd" in code
     assert "sqrtpd" in code
     assert "atan" not in code
+
+
+def test_a_planner_with_memory_is_refused_in_a_sentence():
+    planner = make_planner("model-following", lag=0.047, dead_time=0.04)
+    level, ahead = [[1.0], [0.0], [0.0], [0.0]], [[0.2], [0.0], [0.0], [0.0]]
+    words = r"without memory \(first-order, .* one planner for each"
+    with pytest.raises(TypeError, match=words):
+        batch.rates(planner, level, ahead, DT)
+    with pytest.raises(TypeError, match=words):
+        batch.advance(planner, level, ahead, DT, 3)
+    with pytest.raises(TypeError, match=words):
+        batch.simulate(planner, level, ahead, DT, 3)

@@ -216,10 +216,10 @@ class _File(Section):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("old: {pace: 1}", "f.yaml: `old` is now `inner`"),
-        ("old:", "f.yaml: `old` is now `inner`"),
-        ("inner: {pace: 1}", "f.yaml: `inner.pace` is now `inner.speed_m_s`"),
-        ("pace: 1", "f.yaml: `pace` is not a known key; known here: inner"),
+        ("old: {pace: 1}", "f.yaml, line 1: `old` is now `inner`"),
+        ("old:", "f.yaml, line 1: `old` is now `inner`"),
+        ("inner: {pace: 1}", "f.yaml, line 1: `inner.pace` is now `inner.speed_m_s`"),
+        ("pace: 1", "f.yaml, line 1: `pace` is not a known key; known here: inner"),
     ],
 )
 def test_a_former_key_is_refused_with_what_became_of_it(text, words):
@@ -233,4 +233,4 @@ def test_a_former_key_of_the_configuration_says_what_became_of_it(key):
     text = "".join(f"{'  ' * depth}{part}:\n" for depth, part in enumerate(key.split(".")))
     with pytest.raises(ConfigError) as raised:
         parse(text, "c.yaml", Config)
-    assert str(raised.value) == f"c.yaml: `{key}` {FORMER_KEYS[key]}"
+    assert str(raised.value) == f"c.yaml, line {text.count(':')}: `{key}` {FORMER_KEYS[key]}"

@@ -69,9 +69,15 @@ def test_the_command_line_and_the_record_of_a_flight_see_the_merged_keys(files):
 @pytest.mark.parametrize(
     ("included", "words"),
     [
-        ("vehicle: {lag: 5}", "a.yaml: `vehicle.lag` is not a known key; did you mean `lag_ms`?"),
-        ("vehicel: {lag_ms: 5}", "a.yaml: `vehicel` is not a known key; did you mean `vehicle`?"),
-        ("vehicle: {lag_ms: -5}", "a.yaml: `vehicle.lag_ms`: input should be greater"),
+        (
+            "vehicle: {lag: 5}",
+            "a.yaml, line 1: `vehicle.lag` is not a known key; did you mean `lag_ms`?",
+        ),
+        (
+            "vehicel: {lag_ms: 5}",
+            "a.yaml, line 1: `vehicel` is not a known key; did you mean `vehicle`?",
+        ),
+        ("vehicle: {lag_ms: -5}", "a.yaml, line 1: `vehicle.lag_ms`: input should be greater"),
         ("vehicle: 3", "a.yaml: `vehicle` must hold keys, not 3"),
         ("- vehicle", "a.yaml: expected keys such as"),
         ("vehicle: {lag_ms: 1, lag_ms: 2}", "a.yaml, line 1: not valid YAML"),
@@ -90,7 +96,8 @@ def test_what_is_wrong_in_an_included_file_is_told_of_that_file(files, included,
 
 def test_faults_of_several_files_are_told_each_of_its_own(files):
     main_file = files(main="include: a.yaml\nlimits: {tilt: 3}\n", a="vehicle: {lag: 5}\n")
-    with pytest.raises(ConfigError, match=r"a\.yaml: `vehicle\.lag`.*main\.yaml: `limits\.tilt`"):
+    words = r"a\.yaml, line 1: `vehicle\.lag`.*main\.yaml, line 2: `limits\.tilt`"
+    with pytest.raises(ConfigError, match=words):
         load(main_file)
 
 
@@ -152,7 +159,7 @@ def test_what_is_not_a_file_name_cannot_be_included(files, value):
 def test_check_config_tells_it_as_usage(files, capsys):
     main_file = files(main="include: a.yaml\n", a="vehicle: {lag: 5}\n")
     assert main(["check-config", str(main_file)]) == 2
-    assert "a.yaml: `vehicle.lag`" in " ".join(capsys.readouterr().err.split())
+    assert "a.yaml, line 1: `vehicle.lag`" in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_schema_knows_include():

@@ -19,6 +19,8 @@ from companion.mavlink.transport.endpoint import (
     [
         ("udpin://0.0.0.0:14540", UdpIn("0.0.0.0", 14540)),
         ("udp://:14540", UdpIn("0.0.0.0", 14540)),
+        ("udp://0.0.0.0:14540", UdpIn("0.0.0.0", 14540)),
+        ("udp://127.0.0.1:14540", UdpIn("127.0.0.1", 14540)),
         ("udpin://127.0.0.1:0", UdpIn("127.0.0.1", 0)),
         ("udpout://drone.local:14580", UdpOut("drone.local", 14580)),
         ("udpout://[::1]:14580", UdpOut("::1", 14580)),
@@ -62,3 +64,44 @@ def test_notations(text, endpoint):
 def test_mistakes_are_named(text, hint):
     with pytest.raises(EndpointError, match=hint):
         parse_endpoint(text)
+
+
+_BAUD = "write serial:///dev/ttyACM0:BAUD with the baud rate of the autopilot's port"
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("/dev/ttyACM0", _BAUD),
+        ("/dev/ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
+        ("/dev/ttyACM0,57600", "write serial:///dev/ttyACM0:57600"),
+        ("ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
+        ("serial:///dev/ttyACM0", _BAUD),
+        ("serial://ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
+        ("serial:/dev/ttyACM0:57600", "write serial:///dev/ttyACM0:57600"),
+        ("COM3", "write serial://COM3:BAUD"),
+        ("udp:127.0.0.1:14550", "write udpin://127.0.0.1:14550"),
+        ("udpin:0.0.0.0:14550", "write udpin://0.0.0.0:14550"),
+        ("tcp:192.0.2.7:5760", "write tcp://192.0.2.7:5760"),
+        (":14540", "write udpin://0.0.0.0:14540"),
+        ("14540", "write udpin://0.0.0.0:14540"),
+        (
+            "192.0.2.7:14540",
+            "write udpin://0.0.0.0:14540 to wait for the vehicle, or udpout://192.0.2.7:14540 to "
+            "send to 192.0.2.7 first",
+        ),
+        ("udp://192.0.2.7:14540", "udpin://0.0.0.0:14540 to wait for the vehicle"),
+        ("usb", "write udpin://0.0.0.0:14540, udpout://HOST:PORT"),
+    ],
+)
+def test_the_notation_of_another_program_is_told_ours(text, remedy):
+    with pytest.raises(EndpointError) as caught:
+        parse_endpoint(text)
+    assert remedy in str(caught.value)
+
+
+def test_a_remedy_is_understood():
+    for text in ("/dev/ttyACM0,57600", "udp:127.0.0.1:14550", "tcp:192.0.2.7:5760", "14540"):
+        with pytest.raises(EndpointError) as caught:
+            parse_endpoint(text)
+        parse_endpoint(str(caught.value).partition("write ")[2])

@@ -217,7 +217,12 @@ GOOD = ["t,x,y,z", "0,0,0,0", "1,1,0,0", "2,2,0,0", "3,3,0,0"]
     ("lines", "text"),
     [
         (GOOD[:4], "needs a header and at least 4 samples"),
-        (["t,x,y", *GOOD[1:]], "names no position; expected p_x,p_y,p_z or x,y,z"),
+        (["t,x,y", *GOOD[1:]], "column z of the position is missing; expected .*found t,x,y"),
+        (["t,lat,lon", *GOOD[1:]], "names no position; expected p_x,p_y,p_z or x,y,z"),
+        (["0,0,0,0", *GOOD[1:]], "first line must name the columns, such as t,x,y,z"),
+        (["t;x;y;z", *["1;2;3;4"] * 4], "separated by semicolons; use commas"),
+        (["t_ms,x,y,z", *GOOD[1:]], "column t_ms is in ms; give t in s, m or rad"),
+        (["t,x,y,z,yaw [deg]", *GOOD[1:]], r"column yaw \[deg\] is in deg; give yaw in s, m or"),
         (["x,y,z,w", *GOOD[1:]], "names no time"),
         ([*GOOD[:2], "1,one,0,0", *GOOD[3:]], "line 3: x is 'one', not a number"),
         ([*GOOD[:2], "1,nan,0,0", *GOOD[3:]], "line 3: x is 'nan', not a number"),
@@ -249,3 +254,18 @@ def test_a_file_that_cannot_be_read_is_refused(tmp_path):
     (tmp_path / "picture.csv").write_bytes(b"\xff\xd8\xff\xe0")
     with pytest.raises(TrajectoryError, match=r"picture\.csv: not a text file"):
         read_csv(tmp_path / "picture.csv")
+
+
+def test_a_column_may_say_its_unit():
+    for header in ("t_s,x_m,y_m,z_m,yaw_rad", "time [s],x [m],y [m],z (m),heading[rad]"):
+        read = table([header, *(f"{t},1,2,{t},0.5" for t in range(5))], "x")
+        assert read.position[3].tolist() == [1.0, 2.0, 3.0]
+        assert read.yaw is not None
+
+
+def test_a_comment_before_the_header_says_the_frame_and_unused_columns_are_known():
+    lines = ["t,x,y,z,battery", *(f"{t},1,2,{t},9" for t in range(5))]
+    assert table(lines, "x").frame is None
+    assert table(["# made by hand", "# frame: NED", *lines], "x").frame == "ned"
+    assert table([*lines[:3], "# frame: ned", *lines[3:]], "x").frame is None
+    assert table(lines, "x").unused == ("battery",)

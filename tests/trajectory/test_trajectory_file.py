@@ -10,7 +10,7 @@ import pytest
 import yaml
 from pydantic import BaseModel
 
-from companion.config.trajectory_file import TrajectoryFile, load
+from companion.config.trajectory_file import TrajectoryFile, load, read
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.guidance.trajectory.demand import demand, sampled
@@ -182,7 +182,8 @@ def test_a_csv_file_lies_beside_its_yaml_or_stands_alone(tmp_path):
 def test_a_fault_is_told_in_a_sentence_that_names_the_file(tmp_path, text, sentence):
     with pytest.raises(ConfigError) as caught:
         _load(tmp_path, text)
-    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}: ")
+    line = ", line 1" if sentence.startswith("`") else ""
+    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}{line}: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -211,3 +212,43 @@ def test_a_fault_in_a_csv_names_it_once(tmp_path, rows, sentence):
 def test_a_missing_csv_is_told_too(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.csv: cannot read it"):
         load(tmp_path / "none.csv")
+
+
+TABLE = ["t,x,y,z", *(f"{t / 10},{t * t * (30 - t) / 4500},0,{t / 100}" for t in range(20))]
+
+
+def test_the_frame_of_a_table_is_said_and_changes_where_it_leads(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(TABLE))
+    assumed, notes = read(path)
+    (note,) = notes
+    assert note.startswith("a.csv is read in s, m and rad with x east, y north, z up (enu), for it")
+    assert "# frame: ned" in note
+    path.write_text("\n".join(["# frame: ned", *TABLE]))
+    told, notes = read(path)
+    assert notes == ("a.csv is read in s, m and rad with x north, y east, z down (ned)",)
+    north, east, down = told.at(1.5).position
+    assert assumed.at(1.5).position == pytest.approx((east, north, -down))
+    (tmp_path / "b.yaml").write_text("csv: {file: a.csv, frame: ned}")
+    assert read(tmp_path / "b.yaml").notes == notes
+
+
+@pytest.mark.parametrize(
+    ("comment", "words"),
+    [
+        ("# frame: enu", "its comment says frame: enu, and csv.frame says ned"),
+        ("# frame: body", "its frame 'body' is not one of enu, nwu, ned"),
+    ],
+)
+def test_a_frame_that_cannot_be_is_refused(tmp_path, comment, words):
+    (tmp_path / "a.csv").write_text("\n".join([comment, *TABLE]))
+    (tmp_path / "b.yaml").write_text("csv: {file: a.csv, frame: ned}")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "b.yaml")
+    assert words in str(caught.value)
+
+
+def test_unused_columns_are_told(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([f"{TABLE[0]},volts", *(f"{line},9" for line in TABLE[1:])]))
+    assert read(path).notes[1] == "a.csv: not used are the columns volts"

@@ -3,7 +3,8 @@
 A header names the columns: Agilicious' `t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,…,a_lin_x,…` or
 `t,x,y,z,yaw,vx,vy,vz,ax,ay,az` and their like; in s, m and rad, quaternions w first. Time and
 position are required. Velocity, acceleration (with velocity), and yaw or else a quaternion are used
-if present; other columns are ignored.
+if present; other columns are ignored. A name may end in its unit: `x_m`, `vx_m_s`, `yaw_rad`. A
+comment before the header, `# frame: ned`, says the frame.
 """
 
 import csv
@@ -17,25 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from companion.files.bounded_file import FileRefusedError, read_text
+from companion.guidance.trajectory.csv_header import columns_of, rows_of, shown, without_unit
 from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
-
-_Spellings = tuple[tuple[str, ...], ...]
-
-
-def _of_axes(*patterns: str) -> _Spellings:
-    return tuple(tuple(pattern.format(axis) for axis in "xyz") for pattern in patterns)
-
-
-_SPELLINGS: dict[str, _Spellings] = {
-    "time": (("t",), ("time",), ("time_s",), ("timestamp",)),
-    "position": _of_axes("p_{}", "{}", "p{}", "pos_{}"),
-    "velocity": _of_axes("v_{}", "v{}", "vel_{}", "d{}"),
-    "acceleration": _of_axes("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
-    "yaw": (("yaw",), ("psi",), ("heading",)),
-    "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
-}
-"""Column names by quantity, in lower case; the first spelling that is complete counts."""
 
 _FEWEST = 4
 """Samples; fewer do not determine a smooth curve."""
@@ -65,9 +50,6 @@ _RANGES = {
 _LENGTH_ERROR = 0.1
 """Largest error of a quaternion's length: files round it."""
 
-_SHOWN = 60
-"""Characters of the file in a message."""
-
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -78,12 +60,16 @@ class Table:
         position: (m, 3), m.
         derivatives: velocity, or velocity and acceleration, (m, 3) each, as far as the file goes.
         yaw: (m,), rad, of tilt-yaw and without jumps; None if the file does not tell.
+        frame: as the comment before the header names it; None if there is none.
+        unused: names of the columns that are not read.
     """
 
     times: Floats
     position: Floats
     derivatives: tuple[Floats, ...]
     yaw: Floats | None
+    frame: str | None = None
+    unused: tuple[str, ...] = ()
 
 
 def read_csv(path: Path) -> Table:
@@ -113,17 +99,15 @@ def table(lines: Iterable[str], name: str) -> Table:
     Raises:
         TrajectoryError: as `read`.
     """
-    reader = csv.reader(lines)
-    samples = (
-        (reader.line_num, row) for row in reader if row and not row[0].lstrip().startswith("#")
-    )
-    rows = list(itertools.islice(samples, _MOST + 2))
+    frames: list[str] = []
+    rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST + 2))
     if len(rows) <= _FEWEST:
         raise TrajectoryError(f"{name}: needs a header and at least {_FEWEST} samples")
     if len(rows) > _MOST + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST} samples; leave some out")
-    header = [column.strip().lower() for column in rows[0][1]]
-    groups = _groups(header, name)
+    named = [column.strip().lower() for column in rows[0][1]]
+    header = [without_unit(column) for column in named]
+    groups = columns_of(header, named, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
     times = data["time"][:, 0]
     lines_of = [line for line, _ in rows[1:]]
@@ -132,25 +116,15 @@ def table(lines: Iterable[str], name: str) -> Table:
         counted = values - values[0] if group == "position" else values
         _require_range(group, counted, groups[group], lines_of, name)
     known = [data[group] for group in ("velocity", "acceleration") if group in data]
-    return Table(times - times[0], data["position"], tuple(known), _yaw(data))
-
-
-def _groups(header: list[str], name: str) -> dict[str, tuple[str, ...]]:
-    """The columns of each quantity that the file tells."""
-    groups = {}
-    for group, spellings in _SPELLINGS.items():
-        found = [names for names in spellings if all(column in header for column in names)]
-        if found:
-            groups[group] = found[0]
-        elif group in ("time", "position"):
-            known = " or ".join(",".join(names) for names in spellings)
-            raise TrajectoryError(
-                f"{name}: the header names no {group}; expected {known}, found "
-                f"{_shown(','.join(header))}"
-            )
-    if "velocity" not in groups:
-        groups.pop("acceleration", None)
-    return groups
+    used = {column for names in groups.values() for column in names}
+    return Table(
+        times - times[0],
+        data["position"],
+        tuple(known),
+        _yaw(data),
+        frames[0] if frames else None,
+        tuple(column for column in header if column and column not in used),
+    )
 
 
 def _numbers(
@@ -172,15 +146,10 @@ def _numbers(
             # Python would read 1_0 as 10.
             if not isfinite(number) or "_" in text:
                 raise TrajectoryError(
-                    f"{name}, line {line}: {names[i]} is {_shown(text)!r}, not a number"
+                    f"{name}, line {line}: {names[i]} is {shown(text)!r}, not a number"
                 )
             numbers[k, i] = number
     return numbers
-
-
-def _shown(text: str) -> str:
-    """Text of the file, shortened for a message."""
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
 
 
 def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
@@ -193,7 +162,7 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
             raise TrajectoryError(f"{name}, line {line}: time does not increase")
         raise TrajectoryError(
             f"{name}, line {line}: {step:.3g} s after the sample before; from {_LEAST_STEP:g} to "
-            f"{_LONGEST_STEP:g} s can be used"
+            f"{_LONGEST_STEP:g} s can be used, and time is read in s"
         )
     if times[-1] - times[0] < _SHORTEST:
         raise TrajectoryError(f"{name}: lasts less than {_SHORTEST:g} s")

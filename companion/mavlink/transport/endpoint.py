@@ -12,6 +12,12 @@ _HELP = (
 _PEER = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
 _NETWORK = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
 _SERIAL = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
+_DEVICE = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
+"""A serial device as other programs write it, and its baud rate."""
+_ADDRESS = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
+"""An address as other programs write it: of pymavlink's kind, or without a scheme."""
+_OURSELVES = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
+"""Hosts at which `udp://` can only mean to listen."""
 
 
 @dataclass(frozen=True)
@@ -79,20 +85,22 @@ _NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
 def parse_endpoint(text: str) -> Endpoint:
     """Read an endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`.
 
-    `udp://` means `udpin://`. An empty host of a listening endpoint means every interface. A
-    listening endpoint may name its peers: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in
-    `?peer=192.0.2.7:14580`, several separated by commas.
+    `udp://` with an address of this computer means `udpin://`, as in MAVSDK and mavlink-router. An
+    empty host of a listening endpoint means every interface. A listening endpoint may name its
+    peers: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in `?peer=192.0.2.7:14580`,
+    several separated by commas.
 
     Raises:
         EndpointError: The text is in none of the five notations, or its port is not 1..65535
-            (a listening endpoint also takes 0: any free port).
+            (a listening endpoint also takes 0: any free port). If it is a notation of another
+            program, the message says what to write instead.
     """
     scheme, separator, rest = text.strip().partition("://")
     if separator and scheme == "serial":
         return _serial(text, rest)
     kind = _NETWORK_KINDS.get(scheme)
     if not separator or kind is None:
-        raise EndpointError(f"endpoint {text!r} is not understood: {_HELP}")
+        raise EndpointError(f"endpoint {text!r} is not understood: {_remedy(text)}")
     rest, question, query = rest.partition("?")
     found = _NETWORK.fullmatch(rest.rstrip("/"))
     if found is None:
@@ -101,6 +109,11 @@ def parse_endpoint(text: str) -> Endpoint:
     host, port = found[1].strip("[]") or ("0.0.0.0" if listens else ""), int(found[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
+    if scheme == "udp" and host not in _OURSELVES:
+        raise EndpointError(
+            f"endpoint {text!r} does not say who listens: write udpin://0.0.0.0:{port} to wait for "
+            f"the vehicle, or udpout://{found[1]}:{port} to send to {host} first"
+        )
     if not is_host(host):
         raise EndpointError(f"endpoint {text!r}: {host!r} is no host name or address")
     if not (0 if listens else 1) <= port <= 65535:
@@ -146,5 +159,32 @@ def is_host(text: str) -> bool:
 def _serial(text: str, rest: str) -> SerialPort:
     found = _SERIAL.fullmatch(rest)
     if found is None:
-        raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD after serial://: {_HELP}")
+        raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {_remedy(text)}")
     return SerialPort(found[1], int(found[2]))
+
+
+def _remedy(text: str) -> str:
+    """What to write instead of a notation of another program; all of ours if it is unknown."""
+    text = text.strip()
+    if device := _DEVICE.fullmatch(text):
+        name, baud = device[1], device[2]
+        unix = name.removeprefix("/").removeprefix("dev/")
+        place = name if name.startswith("COM") else f"/dev/{unix}"
+        if baud:
+            return f"write serial://{place}:{baud}"
+        return (
+            f"write serial://{place}:BAUD with the baud rate of the autopilot's port, such as "
+            f"serial://{place}:57600"
+        )
+    if address := _ADDRESS.fullmatch(text):
+        scheme, host, port = address[1], address[2], address[3]
+        kind = _NETWORK_KINDS.get(scheme or "")
+        if kind is not None and (scheme != "udp" or host in _OURSELVES):
+            ours = "udpin" if scheme == "udp" else scheme
+            return f"write {ours}://{host or '0.0.0.0'}:{port}"
+        if scheme in (None, "udp"):
+            out = f", or udpout://{host}:{port} to send to {host} first" if host else ""
+            return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"
+    if text.isdigit() and 0 < int(text) <= 65535:
+        return f"write udpin://0.0.0.0:{text}"
+    return _HELP

@@ -1,0 +1,148 @@
+"""The trajectories of known form, as sections of a YAML file."""
+
+from math import radians
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from companion.files.yaml_file import Section
+from companion.guidance.trajectory import (
+    FARTHEST,
+    FASTEST,
+    LONGEST,
+    Hover,
+    Laps,
+    Trajectory,
+    bernoulli_eight,
+    circle,
+    gerono_eight,
+    helix,
+    line,
+    waypoints,
+)
+
+Metres = Annotated[float, Field(ge=0.01, le=1000.0)]
+Speed = Annotated[float, Field(ge=0.01, le=FASTEST)]
+Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
+Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
+Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Place = tuple[Offset, Offset, Offset]
+FixedOrAlong = Literal["fixed", "along"]
+
+
+class HoverShape(Section):
+    """Stay where it begins."""
+
+    duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
+    """Duration."""
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        return Hover(self.duration_s)
+
+
+class LineShape(Section):
+    """A straight line with limited jerk, rest to rest."""
+
+    to_m: Place
+    """The end: north, east, down of the start."""
+    speed_m_s: Speed
+    """Largest speed."""
+    acceleration_m_s2: Acceleration = 3.0
+    """Largest acceleration."""
+    jerk_m_s3: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
+    """Largest jerk."""
+    heading: FixedOrAlong = "fixed"
+    """fixed: as it was at the start. along: facing along the path."""
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        along = self.heading == "along"
+        return line(self.to_m, self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3, along)
+
+
+class _Rounds(Section):
+    """Keys of all figures that are flown in laps."""
+
+    laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
+    """How often round, gathering and losing speed included."""
+    acceleration_m_s2: Acceleration = 3.0
+    """Largest along the path while speed is gathered or lost; too few laps take more."""
+    direction_deg: Degrees = 0.0
+    """Where the figure lies from the start, clockwise from north."""
+    heading: FixedOrAlong = "fixed"
+    """fixed: as it was at the start. along: facing along the path."""
+
+    def _laps(self, speed: float) -> Laps:
+        along = self.heading == "along"
+        direction = radians(self.direction_deg)
+        return Laps(speed, self.laps, self.acceleration_m_s2, direction, along)
+
+
+class CircleShape(_Rounds):
+    """A circle, anticlockwise from above; it begins and ends where the vehicle is."""
+
+    radius_m: Metres
+    """Radius; the centre lies in direction_deg of the start."""
+    speed_m_s: Speed
+    """Speed along it, once gathered."""
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        return circle(self.radius_m, self._laps(self.speed_m_s))
+
+
+class HelixShape(CircleShape):
+    """A circle that rises."""
+
+    rise_m: Annotated[float, Field(ge=-1000.0, le=1000.0)]
+    """Upwards in each lap; negative sinks."""
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        return helix(self.radius_m, self.rise_m, self._laps(self.speed_m_s))
+
+
+class FigureEightShape(_Rounds):
+    """A figure-eight about the start, its long side along direction_deg."""
+
+    half_width_m: Metres
+    """From the middle to a tip."""
+    peak_speed_m_s: Speed
+    """Speed at the fastest place: gerono, in the middle; bernoulli, at the tips."""
+    shape: Literal["gerono", "bernoulli"] = "gerono"
+    """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
+    φ runs steadily."""
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        eight = gerono_eight if self.shape == "gerono" else bernoulli_eight
+        return eight(self.half_width_m, self._laps(self.peak_speed_m_s))
+
+
+class WaypointsShape(Section):
+    """Through points without a stop, by minimum snap."""
+
+    points_m: Annotated[tuple[Place, ...], Field(min_length=1, max_length=1000)]
+    """north, east, down of the start; the start itself is not among them."""
+    speed_m_s: Speed
+    """Largest speed."""
+    acceleration_m_s2: Acceleration = 3.0
+    """Largest acceleration. The path is made as fast as this and the speed allow."""
+    heading: FixedOrAlong = "fixed"
+    """fixed: as it was at the start. along: facing along the path."""
+    headings_deg: tuple[Degrees | None, ...] | None = None
+    """Instead of `heading`: at each point, clockwise from north; null where it does not matter."""
+
+    @model_validator(mode="after")
+    def _one_heading(self) -> "WaypointsShape":
+        if self.headings_deg is not None and "heading" in self.model_fields_set:
+            raise ValueError("give either heading or headings_deg")
+        return self
+
+    def trajectory(self, folder: Path) -> Trajectory:
+        """What it describes."""
+        headings = [None if h is None else radians(h) for h in self.headings_deg or ()]
+        along = self.heading == "along"
+        return waypoints(self.points_m, self.speed_m_s, self.acceleration_m_s2, along, headings)

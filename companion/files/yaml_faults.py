@@ -1,0 +1,188 @@
+"""What is wrong with a value or a key, and how to mend it: one sentence for each fault."""
+
+import difflib
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from math import degrees, radians
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+_LONGEST_TOLD = 60
+_PLACES_TOLD = 3
+_ALIKE, _ELSEWHERE_ALIKE = 0.5, 0.75
+"""Least likeness of a key beside the unknown one, and of one in another section."""
+
+_NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
+
+_SLIPS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
+    ("_deg_s2", "rad/s²", degrees),
+    ("_deg_s", "rad/s", degrees),
+    ("_deg", "rad", degrees),
+    ("_rad_s", "°/s", radians),
+    ("_ms", "s", lambda value: 1000.0 * value),
+    ("_s", "ms", lambda value: 0.001 * value),
+    ("_percent", "parts of 1", lambda value: 100.0 * value),
+    ("", "%", lambda value: 0.01 * value),
+)
+"""By the end of a key, the unit that its own is mistaken for, and the conversion to its own; the
+first that fits."""
+_BOUNDS: dict[str, Callable[[float, float], bool]] = {
+    "ge": lambda value, bound: value >= bound,
+    "gt": lambda value, bound: value > bound,
+    "le": lambda value, bound: value <= bound,
+    "lt": lambda value, bound: value < bound,
+}
+
+
+def shortened(value: Any) -> str:
+    """A value as an error message shows it."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
+
+
+def kinds_in(annotation: Any) -> set[Any]:
+    """A type and the types inside it, for unions and annotated types."""
+    return {annotation}.union(*(kinds_in(part) for part in get_args(annotation)))
+
+
+def without_consequences(details: list[Any]) -> list[Any]:
+    """Drop "too short" for a list that is short only because an item was refused."""
+    places = [detail["loc"] for detail in details]
+    return [
+        detail
+        for detail in details
+        if detail["type"] != "too_short"
+        or not any(
+            len(p) > len(detail["loc"]) and p[: len(detail["loc"])] == detail["loc"] for p in places
+        )
+    ]
+
+
+def other_unit(key: str, value: float) -> tuple[str, float]:
+    """The unit that this key's is mistaken for, and the value converted from it."""
+    unit, convert = next((unit, convert) for end, unit, convert in _SLIPS if key.endswith(end))
+    return unit, convert(value)
+
+
+def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
+    """One sentence.
+
+    Args:
+        detail: an error of pydantic.
+        model: of the file's top level.
+        former: keys that were renamed or removed → what became of them.
+    """
+    location, value = detail["loc"], detail["input"]
+    where = ".".join(str(part) for part in location)
+    if detail["type"] == "extra_forbidden":
+        told = former.get(where)
+        return f"`{where}` {told}" if told else f"`{where}` {_unknown(location, value, model)}"
+    message = detail["msg"].removeprefix("Value error, ").replace("tuple", "list")
+    if not where:
+        return str(message)
+    if remedy := _remedy(detail, str(location[-1])):
+        return f"`{where}` {remedy}"
+    got = "" if isinstance(value, dict) else f" (got {shortened(value)})"
+    return f"`{where}`: {message[:1].lower()}{message[1:]}{got}{_slip(detail, where)}"
+
+
+def _remedy(detail: Any, key: str) -> str | None:
+    """What to write instead, for values of another kind than the key's."""
+    kind, value = detail["type"], detail["input"]
+    if kind == "value_error" and "must be a number" in detail["msg"]:
+        return f"must be a number: {_number_in(key, value)} (got {shortened(value)})"
+    if kind in ("float_parsing", "int_parsing"):
+        return f"must be a number: {_number_in(key, str(value))} (got {shortened(value)})"
+    if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
+        return "has no value; write one behind the colon, or take the line out"
+    if kind in ("model_type", "dict_type", "model_attributes_type"):
+        return (
+            f"is a section: its keys stand below it, indented by two spaces, a colon and a space "
+            f"behind each (got {shortened(value)})"
+        )
+    if kind == "tuple_type" and isinstance(value, str | int | float):
+        return f"is a list: write `{key}: [{value}]`"
+    return None
+
+
+def _number_in(key: str, text: str) -> str:
+    """What to write instead of a text."""
+    found = _NUMBER_AND_UNIT.fullmatch(text.strip())
+    if found is None:
+        return "write digits, with a point for decimals"
+    number, unit = found[1].replace(",", "."), found[2].strip()
+    other, meant = other_unit(key, float(number))
+    if unit == other:
+        return f"write {meant:.4g}"
+    if unit:
+        return f"write {number} without {unit!r}, for the key's name says the unit"
+    if "," in found[1]:
+        return f"write {number}, with a point for decimals"
+    return f"write {number} without quotation marks"
+
+
+def _slip(detail: Any, where: str) -> str:
+    """A hint where the value would keep its bound in the unit that it is mistaken for."""
+    bound = detail.get("ctx", {})
+    value = detail["input"]
+    if not isinstance(value, int | float) or not value:
+        return ""
+    unit, meant = other_unit(where, value)
+    kept = [keeps(meant, bound[name]) for name, keeps in _BOUNDS.items() if name in bound]
+    return f"; if it is in {unit}, write {meant:.4g}" if kept and all(kept) else ""
+
+
+def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]) -> str:
+    """That a key is unknown, and the key that was meant."""
+    name = str(location[-1])
+    beside = list(_model_at(location, model).model_fields)
+    everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
+    if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in beside):
+        same = [".".join((*place, key)) for key, place in everywhere if key == name]
+        if same:
+            return f"stands in the wrong place; write {_either(same)}"
+    near = _nearest(name, beside, _ALIKE)
+    if not isinstance(value, dict):
+        far = _nearest(name, [key for key, _ in everywhere], _ELSEWHERE_ALIKE)
+        if far and (not near or _likeness(name, far) > _likeness(name, near)):
+            places = [".".join((*place, key)) for key, place in everywhere if key == far]
+            return f"is not a known key; did you mean {_either(places)}?"
+    hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(beside)}"
+    return f"is not a known key; {hint}"
+
+
+def _either(places: list[str]) -> str:
+    """Some dotted keys as alternatives."""
+    return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
+
+
+def _likeness(one: str, other: str) -> float:
+    """From 0 to 1; a key that lacks only its unit is very like."""
+    if other.startswith(f"{one}_"):
+        return 0.99
+    return difflib.SequenceMatcher(None, one, other).ratio()
+
+
+def _nearest(name: str, keys: Iterable[str], least: float) -> str | None:
+    likeness = {key: _likeness(name, key) for key in keys}
+    best = max(likeness, key=likeness.__getitem__, default=None)
+    return best if best is not None and likeness[best] >= least else None
+
+
+def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """The keys of the sections of a file's top level: (section, key)."""
+    for section, field in model.model_fields.items():
+        for kind in kinds_in(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                yield from (((section,), key) for key in kind.model_fields)
+
+
+def _model_at(location: tuple[int | str, ...], model: type[BaseModel]) -> type[BaseModel]:
+    """The model that the last key of a location is refused by."""
+    for part in location[:-1]:
+        field = model.model_fields[str(part)].annotation
+        for kind in (field, *get_args(field)):
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                model = kind
+    return model

@@ -1,0 +1,68 @@
+"""The configuration of a flight in the flight's own folder, with what it flies: it flies again."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from companion.config import Config
+from companion.config.files import FILES_READ
+from companion.config.trajectory_file import TrajectoryFile, is_table
+from companion.files import bounded_yaml, yaml_file
+
+_NAME = "config.yaml"
+_TRAJECTORY = "trajectory"
+"""Folder of the copy of the trajectory's file, and of the table that it names."""
+_TABLE = "table.csv"
+
+
+def record(config: Config, folder: Path, *, follows: bool = True) -> None:
+    """Write `config.yaml` to the folder of a flight, and copy the trajectory's file there.
+
+    The keys of included files stand in it. Other files that it names stay where they are, a signing
+    key among them, and are named by their whole path.
+
+    Args:
+        config: of the flight; its trajectory can be read.
+        folder: of the flight.
+        follows: whether the maneuvers of the configuration are flown, its trajectory among them.
+
+    Raises:
+        OSError: a file cannot be read or written.
+    """
+    data = config.model_dump(mode="json")
+    for place in FILES_READ:
+        _make_absolute(data, place)
+    path = config.flight.trajectory
+    if follows and path is not None and "trajectory" in config.flight.maneuvers:
+        data["flight"]["trajectory"] = f"{_TRAJECTORY}/{_copied(path, folder / _TRAJECTORY)}"
+    (folder / _NAME).write_text(bounded_yaml.dump(data), encoding="utf-8")
+
+
+def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:
+    *sections, key = place
+    section: Any = data
+    for name in sections:
+        section = section.get(name) if isinstance(section, dict) else None
+    if isinstance(section, dict) and isinstance(section.get(key), str):
+        section[key] = str(Path(section[key]).absolute())
+
+
+def _copied(path: Path, folder: Path) -> str:
+    """Copy a trajectory's file, and the table that it names; returns the copy's name."""
+    folder.mkdir()
+    copy = folder / path.name
+    shape = None if is_table(path) else yaml_file.load(path, TrajectoryFile)
+    if shape is None or shape.csv is None:
+        shutil.copyfile(path, copy)
+        return copy.name
+    table = shape.csv.file
+    # The table lies beside its file now, so the file must name it by its name alone.
+    name = _TABLE if table.name == path.name else table.name
+    shutil.copyfile(path.parent / table, folder / name)
+    if table == Path(name):
+        shutil.copyfile(path, copy)
+    else:
+        data = shape.model_dump(mode="json", exclude_unset=True)
+        data["csv"]["file"] = name
+        copy.write_text(bounded_yaml.dump(data), encoding="utf-8")
+    return copy.name

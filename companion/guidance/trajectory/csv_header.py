@@ -1,0 +1,126 @@
+"""The header of a CSV file: which columns hold which quantity, and in which frame."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from companion.guidance.trajectory.sample import TrajectoryError
+
+_Spellings = tuple[tuple[str, ...], ...]
+
+
+def _of_axes(*patterns: str) -> _Spellings:
+    return tuple(tuple(pattern.format(axis) for axis in "xyz") for pattern in patterns)
+
+
+_SPELLINGS: dict[str, _Spellings] = {
+    "time": (("t",), ("time",), ("timestamp",)),
+    "position": _of_axes("p_{}", "{}", "p{}", "pos_{}"),
+    "velocity": _of_axes("v_{}", "v{}", "vel_{}", "d{}"),
+    "acceleration": _of_axes("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
+    "yaw": (("yaw",), ("psi",), ("heading",)),
+    "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
+}
+"""Column names by quantity, in lower case; the first spelling that is complete counts."""
+
+_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(m_s2|m/s\^?2|m/s²|m_s|m/s|rad|m|s)[\])]?")
+"""A column name with its unit behind it."""
+_OTHER_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(deg|°|ms|us|ns|cm|mm|ft)[\])]?")
+"""The same in a unit that is not read."""
+_FRAME = re.compile(r"#\s*frame\s*[:=]\s*(\S+)\s*")
+
+_SHOWN = 60
+"""Characters of the file in a message."""
+
+
+def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
+    """The lines and cells of the header and of the samples.
+
+    Args:
+        reader: of the `csv` module.
+        frames: receives the frames that comments before the header name.
+    """
+    header = True
+    for row in reader:
+        if not row:
+            continue
+        if not row[0].lstrip().startswith("#"):
+            header = False
+            yield reader.line_num, row
+        elif header and (found := _FRAME.fullmatch(",".join(row).strip().lower())):
+            frames.append(found[1])
+
+
+def without_unit(column: str) -> str:
+    """The name of a column without its unit."""
+    found = _UNIT.fullmatch(column)
+    return found[1] if found else column
+
+
+def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tuple[str, ...]]:
+    """The columns of each quantity that the file tells.
+
+    Args:
+        header: names of the columns, without their units.
+        named: as the file names them.
+        name: of the file.
+
+    Raises:
+        TrajectoryError: time or position is missing, or the header is none.
+    """
+    _require_header(named, name)
+    groups = {}
+    for group, spellings in _SPELLINGS.items():
+        found = [names for names in spellings if all(column in header for column in names)]
+        if found:
+            groups[group] = found[0]
+        elif group in ("time", "position"):
+            raise TrajectoryError(f"{name}: {_missing(group, header)}")
+    if "velocity" not in groups:
+        groups.pop("acceleration", None)
+    return groups
+
+
+def _require_header(named: list[str], name: str) -> None:
+    """Check that the first line names columns, separated by commas, in units that are read."""
+    columns = shown(",".join(named))
+    if len(named) == 1 and (found := re.search("[;\t]", named[0])):
+        separator = "semicolons" if found[0] == ";" else "tabs"
+        raise TrajectoryError(f"{name}: its columns are separated by {separator}; use commas")
+    if all(_is_number(column) for column in named):
+        raise TrajectoryError(
+            f"{name}: its first line must name the columns, such as t,x,y,z; found {columns}"
+        )
+    known = {column for spellings in _SPELLINGS.values() for names in spellings for column in names}
+    for column in named:
+        found = _OTHER_UNIT.fullmatch(column)
+        if found and found[1] in known:
+            raise TrajectoryError(
+                f"{name}: the column {column} is in {found[2]}; give {found[1]} in s, m or rad"
+            )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _missing(group: str, header: list[str]) -> str:
+    """Which columns of a quantity the header lacks, and which it has."""
+    spellings = _SPELLINGS[group]
+    known = " or ".join(",".join(names) for names in spellings)
+    nearest = max(spellings, key=lambda names: sum(column in header for column in names))
+    lacks = [column for column in nearest if column not in header]
+    if len(lacks) < len(nearest):
+        told = f"the column {' and '.join(lacks)} of the {group} is missing"
+    else:
+        told = f"the header names no {group}"
+    return f"{told}; expected {known}, found {shown(','.join(header))}"
+
+
+def shown(text: str) -> str:
+    """Text of the file, shortened for a message."""
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "…"

@@ -1,0 +1,87 @@
+"""What a configuration's commonest mistakes are told: one sentence with file, line and remedy."""
+
+import pytest
+
+from companion.config import Config
+from companion.config.files import load
+from companion.config.reference import keys
+from companion.files import bounded_yaml
+from companion.files.yaml_file import ConfigError
+
+
+def told(tmp_path, text):
+    path = tmp_path / "c.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load(path)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(f"{path}, line ")
+    return str(caught.value).removeprefix(f"{path}, ")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("limits:\n\tmax_tilt_deg: 20\n", "line 2: a tab stands where YAML wants spaces"),
+        ("limits:\n  max_tilt_deg: 20 deg\n", "line 2: `limits.max_tilt_deg` must be a number: "),
+        ("limits: {max_tilt_deg: 20 deg}", "write 20 without 'deg', for the key's name says the"),
+        ("limits: {max_tilt_deg: 0.35 rad}", "must be a number: write 20.05 (got '0.35 rad')"),
+        ("thrust: {hover_thrust: 49%}", "must be a number: write 0.49 (got '49%')"),
+        ("limits: {max_tilt_deg: '20'}", "write 20 without quotation marks (got '20')"),
+        ("limits: {max_tilt_deg: '20,5'}", "write 20.5, with a point for decimals"),
+        ("limits: {max_tilt_deg: steep}", "write digits, with a point for decimals"),
+        ("limits:\n\n  max_tilt_deg: 0.35\n", "line 3: `limits.max_tilt_deg`: input should be"),
+        ("limits: {max_tilt_deg: 0.35}", "(got 0.35); if it is in rad, write 20.05"),
+        ("deadman: {telemetry_stale_ms: 0.1}", "if it is in s, write 100"),
+        ("thrust: {hover_thrust: 49}", "if it is in %, write 0.49"),
+        ("guidance: {disturbance_bandwidth_rad_s: 100}", "if it is in °/s, write 1.745"),
+        ("max_tilt_deg: 20", "stands in the wrong place; write `limits.max_tilt_deg`"),
+        ("limits: {gain_per_s: 4}", "stands in the wrong place; write `planner.gain_per_s`"),
+        ("duration_s: 4", "write `hover.duration_s` or `steps.duration_s` or `corners.duration_s`"),
+        ("radius: 4", "did you mean `circle.radius_m`?"),
+        ("max_tlt_deg: 4", "did you mean `limits.max_tilt_deg`?"),
+        ("limits: {max_tilt: 4}", "did you mean `max_tilt_deg`?"),
+        ("limits: {max_tilt_deg: }", "has no value; write one behind the colon"),
+        ("limits: 20", "`limits` is a section: its keys stand below it, indented"),
+        ("limits:\n  max_tilt_deg:20\n", "a colon and a space behind each"),
+        ("flight: {maneuvers: hover}", "is a list: write `maneuvers: [hover]`"),
+    ],
+)
+def test_a_mistake_is_told_with_its_line_and_its_remedy(tmp_path, text, sentence):
+    assert sentence in told(tmp_path, text)
+
+
+def test_two_faults_of_one_file_name_it_once(tmp_path):
+    words = told(tmp_path, "max_tilt_deg: 20\nlimits:\n  fence_radius_m: 5 m\n")
+    assert words.count("c.yaml") == 0
+    assert "line 3: `limits.fence_radius_m`" in words or "line 1: `max_tilt_deg`" in words
+
+
+@pytest.mark.parametrize("key", list(keys(Config())), ids=lambda key: key.name)
+def test_every_key_in_the_wrong_section_is_told_its_own(tmp_path, key):
+    wrong = "link" if key.section != "link" else "limits"
+    if key.name in Config().model_dump()[wrong]:
+        pytest.skip("both sections have such a key")
+    sentence = told(tmp_path, f"{wrong}: {{{key.name}: 1}}\n")
+    assert f"`{wrong}.{key.name}` stands in the wrong place; write `" in sentence
+    owners = [one.section for one in keys(Config()) if one.name == key.name]
+    assert f"`{owners[0]}.{key.name}`" in sentence
+
+
+def test_lines_are_those_of_keys_and_of_items():
+    text = "a:\n  b: 1\n  c:\n    - 2\n    - d: 3\n      e: [4,\n        5]\nf: {g: 6}\n"
+    document = bounded_yaml.read(text)
+    assert document.root == {"a": {"b": 1, "c": [2, {"d": 3, "e": [4, 5]}]}, "f": {"g": 6}}
+    assert document.lines == {
+        ("a",): 1,
+        ("a", "b"): 2,
+        ("a", "c"): 3,
+        ("a", "c", 0): 4,
+        ("a", "c", 1): 5,
+        ("a", "c", 1, "d"): 5,
+        ("a", "c", 1, "e"): 6,
+        ("a", "c", 1, "e", 0): 6,
+        ("a", "c", 1, "e", 1): 7,
+        ("f",): 8,
+        ("f", "g"): 8,
+    }
