@@ -14,7 +14,7 @@ from companion.nmpc.settings import Settings
 _LEAST_COSINE = 0.2
 """cos(tilt) of the largest tilt that the models allow, 78°."""
 _LONGEST_COEFFICIENTS = sqrt(1.0 - _LEAST_COSINE**2)
-"""|c| at that tilt."""
+"""|c| at the largest tilt that the models allow."""
 
 _LONGEST_STEP = 0.02
 """Longest integration step, s."""

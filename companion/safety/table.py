@@ -42,7 +42,7 @@ def _fixed(config: Config) -> tuple[Monitor, ...]:
 
 
 def _autopilot(config: Config) -> tuple[Monitor, ...]:
-    """Battery, GPS and estimator."""
+    """Monitors of battery, GPS and estimator."""
     safety = config.safety
     resets = autopilot_judges.estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
@@ -59,7 +59,7 @@ def _autopilot(config: Config) -> tuple[Monitor, ...]:
 
 
 def _motion(config: Config) -> tuple[Monitor, ...]:
-    """Envelope, fence and tracking."""
+    """Monitors of flight envelope, fence, tracking error and thrust."""
     safety, limits, fence = config.safety, config.limits, fence_of(config)
     tilt = motion_judges.tilt(limits.max_tilt + safety.tilt_margin)
     body_rate = motion_judges.body_rate(safety.max_body_rate)
@@ -80,7 +80,7 @@ def _motion(config: Config) -> tuple[Monitor, ...]:
 
 
 def _link(config: Config) -> tuple[Monitor, ...]:
-    """The link and this computer."""
+    """Monitors of the link and of this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
     trip = link_judges.round_trip(safety.max_round_trip)

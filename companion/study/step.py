@@ -15,7 +15,7 @@ from companion.attitude.reference import FirstOrderReference
 Floats = NDArray[np.float64]
 
 ALL_HEADINGS = tuple(k * pi / 36.0 for k in range(-35, 37))
-"""Every π/36, as in the paper's figure 3; rad."""
+"""The headings of the paper's figure 3, every π/36; rad."""
 
 
 @dataclass(frozen=True)

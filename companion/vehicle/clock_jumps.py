@@ -10,7 +10,7 @@ TOGETHER = 0.1
 _CONFIRMED_BY = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
 _CONFIRMED_FOR = 0.04
-"""Time over which these misfits must come, s."""
+"""Time that the misfits in a row must span to show a jump of the clock, s."""
 REBOOTED = 2.0
 """If the clock goes back by more than this, s, the autopilot restarted; by less, it jumped."""
 _WRAP = 2**32 / 1000.0

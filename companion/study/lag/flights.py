@@ -121,7 +121,7 @@ class Comparison(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """One cell of the grid."""
+    """One cell of the grid: sample rate, and dead time and lag of the rate loop."""
 
     rate_hz: float
     dead_time_ms: int
