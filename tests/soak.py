@@ -24,7 +24,7 @@ from typing import NamedTuple
 import psutil
 import yaml
 
-from tests.flight.fly import free_port, mock_vehicle
+from tests.flight.sockets import free_port, mock_vehicle
 from tests.soak_relay import Relay
 
 RADIUS_M, SPEED_M_S = 3.0, 2.0

@@ -27,7 +27,7 @@ INDEX = ROOT / "docs/index.md"
 PAGES = [README, ROOT / "examples/README.md", *sorted((ROOT / "docs").glob("*.md"))]
 MOST_WORDS = 900  # of README.md: it is read in five minutes
 
-FENCE = re.compile(r"^[ \t]*```(\w*)\n(.*?)^[ \t]*```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^[ \t]*```(\w*)\n(.*?)^[ \t]*```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COMMAND = re.compile(r"(\.venv/bin/)?companion (?=--|[a-z])")
@@ -42,7 +42,7 @@ each_page = pytest.mark.parametrize("page", PAGES, ids=named)
 
 
 def prose(page: Path) -> str:
-    return FENCE.sub("", page.read_text("utf-8"))
+    return BLOCK.sub("", page.read_text("utf-8"))
 
 
 def anchors(page: Path) -> set[str]:
@@ -67,11 +67,11 @@ def command_lines(text: str) -> Iterator[list[str]]:
     """The arguments of each `companion …` in a shell block, or as inline code with options."""
     lines = [
         line
-        for language, block in FENCE.findall(text)
+        for language, block in BLOCK.findall(text)
         if language in ("sh", "bash", "shell", "console")
         for line in block.replace("\\\n", " ").splitlines()
     ]
-    lines += [code for code in INLINE.findall(FENCE.sub("", text)) if "…" not in code]
+    lines += [code for code in INLINE.findall(BLOCK.sub("", text)) if "…" not in code]
     for line in lines:
         if COMMAND.match(line):
             yield shlex.split(line, comments=True)[1:]

@@ -106,6 +106,25 @@ def test_the_injected_fault_makes_the_vehicle_land(folder: Path) -> None:
     assert numbers(state)[-1] == pytest.approx(0.0, abs=0.05)
 
 
+def test_own_guidance_stays_with_its_point_in_wind(folder: Path) -> None:
+    behind, landed = output(folder, "own_guidance.py").splitlines()
+    level, height = numbers(behind)
+    assert level < 0.5
+    assert height < 0.1
+    assert landed == "landed: True"
+
+
+def test_the_learned_policy_reaches_its_goal(folder: Path) -> None:
+    assert numbers(output(folder, "learned_policy.py"))[0] < 0.2
+
+
+def test_the_survey_is_refused_too_fast_flown_and_comes_home(folder: Path) -> None:
+    refused, flown, back = output(folder, "waypoint_survey.py").splitlines()
+    assert refused.startswith("refused: waypoints: ")
+    assert flown.startswith("5 corners in ")
+    assert numbers(back)[0] < 0.2
+
+
 def test_model_following_is_straighter_behind_a_rate_loop(folder: Path) -> None:
     lines = [line.split() for line in output(folder, "compare_planners.py").splitlines()]
     straightness = {name: float(figure) for name, figure, result in lines if result == "ok"}

@@ -33,6 +33,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"companion {version(_PACKAGE)}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_flights(commands)
+    tool_options.add_serve(commands)
     _add_doctor(commands)
     _add_identify(commands)
     tool_options.add_benches(commands)

@@ -41,6 +41,10 @@ class GroundContact:
         self.takeoff_commanded = True
         self._start_height = self._state.height
 
+    def note_flying(self) -> None:
+        """Note that the vehicle already flies: this program did not command the take-off."""
+        self.takeoff_commanded = self._left = True
+
     def update(self) -> None:
         """Take the newest telemetry; the watch calls this 50 times a second."""
         state = self._state

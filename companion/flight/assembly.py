@@ -174,8 +174,8 @@ def assemble(
     preflight.on_identity = memory.load
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
-            if part.slowed > 1.0:
-                flight.note(f"{part.name} is slowed down {part.slowed:.2f} times for the limits")
+            for text in part.notes:
+                flight.note(text)
             if config.guidance.kind == "nmpc":
                 guidance_loop.predictive = predictive(config, part, flight.note)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)

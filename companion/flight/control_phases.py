@@ -14,7 +14,7 @@ from companion.flight.commands import (
 )
 from companion.flight.context import FlightContext
 from companion.guidance import ManeuverSequence
-from companion.guidance.source import CommandedSource, ManeuverSource, Source
+from companion.guidance.source import ManeuverSource, Source
 from companion.safety.actions import Exit, FlightEnded, internal
 from companion.vehicle.autopilot import Role
 
@@ -46,7 +46,7 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
     context.guidance_loop.hold_reference()
 
 
-async def fly_commanded(context: FlightContext, source: CommandedSource) -> None:
+async def fly_commanded(context: FlightContext, source: Source) -> None:
     """Fly what another program commands until it ends its control, then hold here."""
     await _fly(context, source, lambda: f"commanded by {source.name}")
     context.guidance_loop.hold_here()

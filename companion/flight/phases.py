@@ -6,7 +6,7 @@ from math import inf
 from typing import Any
 
 from companion.config.flight import FlightConfig
-from companion.flight import control_phases, preflight_phases, takeoff
+from companion.flight import control_phases, preflight_phases, takeoff, takeover
 from companion.flight.context import FlightContext
 from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
@@ -107,6 +107,28 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
             _TAKE_OVER,
             Exit.LAND,
             modes=_RISING | {Role.OFFBOARD},
+            monitored=True,
+        ),
+    )
+
+
+def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
+    """The phases that take over a vehicle which its autopilot holds in the air."""
+    return (
+        Phase(
+            "checks",
+            "the vehicle to be ready to be taken over",
+            takeover.look_over,
+            config.ready_timeout_s,
+            modes=_RISING,
+        ),
+        Phase(
+            "offboard",
+            "the autopilot to obey our rates",
+            takeoff.offboard,
+            _TAKE_OVER,
+            Exit.HOLD,
+            modes=_RISING | _UNDER_CONTROL,
             monitored=True,
         ),
     )

@@ -1,13 +1,23 @@
 """Plans: which phases a flight runs, in which order."""
 
 from collections.abc import AsyncGenerator
+from functools import partial
 from typing import Protocol
 
 from companion.config import Config
 from companion.flight.context import FlightContext
+from companion.flight.control_phases import fly_commanded
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.phases import Phase, flight_phases, ground_phases
+from companion.flight.phases import (
+    Phase,
+    flight_phases,
+    ground_phases,
+    hand_back_phase,
+    program_phase,
+    takeover_phases,
+)
 from companion.guidance import ManeuverSequence
+from companion.guidance.source import Source
 
 
 class Plan(Protocol):
@@ -44,3 +54,28 @@ class ConfiguredPlan:
             context.config.flight, self.maneuvers.duration, context.link.autopilot
         ):
             yield phase
+
+
+class TakeoverPlan:
+    """Takes over a vehicle that its autopilot holds in the air, flies a source, and hands it back.
+
+    Nothing is armed and no take-off is commanded. If the checks or the takeover fail, or the
+    source does, the autopilot is asked to hold.
+
+    Args:
+        source: of the references; it decides when control ends.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.maneuvers = ManeuverSequence(())
+        self._source = source
+
+    async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
+        """The checks, the takeover, control, and the hand-back."""
+        connect, *_ = ground_phases(context.config.flight)
+        yield connect
+        for phase in takeover_phases(context.config.flight):
+            yield phase
+        work = partial(fly_commanded, source=self._source)
+        yield program_phase("control", f"{self._source.name} to end its control", work)
+        yield hand_back_phase()

@@ -12,7 +12,7 @@ from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
 from companion.flight.maneuvers import require_inside
 from companion.guidance.fence import Place
 from companion.preflight import vehicle_checks
-from companion.preflight.evidence import Stage
+from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
@@ -42,13 +42,18 @@ async def checks(context: FlightContext) -> None:
     # Positions are sent only once the estimator has one, so the rates are counted now.
     context.detail = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(Stage.GROUND)
+    note_heartbeat_rate(context, evidence)
+    _require_inside_map(context)
+    report_offboard_loss(context, evidence.survey.values)
+    context.mode_at_checks = context.link.state.mode
+
+
+def note_heartbeat_rate(context: FlightContext, evidence: Evidence) -> None:
+    """Set from the counted heartbeats how old the mode may be."""
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
         context.heartbeat_limit = limit
-    _require_inside_map(context)
-    _report_offboard_loss(context, evidence.survey.values)
-    context.mode_at_checks = context.link.state.mode
 
 
 async def stream(context: FlightContext) -> None:
@@ -156,7 +161,7 @@ def _refuse(finding: Finding) -> None:
         raise FlightEnded(finding.sentence())
 
 
-def _report_offboard_loss(context: FlightContext, values: Values) -> None:
+def report_offboard_loss(context: FlightContext, values: Values) -> None:
     """Report what the autopilot does when our setpoints stop."""
     autopilot = context.link.autopilot
     failsafe = autopilot.offboard_loss_failsafe

@@ -12,13 +12,13 @@ from companion.flight import flown_config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.observer import Observer, StateLogger
+from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
+from companion.flight.wiring import connected
 from companion.realtime import Wishes
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 from companion.vehicle.link import Link
-from companion.vehicle.records import AttitudeSample
 
 
 class Session:
@@ -125,44 +125,16 @@ class Session:
         return TlogWriter(self._folder / "flight.tlog", epoch, on_failure)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
-        """Connect the link's callbacks to the flight, and fly it."""
-        flight, loop, guidance_loop = (
-            assembled.flight,
-            assembled.context.loop,
-            assembled.context.guidance_loop,
-        )
-        dead_time_watch = assembled.dead_time_watch
-
-        def on_attitude(sample: AttitudeSample) -> None:
-            loop.on_sample(sample)
-            guidance_loop.note_attitude(sample)
-            if loop.offboard_active:
-                dead_time_watch.after_answer(sample.received)
-
-        link.on_attitude = on_attitude
-        link.on_error = flight.fail
-        state_logger = StateLogger(link.state, flight.note)
-
-        def on_heartbeat(_: object) -> None:
-            state_logger.log_changes()
-            flight.on_heartbeat()
-
-        def on_current_mode(_: object) -> None:
-            state_logger.log_changes()
-            flight.on_current_mode()
-
-        link.subscribe("HEARTBEAT", on_heartbeat)
-        link.subscribe("CURRENT_MODE", on_current_mode)
-        # In a task of its own, so that `leave` ends the flight but not the writing of the files.
-        self._flying = asyncio.ensure_future(flight.run())
-        try:
-            return await self._flying
-        except asyncio.CancelledError:
-            flight.failed_in = flight.failed_in or flight.phase
-            return "left at once by the user"
-        finally:
-            link.on_attitude = None
-            state_logger.log_changes()
+        """Fly over the open link."""
+        flight = assembled.flight
+        with connected(link, assembled):
+            # In a task of its own: `leave` ends the flight but not the writing of the files.
+            self._flying = asyncio.ensure_future(flight.run())
+            try:
+                return await self._flying
+            except asyncio.CancelledError:
+                flight.failed_in = flight.failed_in or flight.phase
+                return "left at once by the user"
 
     def _finish(
         self,

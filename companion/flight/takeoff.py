@@ -4,6 +4,7 @@ import asyncio
 
 from companion.flight.commands import change_mode, command_if_ours, in_role, in_roles, require_role
 from companion.flight.context import FlightContext
+from companion.flight.preflight_phases import stream
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -106,9 +107,11 @@ async def _take_over(context: FlightContext) -> None:
     """Take over, by a command or by the first setpoint, as the autopilot needs."""
     # An idle command from the ground, obeyed in the air, would let the vehicle fall.
     await context.until(lambda: _commands_flight(context), "a target from guidance")
+    autopilot = context.link.autopilot
+    if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
+        await stream(context)
     context.detail = "the autopilot to obey our rates"
     context.loop.taking_over = True
-    autopilot = context.link.autopilot
     if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
         # The known mode may be a second old, and a pilot may have taken over since.
         await context.fresh_heartbeat()

@@ -65,12 +65,12 @@ class Follow:
     Attributes:
         trajectory: the trajectory to follow.
         yaw_rate: largest yaw rate in the turn before the trajectory, rad/s.
-        slowed: factor by which the trajectory was slowed down to be feasible.
+        notes: how its file was understood and how it is flown, one sentence each.
     """
 
     trajectory: Trajectory
     yaw_rate: float
-    slowed: float = 1.0
+    notes: tuple[str, ...] = ()
     _turned: Trajectory | None = None
     _pose: Pose | None = None
 

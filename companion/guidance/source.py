@@ -85,8 +85,9 @@ class ManeuverSource:
 class CommandedSource:
     """References that another program or the user's code gives one by one.
 
-    Between two of them the reference moves on by its own velocity, acceleration and jerk. When the
-    newest is older than `stale`, the vehicle holds its position and `silent_since` is set.
+    Between two of them the reference moves on by its own velocity, acceleration and jerk. If a
+    reference becomes older than `stale` before the next one comes, the source fails: the vehicle
+    holds its position, and later references are not flown.
 
     Args:
         name: who gives the references.
@@ -96,16 +97,14 @@ class CommandedSource:
     Attributes:
         name: who gives the references.
         pose: the pose at which the source began, or None.
-        silent_since: when the newest reference became too old, or None.
     """
 
     def __init__(self, name: str, stale: float, begins_within: float) -> None:
         self.name = name
         self.pose: Pose | None = None
-        self.silent_since: float | None = None
         self._stale = stale
         self._begins_within = begins_within
-        self._held = Reference((0.0, 0.0, 0.0))
+        self._held: Reference | None = None
         self._newest: Reference | None = None
         self._given_at = 0.0
         self._jerk = (0.0, 0.0, 0.0)
@@ -114,9 +113,7 @@ class CommandedSource:
 
     def begin(self, now: float, pose: Pose) -> None:
         """Hold `pose` until the first reference."""
-        self.pose = pose
-        self._held = Reference(pose.position_ned, heading=pose.heading)
-        self._given_at = now
+        self.pose, self._given_at = pose, now
 
     def give(
         self, reference: Reference, now: float, jerk_ned: tuple[float, float, float] | None = None
@@ -126,13 +123,14 @@ class CommandedSource:
         Args:
             reference: the reference at `now`.
             now: s of event-loop time.
-            jerk_ned: derivative of the reference's acceleration, m/s³. None: the difference from
-                the reference before, if that one was fresh; else 0.
+            jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
+                the difference to the reference before; 0 for the first.
         """
         before, since = self._newest, now - self._given_at
+        self._require_fresh(now)
         if jerk_ned is not None:
             self._jerk = jerk_ned
-        elif before is None or not 0.0 < since <= self._stale or self.silent_since is not None:
+        elif before is None or since <= 0.0:
             self._jerk = (0.0, 0.0, 0.0)
         else:
             old, new = before.acceleration_ned, reference.acceleration_ned
@@ -141,7 +139,7 @@ class CommandedSource:
                 (new[1] - old[1]) / since,
                 (new[2] - old[2]) / since,
             )
-        self._newest, self._given_at, self.silent_since = reference, now, None
+        self._newest, self._given_at = reference, now
 
     def end(self) -> None:
         """Note that no more references will come."""
@@ -149,27 +147,32 @@ class CommandedSource:
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, extrapolated; if it is too old, a hold of the present position."""
-        newest, given_at = self._newest, self._given_at
-        if now - given_at > self._longest_silence and self.silent_since is None:
-            self.silent_since = now
-            if newest is not None:
-                self._held = Reference(motion.position_ned, heading=newest.heading)
-        if newest is None or self.silent_since is not None:
-            held = self._held
-            return lambda _: held
-        jerk = self._jerk
-        return lambda time: continued(newest, jerk, time - given_at)
+        self._require_fresh(now)
+        newest, given_at, jerk = self._newest, self._given_at, self._jerk
+        if newest is not None and self._failure is None:
+            return lambda time: continued(newest, jerk, time - given_at)
+        if self._held is None or newest is None:
+            self._held = self._hold(motion)
+        held = self._held
+        return lambda _: held
 
-    @property
-    def _longest_silence(self) -> float:
-        return self._begins_within if self._newest is None else self._stale
+    def _hold(self, motion: VehicleMotion) -> Reference:
+        """Hold the pose at which the source began, or after references the present position."""
+        if self._newest is None and self.pose is not None:
+            return Reference(self.pose.position_ned, heading=self.pose.heading)
+        heading = 0.0 if self._newest is None else self._newest.heading
+        return Reference(motion.position_ned, heading=heading)
+
+    def _require_fresh(self, now: float) -> None:
+        """Note a failure if the newest reference is too old, or the first one does not come."""
+        allowed = self._begins_within if self._newest is None else self._stale
+        if self._failure is None and not self._ended and now - self._given_at > allowed:
+            self._failure = f"{self.name} gave no new command for {allowed:g} s"
 
     @property
     def failure(self) -> str | None:
         """Why control must end: the reason given to `fail`, or that references have stopped."""
-        if self._failure is not None or self.silent_since is None or self._ended:
-            return self._failure
-        return f"{self.name} gave no new command for {self._longest_silence:g} s"
+        return self._failure
 
     def fail(self, reason: str) -> None:
         """Note that no more references will come, because of `reason`."""

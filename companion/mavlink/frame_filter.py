@@ -44,8 +44,12 @@ class FrameFilter:
         """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
         return self._signing is not None and self._signing.awaits_answer
 
-    def from_vehicle(self, frame: Frame) -> bool:
+    def is_vehicle(self, frame: Frame) -> bool:
         """Whether a frame carries the vehicle's system and component."""
+        return (frame.system, frame.component) == self._source
+
+    def from_vehicle(self, frame: Frame) -> bool:
+        """Whether a frame carries the vehicle's system and component; counts other frames."""
         source = (frame.system, frame.component)
         if source == self._source:
             return True

@@ -54,6 +54,8 @@ class FrameScanner:
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
         stats: Counts wrong checksums and unknown messages.
+        keep_unknown: Whether frames of unknown messages are returned too, with their checksum not
+            checked. Their id is not in `crc_extra`.
     """
 
     def __init__(
@@ -62,9 +64,11 @@ class FrameScanner:
         *,
         streaming: bool = False,
         stats: LinkStats | None = None,
+        keep_unknown: bool = False,
     ) -> None:
         self._crc_extra = crc_extra
         self._streaming = streaming
+        self._keep_unknown = keep_unknown
         self._stats = stats or LinkStats()
         self._rest = b""
 
@@ -102,7 +106,7 @@ class FrameScanner:
         check_at = at + _V2_HEADER_LENGTH + data[at + 1]
         end = check_at + (2 + SIGNATURE_LENGTH if incompatible else 2)
         fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None:
+        if fault is not None and not (fault == end - at and self._keep_unknown):
             return fault
         frames.append(
             Frame(
@@ -124,7 +128,7 @@ class FrameScanner:
         check_at = at + _V1_HEADER_LENGTH + size
         end = check_at + 2
         fault = self._fault(data, at, check_at, end, message_id)
-        if fault is not None:
+        if fault is not None and not (fault == end - at and self._keep_unknown):
             return fault
         payload = data[at + _V1_HEADER_LENGTH : check_at]
         frames.append(
@@ -151,7 +155,14 @@ class FrameScanner:
         if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
             self._stats.unknown += 1
             return end - at
+        if self._keep_unknown and end > len(data) and _is_plausible(data, at):
+            return _INCOMPLETE
         return _NOT_A_FRAME
+
+
+def _is_plausible(data: bytes, at: int) -> bool:
+    """Whether this looks like a version 2 header: two of its bytes are 0, as they usually are."""
+    return data[at] == V2 and data[at + 3] == 0 and data[at + 9] == 0
 
 
 def build_frame(

@@ -76,6 +76,15 @@ class Outbox:
         """Send a message given by its payload; return False if it could not be sent."""
         return self._send(self._frame(message_id, payload))
 
+    def forward(self, frame: bytes) -> bool:
+        """Send a whole frame of another node unchanged; return False if it could not be sent."""
+        if self.transport is None or not self.transport.send(frame):
+            return False
+        self._stats.forwarded += 1
+        if self._tap is not None:
+            self._tap(self._loop.time(), frame)
+        return True
+
     def _frame(self, message_id: int, payload: bytes) -> bytes:
         return build_frame(
             message_id,

@@ -29,6 +29,7 @@ class LinkStats:
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
         malformed: Messages that could not be decoded or whose values are impossible.
         sent: Passed to the kernel.
+        forwarded: Frames of other nodes that were passed to the kernel unchanged.
         not_sent: Could not be sent (no peer, buffer full, connection down) and were dropped.
         reconnects: How often the connection was opened again.
         peers: How often the peer changed to another address or port, or to another TCP client. A
@@ -51,6 +52,7 @@ class LinkStats:
     stamped_ahead: int = 0
     malformed: int = 0
     sent: int = 0
+    forwarded: int = 0
     not_sent: int = 0
     reconnects: int = 0
     peers: int = 0

@@ -1,7 +1,8 @@
 """Rows of numbers recorded in flight: the newest in memory, all of them on the disk.
 
 Memory does not grow with the flight. A thread of its own writes the files in large chunks: the
-control loop only hands over full chunks, and never waits for the disk.
+control loop only hands over full chunks, and never waits for the disk. A flight without a folder
+has no such thread: its rows stay in memory.
 """
 
 import errno
@@ -11,6 +12,7 @@ import threading
 import weakref
 from array import array
 from collections import deque
+from io import BytesIO
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
@@ -27,7 +29,7 @@ class SpooledFile:
     """A temporary file of doubles, made at the first write and deleted with its owner.
 
     Args:
-        folder: where it is; None: where the system has its temporary files.
+        folder: where it is; None: in memory.
     """
 
     def __init__(self, folder: Path | None) -> None:
@@ -42,7 +44,11 @@ class SpooledFile:
         """
         if self._file is None:
             # Closed when this object goes.
-            self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115
+            self._file = (
+                BytesIO()
+                if self._folder is None
+                else tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115
+            )
         if self._file.write(chunk) != len(chunk):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -62,7 +68,7 @@ class Spool:
     """Writes chunks to their files, in a thread that starts with the first chunk.
 
     Args:
-        folder: where the files are; None: where the system has its temporary files.
+        folder: where the files are; None: in memory, without a thread.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -78,6 +84,9 @@ class Spool:
 
     def put(self, file: SpooledFile, chunk: bytes) -> bool:
         """Take a chunk; false if it cannot be kept."""
+        if self.folder is None:
+            file.append(chunk)
+            return True
         if self._failures or self._queue.qsize() >= _MOST_WAITING:
             return False
         if not self._begun:

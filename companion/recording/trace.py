@@ -31,8 +31,8 @@ class FlightTrace:
     """All rows of one flight.
 
     Args:
-        folder: where rows wait that are too many for the memory; None: where the system has its
-            temporary files. They are gone with the trace; `save` writes what is to stay.
+        folder: where older rows wait on the disk; None: they stay in memory. They are gone with
+            the trace; `save` writes what is to stay.
 
     Attributes:
         response: (vehicle time s, w, x, y, z, target north, target east), of steps only.

@@ -23,7 +23,7 @@ pytest the fixture `mock_vehicle` makes vehicles.
 """
 
 from companion.testing.conformance import check_guidance, check_planner
-from companion.testing.flying import connect, environment, fly, run, session
+from companion.testing.flying import UnseenError, connect, environment, fly, run, session
 from companion.testing.vehicle import MockVehicle, ReceivedSetpoint
 from companion.testing.virtual_loop import VirtualEventLoop
 from companion.testing.wire import open_wire
@@ -33,6 +33,7 @@ __all__ = [
     "MockVehicle",
     "ReceivedSetpoint",
     "Truth",
+    "UnseenError",
     "VirtualEventLoop",
     "check_guidance",
     "check_planner",

@@ -26,26 +26,23 @@ class MemoryTransport:
     Args:
         receiver: takes what arrives.
         take: takes what is sent.
-        clock: stamps what arrives.
     """
 
     reconnects = False
 
-    def __init__(
-        self, receiver: Receiver, take: Callable[[bytes], None], clock: VirtualClock
-    ) -> None:
+    def __init__(self, receiver: Receiver, take: Callable[[bytes], None]) -> None:
         self.is_open = True
-        self._receiver, self._take, self._clock = receiver, take, clock
+        self._receiver, self._take = receiver, take
         self._loop = asyncio.get_running_loop()
         self._connected = self._heard = False
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
-    def deliver(self, datagram: bytes) -> None:
-        """Let a datagram of the vehicle arrive."""
-        receiver, now_ns = self._receiver, self._clock.read_ns()
+    def deliver(self, datagram: bytes, received_ns: int) -> None:
+        """Let a datagram of the vehicle arrive at a time of the loop, ns."""
+        receiver = self._receiver
         if self._connected:
-            self._heard = receiver.receive(datagram, now_ns) or self._heard
-        elif receiver.claim(datagram, now_ns, _NAME) or receiver.may_answer(_NAME):
+            self._heard = receiver.receive(datagram, received_ns) or self._heard
+        elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_answer(_NAME):
             self._connected = self._heard = True
 
     def send(self, frame: bytes) -> bool:
@@ -87,16 +84,16 @@ class Wire:
         """
         if self._transport is not None and self._transport.is_open:
             raise EndpointError("the mock vehicle has one companion link, which is open already")
-        self._transport = MemoryTransport(receiver, self._take, self._clock)
+        self._transport = MemoryTransport(receiver, self._take)
         return self._transport
 
     def _take(self, frame: bytes) -> None:
         """Take a frame of the application."""
         self._vehicle.receive(frame)
 
-    def _deliver(self, datagram: bytes) -> None:
+    def _deliver(self, datagram: bytes, at: float) -> None:
         if self._transport is not None and self._transport.is_open:
-            self._transport.deliver(datagram)
+            self._transport.deliver(datagram, round(at * 1e9))
 
 
 class LockstepWire(Wire):
@@ -107,8 +104,9 @@ class LockstepWire(Wire):
 
     def advance(self, until: float) -> None:
         """Let the vehicle make a step. The application's timers wait for it."""
-        for datagram in self._vehicle.begin() or self._vehicle.step():
-            self._deliver(datagram)
+        datagrams = self._vehicle.begin() or self._vehicle.step()
+        for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
+            self._deliver(datagram, self._vehicle.time)
         # Without an open link, or with one that does not accept the beacon, time passes as well.
         self._clock.now = max(self._clock.now, self._vehicle.time)
 
@@ -120,45 +118,54 @@ class FreeWire(Wire):
         super().__init__(vehicle, clock)
         self._delay = vehicle.delay_s
         self._burst = vehicle.settings.burst_ms * 1e-3
-        self._under_way: list[tuple[float, int, Callable[[bytes], None], bytes]] = []
+        self._under_way: list[tuple[float, int, bool, bytes]] = []
         self._order = count()
         self._slipped = clock.now - vehicle.time
         vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
 
     def deliver_due(self) -> None:
         """Deliver what arrives at the present time, in the order of sending."""
-        under_way = self._under_way
-        while under_way and under_way[0][0] <= self._clock.now:
-            _, _, deliver, datagram = heapq.heappop(under_way)
-            deliver(datagram)
+        self._reached_application()
 
     def advance(self, until: float) -> None:
-        """Go on to the next arrival, the vehicle's next step or `until`."""
+        """Go on until something reaches the application, at most to `until`."""
         clock, vehicle = self._clock, self._vehicle
-        step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
-        arrival = self._under_way[0][0] if self._under_way else step_at
-        clock.now = max(clock.now, min(until, arrival, step_at))
-        self.deliver_due()
-        if clock.now >= step_at:
-            self._send(vehicle.begin())
-            self._send(vehicle.step())
-            self._slipped += vehicle.take_slip()
-            self.deliver_due()
+        while True:
+            step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
+            arrival = self._under_way[0][0] if self._under_way else step_at
+            clock.now = max(clock.now, min(until, arrival, step_at))
+            reached = self._reached_application()
+            if clock.now >= step_at:
+                self._send(vehicle.begin())
+                self._send(vehicle.step())
+                self._slipped += vehicle.take_slip()
+                reached = self._reached_application() or reached
+            if reached or clock.now >= until:
+                return
+
+    def _reached_application(self) -> bool:
+        """Deliver what is due; returns whether some of it went to the application."""
+        under_way, reached = self._under_way, False
+        while under_way and under_way[0][0] <= self._clock.now:
+            _, _, to_application, datagram = heapq.heappop(under_way)
+            if to_application:
+                reached = True
+                self._deliver(datagram, self._clock.now)
+            else:
+                self._vehicle.receive(datagram)
+                self._send(self._vehicle.sent())
+        return reached
 
     def _take(self, frame: bytes) -> None:
-        self._put(self._hand_over, frame)
-
-    def _hand_over(self, datagram: bytes) -> None:
-        self._vehicle.receive(datagram)
-        self._send(self._vehicle.sent())
+        self._put(frame, to_application=False)
 
     def _send(self, datagrams: list[bytes]) -> None:
         for datagram in datagrams:
-            self._put(self._deliver, datagram)
+            self._put(datagram, to_application=True)
 
-    def _put(self, deliver: Callable[[bytes], None], datagram: bytes) -> None:
+    def _put(self, datagram: bytes, *, to_application: bool) -> None:
         due = self._clock.now + self._delay
-        heapq.heappush(self._under_way, (due, next(self._order), deliver, datagram))
+        heapq.heappush(self._under_way, (due, next(self._order), to_application, datagram))
 
 
 def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:

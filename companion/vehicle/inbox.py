@@ -44,6 +44,8 @@ class Inbox:
     Attributes:
         on_attitude: Called with each attitude sample, synchronously.
         on_foreign: Called with each frame of another system or component than the vehicle's.
+        on_frame: Called with each frame of the peer, whatever its source and message, after the
+            control loop and all subscribers.
         lockstep: Handles beacons in lockstep; otherwise None.
     """
 
@@ -66,6 +68,7 @@ class Inbox:
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
         self.on_foreign: Callable[[Frame], None] | None = None
+        self.on_frame: Callable[[Frame], None] | None = None
         self.lockstep: LockstepClient | None = None
         self._peer_rule = PeerRule(
             stats,
@@ -78,7 +81,9 @@ class Inbox:
 
     def connect(self, *, streaming: bool) -> None:
         """Forget an incomplete frame: the next bytes come over another connection."""
-        self._scanner = FrameScanner(CRC_EXTRA, streaming=streaming, stats=self._stats)
+        self._scanner = FrameScanner(
+            CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
+        )
         self._counter.reset()
 
     def follow_vehicle_time(
@@ -93,12 +98,16 @@ class Inbox:
         accepted = False
         try:
             for frame in self._scanner.feed(data):
-                if self._admit(frame):
+                if frame.message_id not in CRC_EXTRA:
+                    self._show(frame)
+                elif self._admit(frame):
                     accepted = True
                     if self._candidate is not None:
                         self._peer_rule.set_peer(self._candidate)
                         self._candidate = None
                     self._accept(frame, received_ns)
+                elif not self._filter.is_vehicle(frame):
+                    self._show(frame)
         except Exception as error:  # from the tap; subscribers are guarded one by one
             self._router.report(error)
             return False
@@ -109,7 +118,8 @@ class Inbox:
 
         Without a valid claim in the bytes, no frame in them is accepted. Never raises.
         """
-        admitted = [frame for frame in self._scanner.feed(data) if self._admit(frame)]
+        known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
+        admitted = [frame for frame in known if self._admit(frame)]
         if not any(map(self._peer_rule.is_claim, admitted)):
             self._stats.unclaimed += len(admitted)
             return False
@@ -178,6 +188,13 @@ class Inbox:
                 self._router.report(error)
         self._counter.count(frame.message_id, frame.sequence)
         self._router.route(frame.message_id, frame.payload)
+        if self.on_frame is not None:
+            self._router.guard(self.on_frame, frame)
+
+    def _show(self, frame: Frame) -> None:
+        """Pass to `on_frame` a frame that is not the vehicle's or whose message is unknown."""
+        if self.on_frame is not None:
+            self._router.guard(self.on_frame, frame)
 
     def _take_sample(self, payload: bytes, now: float, received_ns: int) -> None:
         decoded = decode_attitude(payload)

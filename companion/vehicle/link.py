@@ -171,6 +171,23 @@ class Link(VehicleClient):
         self._inbox.on_foreign = callback
 
     @property
+    def on_frame(self) -> Callable[[Frame], None] | None:
+        """Called with each received frame, of any sender and message, after all other callbacks.
+
+        An exception that it raises goes to `on_error`. The checksum of a message that the dialect
+        does not know is not checked.
+        """
+        return self._inbox.on_frame
+
+    @on_frame.setter
+    def on_frame(self, callback: Callable[[Frame], None] | None) -> None:
+        self._inbox.on_frame = callback
+
+    def forward(self, frame: bytes) -> bool:
+        """Send a whole frame of another node unchanged; return False if it could not be sent."""
+        return self._outbox.forward(frame)
+
+    @property
     def on_error(self) -> Callable[[Exception], None] | None:
         """Called with an exception that a callback raised; without it such errors are logged."""
         return self._router.on_error

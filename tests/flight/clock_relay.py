@@ -20,8 +20,8 @@ class ClockRelay(PositionRelay):
         late_ms: attitudes come so much later, by the vehicle's clock.
     """
 
-    def __init__(self, vehicle_port):
-        super().__init__(vehicle_port)
+    def __init__(self, vehicle):
+        super().__init__(vehicle)
         self.shift_ms = self.outlier_ms = self.late_ms = 0
         self._late = deque()
 

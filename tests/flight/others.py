@@ -1,8 +1,4 @@
-"""What others do while a flight is on its way: at a certain phase, or from another station."""
-
-import socket
-
-from pymavlink.dialects.v20 import common
+"""What others do while a flight is on its way, at a certain phase."""
 
 from companion.flight.observer import Silent
 
@@ -26,12 +22,3 @@ class When(Silent):
         if name == self.wanted and self.action is not None:
             action, self.action = self.action, None
             action()
-
-
-def station(mock, command, *parameters):
-    """Another station commands: a second sender, which the vehicle obeys."""
-    sender = common.MAVLink(None, srcSystem=255, srcComponent=190)
-    padded = [*parameters, *[0] * (7 - len(parameters))]
-    frame = common.MAVLink_command_long_message(1, 1, command, 0, *padded).pack(sender)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as channel:
-        channel.sendto(frame, ("127.0.0.1", mock.port + 40))

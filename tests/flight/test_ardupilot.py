@@ -6,7 +6,7 @@ from pymavlink import mavutil
 
 from companion.mavlink.commands import CommandClient
 from tests.flight.fly import CONFIGS, fly, mock_vehicle
-from tests.flight.others import When, station
+from tests.flight.others import When
 
 VEHICLE = yaml.safe_load((CONFIGS / "vehicle-ardupilot.yaml").read_text())
 MANEUVERS = {
@@ -138,7 +138,7 @@ def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(tmp_path
 
 def test_a_pilot_who_brakes_in_the_climb_is_not_fought(tmp_path):
     with mock_vehicle(tmp_path, autopilot="ardupilot") as mock:
-        observer = When("takeoff", lambda: station(mock, *SET_MODE, BRAKE), after=1.0)
+        observer = When("takeoff", lambda: mock.command(*SET_MODE, BRAKE), after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
         assert mock.state()["mode"] == "BRAKE"
     assert summary.result == "the pilot or another station took over: mode BRAKE"

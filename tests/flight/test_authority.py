@@ -9,7 +9,6 @@ from pymavlink import mavutil
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
 from companion.flight.observer import Silent
-from companion.mavlink import lockstep
 from companion.mavlink.commands import (
     MAV_CMD_COMPONENT_ARM_DISARM,
     MAV_CMD_DO_SET_MODE,
@@ -23,8 +22,8 @@ from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
 from companion.vehicle.records import Landed
 from companion.vehicle.state import VehicleState
-from tests.flight.fly import fly, mock_vehicle, session_for
-from tests.flight.others import When, station
+from tests.flight.fly import fly, mock_vehicle, run, session_for
+from tests.flight.others import When
 
 HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
 
@@ -48,7 +47,7 @@ async def accept():
 def interrupted(mock, folder, phase, ask_landing=None, after=0.0):
     observer = When(phase, lambda: session.interrupt("interrupted by the user"), after)
     session = session_for(mock, folder, observer, ask_landing)
-    return lockstep.run(session.fly()), observer
+    return run(mock, session.fly()), observer
 
 
 def test_interrupted_in_flight_and_told_to_land_it_lands(tmp_path):
@@ -99,7 +98,7 @@ def test_interrupted_once_armed_it_disarms(tmp_path):
     with mock_vehicle(tmp_path) as mock:
         observer = OnEvent("armed", lambda: session.interrupt("interrupted by the user"))
         session = session_for(mock, tmp_path / "log", observer)
-        summary = lockstep.run(session.fly())
+        summary = run(mock, session.fly())
         assert not mock.state()["armed"]
     arming = [(command, value) for _, command, value in commands(summary) if command == ARM]
     assert arming == [(ARM, 1.0), (ARM, 0.0)]
@@ -137,7 +136,7 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
     with mock_vehicle(tmp_path) as mock:
         observer = When("maneuvers", claim, after=2.0)
         session = session_for(mock, tmp_path / "log", observer)
-        summary = lockstep.run(session.fly())
+        summary = run(mock, session.fly())
         assert not mock.state()["crashed"]
     assert summary.result == "the autopilot says that it has landed"
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
@@ -180,8 +179,8 @@ def test_a_pilot_whose_takeover_cannot_be_heard_is_not_overruled(tmp_path):
 
 def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        cut = {"fault": {"kind": "drop", "direction": "to_companion"}}
-        observer = When("takeoff", lambda: mock.ask(cut), after=1.0)
+        cut = {"kind": "drop", "direction": "to_companion"}
+        observer = When("takeoff", lambda: mock.inject(cut), after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
         assert mock.state()["armed"]
     assert (summary.phase, "no heartbeat" in summary.result) == ("takeoff", True)
@@ -191,7 +190,7 @@ def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go(tmp_path):
 
 def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("takeoff", lambda: station(mock, SET_MODE, 1, 4, 3), after=1.0)
+        observer = When("takeoff", lambda: mock.command(SET_MODE, 1, 4, 3), after=1.0)
         summary = fly(mock, tmp_path / "log", observer, flight={"takeoff_height_m": 20.0})
         assert mock.state()["mode"] == "LOITER"
     assert "the climb was stopped" in summary.result
@@ -227,9 +226,9 @@ class LostAnswer:
 
 def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monkeypatch):
     def disarm_soon():
-        asyncio.get_running_loop().call_later(0.5, station, mock, ARM, 0)
+        asyncio.get_running_loop().call_later(0.5, mock.command, ARM, 0)
 
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle(tmp_path, in_lockstep=True) as mock:
         LostAnswer(monkeypatch, ARM, disarm_soon)
         summary = fly(mock, tmp_path / "log")
         assert not mock.state()["armed"]
@@ -239,7 +238,7 @@ def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monk
 
 def test_a_landing_is_not_repeated_over_a_pilot(tmp_path, monkeypatch):
     def take():
-        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        mock.take_over("POSCTL")
 
     with mock_vehicle(tmp_path) as mock:
         LostAnswer(monkeypatch, LAND, take)
@@ -251,8 +250,7 @@ def test_a_landing_is_not_repeated_over_a_pilot(tmp_path, monkeypatch):
 
 def test_a_pilot_who_keeps_it_armed_after_our_landing_is_not_disarmed(tmp_path):
     with mock_vehicle(tmp_path, parameters={"COM_DISARM_LAND": -1.0}) as mock:
-        takeover = {"fault": {"kind": "pilot_takeover", "mode": "STABILIZED"}}
-        observer = When("disarm", lambda: mock.ask(takeover), after=1.0)
+        observer = When("disarm", lambda: mock.take_over("STABILIZED"), after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
         state = mock.state()
     assert "took over: mode STABILIZED" in summary.result
@@ -262,7 +260,7 @@ def test_a_pilot_who_keeps_it_armed_after_our_landing_is_not_disarmed(tmp_path):
 
 def test_a_vehicle_that_somebody_arms_after_the_checks_is_not_taken(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("stream", lambda: station(mock, ARM, 1))
+        observer = When("stream", lambda: mock.command(ARM, 1))
         summary = fly(mock, tmp_path / "log", observer)
         assert mock.state()["on_ground"]
     assert "already armed" in summary.result
@@ -283,7 +281,7 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
 
     def holding(climb):
         if climb._context.link.state.height > 3.3 and not held:
-            held.append(station(mock, SET_MODE, 1, 4, 3))
+            held.append(mock.command(SET_MODE, 1, 4, 3))
         return over(climb)
 
     monkeypatch.setattr(takeoff._Climb, "over", holding)
@@ -299,7 +297,7 @@ def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(tmp_path
     hand_back = control_phases.hand_back
 
     async def taking(context):
-        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        mock.take_over("POSCTL")
         await asyncio.sleep(0.01)  # faults begin with the vehicle's next step
         await hand_back(context)
 
@@ -331,7 +329,7 @@ def test_a_link_that_is_always_late_is_refused_before_takeoff(tmp_path):
 
 def test_without_being_told_to_it_waits_for_the_pilot_to_arm(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        observer = When("arm", lambda: station(mock, ARM, 1), after=3.0)
+        observer = When("arm", lambda: mock.command(ARM, 1), after=3.0)
         summary = fly(mock, tmp_path / "log", observer, flight={"arm": False})
     assert summary.result == "ok", summary.events
     assert next(at for at, text in summary.events if text == "armed") > 5.0
@@ -339,8 +337,8 @@ def test_without_being_told_to_it_waits_for_the_pilot_to_arm(tmp_path):
 
 def test_a_pilot_who_arms_in_another_mode_is_waited_for_and_not_taken_off_with(tmp_path):
     def arm_and_keep():
-        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
-        station(mock, ARM, 1)
+        mock.take_over("POSCTL")
+        mock.command(ARM, 1)
 
     with mock_vehicle(tmp_path) as mock:
         observer = When("arm", arm_and_keep, after=1.0)
@@ -372,8 +370,7 @@ def test_a_vehicle_that_is_armed_already_is_not_touched(tmp_path):
 
 def test_the_pilot_takes_over_during_the_takeoff(tmp_path):
     with mock_vehicle(tmp_path) as mock:
-        takeover = {"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}}
-        observer = When("takeoff", lambda: mock.ask(takeover), after=1.0)
+        observer = When("takeoff", mock.take_over, after=1.0)
         summary = fly(mock, tmp_path / "log", observer)
         state = mock.state()
     assert summary.result == "the pilot or another station took over: mode POSCTL"
@@ -423,7 +420,7 @@ def test_a_hold_that_is_refused_becomes_a_landing(tmp_path, monkeypatch):
     with mock_vehicle(tmp_path) as mock:
         observer = When("maneuvers", lambda: session.interrupt("Ctrl-C"), after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
-        summary = lockstep.run(session.fly())
+        summary = run(mock, session.fly())
         state = mock.state()
     said = [text for _, text in summary.events]
     assert said.index(Exit.HOLD.value) < said.index(Exit.LAND.value)
@@ -443,7 +440,7 @@ def test_an_error_at_every_sample_does_not_stop_the_landing(tmp_path, monkeypatc
     with mock_vehicle(tmp_path) as mock:
         observer = When("maneuvers", breaks, after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
-        summary = lockstep.run(session.fly())
+        summary = run(mock, session.fly())
         state = mock.state()
     assert summary.result == "internal error: ZeroDivisionError('a fault of ours')"
     assert (state["armed"], state["on_ground"], state["crashed"]) == (False, True, False)

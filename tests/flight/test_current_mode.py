@@ -10,7 +10,7 @@ from companion.flight.phases import Phase
 from companion.flight.watch import Watch
 from companion.vehicle.autopilot import Role
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import When, station
+from tests.flight.others import When
 
 PHASE = Phase("connect", "", lambda _: None, 1.0)
 AFTER_A_HEARTBEAT = [0.1, pytest.param(0.35, marks=pytest.mark.slow), 0.7]
@@ -24,9 +24,9 @@ def takeover(tmp_path, after, **settings):
     def begin():
         nonlocal at
         at = ceil(mock.state()["time"]) + 2.0 + after
-        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at}})
+        mock.inject({"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at})
 
-    with mock_vehicle(tmp_path, **settings) as mock:
+    with mock_vehicle(tmp_path, **settings, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result
@@ -48,9 +48,9 @@ def test_a_vehicle_that_disarms_in_flight_is_heard_at_once(tmp_path):
     def kill():
         nonlocal at
         at = mock.state()["time"]
-        station(mock, 400, 0, 21196)
+        mock.command(400, 0, 21196)
 
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle(tmp_path, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", When("maneuvers", kill, after=1.0))
         state = mock.state()
     assert summary.result == "the vehicle disarmed in flight"

@@ -175,7 +175,7 @@ PX4 = {"lag_ms": 47, "dead_time_ms": 40, "yaw_lag_ms": 370, "yaw_dead_time_ms": 
 def flown(folder, maneuvers, **fault):
     """The summary of a flight on PX4's measured response, with 40 ms more in one direction."""
     faults = [{"kind": "delay", "delay_ms": 40, **fault}] if fault else []
-    with mock_vehicle(folder, seed=3, faults=faults) as mock:
+    with mock_vehicle(folder, seed=3, faults=faults, in_lockstep=True) as mock:
         flight = {"maneuvers": [maneuvers], "takeoff_height_m": 3.0}
         summary = fly(mock, folder / "log", vehicle=PX4, flight=flight)
     assert summary.result == "ok", summary.events

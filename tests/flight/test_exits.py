@@ -20,8 +20,9 @@ from pymavlink import mavutil
 
 from companion.cli.signals import HOW_TO_LEAVE, LEAVE_AFTER
 from companion.control.guidance_loop import GuidanceLoop
-from companion.mavlink import lockstep
-from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, fly, merged, mock_vehicle, session_for
+from tests.flight import fly as memory
+from tests.flight import sockets
+from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, merged
 from tests.flight.others import When
 
 
@@ -34,9 +35,12 @@ class Ways(NamedTuple):
     left: Callable[[dict], bool]
 
     def mock(self, folder, **settings):
-        return mock_vehicle(
-            folder, autopilot=self.autopilot, parameters=self.parameters, **settings
-        )
+        """In a process of its own."""
+        known = {"autopilot": self.autopilot, "parameters": self.parameters}
+        return sockets.mock_vehicle(folder, **known, **settings)
+
+    def in_memory(self):
+        return memory.mock_vehicle(autopilot=self.autopilot, parameters=self.parameters)
 
 
 def lands(state):
@@ -141,7 +145,7 @@ def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
     with ways.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
         process = start(mock, tmp_path, flight={"accept": ["COM_OF_LOSS_T"]})
         mock.until(in_offboard)
-        mock.ask({"fault": {"kind": "drop", "direction": "from_companion"}})
+        mock.inject({"kind": "drop", "direction": "from_companion"})
         time.sleep(0.1)  # faults begin with the vehicle's next step
         for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             process.send_signal(number)  # none of these leaves
@@ -169,7 +173,7 @@ def test_killed_the_autopilot_does_what_it_does_without_us(tmp_path, ways):
 
 
 def test_a_disk_that_takes_no_more_ends_the_recording_and_not_the_flight(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+    with sockets.mock_vehicle(tmp_path) as mock:
         process = start(mock, tmp_path, "--lockstep", hover={"duration_s": 3.0})
         prlimit(process.pid, RLIMIT_FSIZE, (300_000, 300_000))
         result = finish(process, 0)
@@ -207,7 +211,7 @@ def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(
     with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
         process = start(mock, tmp_path, link={"backend": backend})
         mock.until(in_offboard)
-        mock.ask({"fault": {"kind": "stop_telemetry", "duration_s": 0.1}})
+        mock.inject({"kind": "stop_telemetry", "duration_s": 0.1})
         time.sleep(0.03)  # faults begin with the vehicle's next step
         process.send_signal(signal.SIGSTOP)
         frozen = mock.until(lambda state: state["mode"] == "LAND")
@@ -229,11 +233,11 @@ def test_frozen_and_thawed_it_does_not_take_the_vehicle_from_a_pilot_who_took_it
     with PX4.mock(tmp_path, in_lockstep=False, speed=1.0) as mock:
         process = start(mock, tmp_path)
         mock.until(in_offboard)
-        mock.ask({"fault": {"kind": "delay", "delay_ms": 40.0}})
+        mock.inject({"kind": "delay", "delay_ms": 40.0})
         process.send_signal(signal.SIGSTOP)
         stopped = mock.state()["time"]
         mock.until(lambda state: state["time"] > stopped + 0.8)
-        mock.ask({"fault": {"kind": "pilot_takeover", "mode": "POSCTL"}})
+        mock.inject({"kind": "pilot_takeover", "mode": "POSCTL"})
         mock.until(lambda state: state["time"] > stopped + 2.0)
         process.send_signal(signal.SIGCONT)
         finish(process, 1)
@@ -268,8 +272,8 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
             flown(guidance_loop)
 
     monkeypatch.setattr(GuidanceLoop, "step", freezing)
-    with ways.mock(tmp_path) as mock:
-        summary = fly(mock, tmp_path / "log")
+    with ways.in_memory() as mock:
+        summary = memory.fly(mock, tmp_path / "log")
         state = mock.state()
     assert summary.result == "guidance makes no commands any more"
     assert (state["mode"], state["armed"], state["crashed"]) == (ways.held, True, False)
@@ -280,9 +284,9 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
 
 @BOTH
 def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
-    with ways.mock(tmp_path) as mock:
-        observer = When("maneuvers", lambda: mock.ask({"fault": {"kind": "drop"}}), after=1.0)
-        summary = fly(mock, tmp_path / "log", observer)
+    with ways.in_memory() as mock:
+        observer = When("maneuvers", lambda: mock.inject({"kind": "drop"}), after=1.0)
+        summary = memory.fly(mock, tmp_path / "log", observer)
         state = mock.until(ways.left, seconds=40)
     assert "no attitude" in summary.result
     assert "releasing control" in summary.events[-1][1]
@@ -291,11 +295,11 @@ def test_an_unplugged_cable_is_let_go_and_left_to_the_autopilot(tmp_path, ways):
 
 
 def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+    with memory.mock_vehicle() as mock:
         observer = When("maneuvers", lambda: session.interrupt("enough"), after=1.0)
         steps = {"flight": {"maneuvers": ["steps"]}}
-        session = session_for(mock, tmp_path / "log", observer, **steps)
-        summary = lockstep.run(session.fly())
+        session = memory.session_for(mock, tmp_path / "log", observer, **steps)
+        summary = memory.run(mock, session.fly())
         assert mock.state()["mode"] == "LOITER"
     interrupted = next(at for at, text in summary.events if text == "enough")
     held = next(at for at, t in summary.events if at > interrupted and t == "mode AUTO.LOITER")

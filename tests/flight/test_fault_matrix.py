@@ -106,7 +106,7 @@ class Begin(Silent):
     def phase(self, name, waits_for):
         if name == self.wanted:
             at = self.mock.state()["time"] + self.after
-            self.mock.ask({"fault": {**self.fault, "at_s": at}})
+            self.mock.inject({**self.fault, "at_s": at})
             self.wanted = None
 
 
@@ -135,7 +135,7 @@ def excess(state):
 
 @pytest.mark.parametrize(("autopilot", "fault", "phase", "end"), list(cells()))
 def test_a_fault_in_a_phase_ends_as_documented(tmp_path, autopilot, fault, phase, end):
-    with mock_vehicle(tmp_path, autopilot=autopilot) as mock:
+    with mock_vehicle(tmp_path, autopilot=autopilot, in_lockstep=True) as mock:
         observer = Begin(mock, fault, phase)
         summary = fly(mock, tmp_path / "log", observer, **SHORT)
         assert observer.wanted is None, summary.events

@@ -4,17 +4,14 @@ The table of docs/exits.md: `python -m pytest tests/flight/test_killed.py -s` pr
 """
 
 import asyncio
-import time
 from math import dist, tau
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
 
 from companion.flight.maneuvers import configured_maneuvers
-from companion.mavlink import lockstep
 from companion.preflight.offboard_loss import worst_reach
-from tests.flight.fly import mock_vehicle, session_for
+from tests.flight.fly import mock_vehicle, quick_flight, run, session_for
 from tests.flight.others import When
 
 HELD = {"px4": "COM_OF_LOSS_T", "ardupilot": "GUID_TIMEOUT"}
@@ -68,8 +65,7 @@ def carried(folder, autopilot, speed, held, after):
     """One flight whose setpoints end `after` s of its circle; PX4 is set to hold afterwards."""
     folder.mkdir()
     settings = {HELD[autopilot]: held, **({"COM_OBL_RC_ACT": 5} if autopilot == "px4" else {})}
-    patience = {"patience_s": 1.0}
-    with mock_vehicle(folder, autopilot=autopilot, parameters=settings, lockstep=patience) as mock:
+    with mock_vehicle(folder, autopilot=autopilot, parameters=settings) as mock:
         session = None
 
         def leave():
@@ -78,11 +74,11 @@ def carried(folder, autopilot, speed, held, after):
         observer = When("maneuvers", leave)
         changes = flight(autopilot, speed)
         session = session_for(mock, folder / "flight", observer, **changes)
-        assert lockstep.run(session.fly()).result == "left at once by the user"
+        assert run(mock, session.fly()).result == "left at once by the user"
         state = mock.state()
         ways, ended = [state["position"]], state["last_setpoint"]
         while state["time"] < ended + held + SETTLED[autopilot]:
-            time.sleep(0.002)
+            mock.step()
             state = mock.state()
             ways.append(state["position"])
         assert (state["last_setpoint"], state["crashed"]) == (ended, False)
@@ -106,8 +102,7 @@ def worst(folder, autopilot, speed, held, *, all_of_them):
 
 def bound(folder, autopilot, speed, held):
     """What the doctor's model says of the same flight."""
-    anybody = SimpleNamespace(port=0, in_lockstep=True, autopilot=autopilot)
-    config = session_for(anybody, folder / "bound", **flight(autopilot, speed))._config
+    config = quick_flight(autopilot, flight(autopilot, speed))
     return worst_reach(config, configured_maneuvers(config), held, brakes=autopilot == "px4")
 
 

@@ -21,8 +21,8 @@ HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking th
 
 def test_after_a_failsafe_landing_the_next_flight_begins(tmp_path):
     with mock_vehicle(tmp_path, parameters={"COM_OBL_RC_ACT": 4}) as mock:
-        cut = {"fault": {"kind": "drop", "duration_s": 3.0}}
-        observer = When("maneuvers", lambda: mock.ask(cut), after=1.0)
+        cut = {"kind": "drop", "duration_s": 3.0}
+        observer = When("maneuvers", lambda: mock.inject(cut), after=1.0)
         first = fly(mock, tmp_path / "first", observer)
         assert "releasing control" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])

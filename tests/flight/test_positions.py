@@ -12,17 +12,15 @@ from tests.flight.position_relay import PositionRelay
 def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
     """Summary and truth of a flight in whose maneuver positions begin to come so."""
     folder.mkdir(exist_ok=True)
-    with mock_vehicle(folder) as mock, PositionRelay(mock.port) as relay:
+    with mock_vehicle() as mock:
+        relay = PositionRelay(mock)
 
         def begin():
             relay.way, relay.delay_ms = way, delay_ms
 
         if from_the_start:
             begin()
-        link = {"endpoint": relay.endpoint}
-        summary = fly(
-            mock, folder / "log", When("maneuvers", begin, after=1.0), link=link, **changes
-        )
+        summary = fly(mock, folder / "log", When("maneuvers", begin, after=1.0), **changes)
         return summary, mock.state()
 
 

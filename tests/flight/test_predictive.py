@@ -14,7 +14,7 @@ from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, circle
 from companion.mavlink import lockstep
 from companion.nmpc import Answer, Status, Trouble, Vehicle
-from tests.flight.fly import mock_vehicle, session_for
+from tests.flight.sockets import mock_vehicle, session_for
 from tests.flight.test_tracking import following
 
 CASADI = pytest.importorskip("casadi")

@@ -7,7 +7,6 @@ from pymavlink import mavutil
 
 from companion.flight.observer import Silent
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import station
 
 ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 31, 32
 SET_MESSAGE_INTERVAL = 511
@@ -29,7 +28,7 @@ class Lowers(Silent):
     def waiting(self, name, detail, elapsed, timeout):
         if name == "maneuvers" and elapsed > 2.5 and self.left:
             self.left -= 1
-            station(self.mock, SET_MESSAGE_INTERVAL, self.message, 1e6 / self.hz)
+            self.mock.command(SET_MESSAGE_INTERVAL, self.message, 1e6 / self.hz)
 
 
 def asked_again(summary):

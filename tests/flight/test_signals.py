@@ -14,8 +14,9 @@ import yaml
 from companion.cli.signals import HOW_TO_LEAVE, Signals, fly_interruptibly
 from companion.mavlink import lockstep
 from companion.vehicle.link import Link
-from tests.flight.fly import QUICK_FLIGHT, merged, mock_vehicle, session_for
+from tests.flight.fly import QUICK_FLIGHT, merged
 from tests.flight.others import When
+from tests.flight.sockets import mock_vehicle, session_for
 
 INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 LANDS_ALONE = {"COM_OBL_RC_ACT": 4}  # so that what holds was handed back

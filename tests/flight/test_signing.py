@@ -12,7 +12,7 @@ from companion.mavlink.errors import LinkTimeout
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.vehicle.link import Link
-from tests.flight.fly import mock_vehicle, session_for
+from tests.flight.sockets import mock_vehicle, session_for
 
 
 @pytest.fixture

@@ -4,9 +4,8 @@ import json
 
 import pytest
 
-from companion.mavlink import loop as link_loop
 from tests.flight.clock_relay import ClockRelay
-from tests.flight.fly import fly, mock_vehicle, session_for
+from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
 HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
@@ -15,9 +14,10 @@ WRAP_MS = 2**32
 
 def flown(folder, autopilot, begin):
     """A flight in whose maneuver the vehicle's stamps change; its summary and the true state."""
-    with mock_vehicle(folder, autopilot=autopilot) as mock, ClockRelay(mock.port) as relay:
+    with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
+        relay = ClockRelay(mock)
         observer = When("maneuvers", lambda: begin(relay), after=1.0)
-        summary = fly(mock, folder / "log", observer, link={"endpoint": relay.endpoint})
+        summary = fly(mock, folder / "log", observer)
         return summary, mock.state()
 
 
@@ -40,9 +40,9 @@ def test_a_clock_that_jumps_in_flight_is_handed_back(tmp_path, autopilot, shift_
 
 def wrapping(folder, autopilot, seconds):
     """A flight whose time since boot wraps so long after its begin."""
-    with mock_vehicle(folder, autopilot=autopilot) as mock, ClockRelay(mock.port) as relay:
-        relay.shift_ms = WRAP_MS - round(1000 * seconds)
-        return fly(mock, folder / "log", link={"endpoint": relay.endpoint}), mock.state()
+    with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
+        ClockRelay(mock).shift_ms = WRAP_MS - round(1000 * seconds)
+        return fly(mock, folder / "log"), mock.state()
 
 
 WRAPPED = "the vehicle's time since boot wrapped around after 49.7 days"
@@ -74,12 +74,8 @@ def test_one_sample_stamped_far_ahead_is_dropped_named_and_flown_on(tmp_path, au
 
 
 def test_telemetry_that_is_late_from_the_start_is_refused_where_timesync_tells_it(tmp_path):
-    with (
-        mock_vehicle(tmp_path, in_lockstep=False, speed=1.0) as mock,
-        ClockRelay(mock.port) as relay,
-    ):
-        relay.late_ms = 400
-        session = session_for(mock, tmp_path / "log", link={"endpoint": relay.endpoint})
-        summary = link_loop.run(session.fly())
+    with mock_vehicle() as mock:
+        ClockRelay(mock).late_ms = 400
+        summary = fly(mock, tmp_path / "log")
     assert "old when it arrives, longer than deadman.telemetry_stale_ms" in summary.result
     assert summary.counts.setpoints == 0

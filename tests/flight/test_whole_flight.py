@@ -1,4 +1,4 @@
-"""The whole maneuver against the mock over a real socket, in lockstep."""
+"""The whole maneuver against the mock."""
 
 import pytest
 from pymavlink import mavutil
@@ -17,11 +17,11 @@ MANEUVERS = {
 
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory):
-    """The same maneuver flown twice by two fresh pairs of processes."""
+    """The same maneuver flown twice by two fresh vehicles."""
     summaries = []
     for number in range(2):
         folder = tmp_path_factory.mktemp(f"flight{number}")
-        with mock_vehicle(folder, seed=7) as mock:
+        with mock_vehicle(folder, seed=7, in_lockstep=True) as mock:
             summaries.append(fly(mock, folder / "log", **MANEUVERS))
             assert not mock.state()["crashed"]
     return summaries
@@ -64,7 +64,7 @@ def test_another_seed_gives_another_log(twice, tmp_path):
     for seed in (7, 8):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        with mock_vehicle(folder, seed=seed) as mock:
+        with mock_vehicle(folder, seed=seed, in_lockstep=True) as mock:
             logs.append(fly(mock, folder / "log", **HOVER).log / "flight.tlog")
     once, same, other = (log.read_bytes()[:100_000] for log in logs)
     assert once == same != other
@@ -92,7 +92,7 @@ def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
         "wind": {"speed_m_s": 2.0, "from_deg": 40.0, "gust_m_s": 0.7, "vertical_gust_m_s": 0.3},
         "battery": {"initial_remaining": 0.5},
     }
-    with mock_vehicle(tmp_path, **settings) as mock:
+    with mock_vehicle(tmp_path, **settings, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", **MANEUVERS)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events

@@ -1,18 +1,17 @@
-"""A hostile autopilot in lockstep over a real UDP socket: it does and tells what a script says.
+"""A hostile autopilot in lockstep: it does and tells what a script says.
 
 It speaks MAVLink 2 by pymavlink alone. Each step ends with SYSTEM_TIME as a beacon, and it waits
-for the answer; what it stamps and tells may lie about time as about everything else.
+for the answer; what it stamps and tells may lie about time as about everything else. `wire` joins
+it to the companion.
 """
 
 import struct
-import threading
 from math import inf
 from typing import NamedTuple
 
 from tests.hostile import personality as kinds
 from tests.hostile.telemetry import Telemetry
 from tests.hostile.vehicle import Vehicle
-from tests.hostile.wire import Wire
 
 STEP_S = 0.02
 LONGEST_S = 90.0
@@ -50,11 +49,12 @@ class Sent(NamedTuple):
     in_air: bool
 
 
-class HostileAutopilot(threading.Thread):
+class HostileAutopilot:
     """One scripted vehicle.
 
     Attributes:
-        vehicle, telemetry, parameters, wire: what a script changes.
+        vehicle, telemetry, parameters: what a script changes.
+        wire: over sockets, its end of the link; else None.
         marks: what happened first when, s of vehicle time, such as TAKEOFF (see `_note`).
         acks: command → how it is answered, a key of `ACKS`.
         timesync: true time in s → the clock that answers TIMESYNC, s; None: no answers.
@@ -62,56 +62,55 @@ class HostileAutopilot(threading.Thread):
         uid: of AUTOPILOT_VERSION.
         sent: what the companion sent.
         acted: when the script acted, s.
-        error: what broke in here, or None.
 
     Args:
         kind: the personality.
-        port: of the companion on this computer.
         script: [(mark, delay in s, action)]; an action takes this autopilot.
         mode: in which it begins.
     """
 
-    def __init__(self, kind, port, script=(), mode=None):
-        super().__init__(daemon=True)
+    def __init__(self, kind, script=(), mode=None):
         begins = mode or ("STABILIZE" if kind.enters_by_setpoint else "READY")
         self.vehicle = Vehicle(kind, begins)
         self.telemetry = Telemetry(self.vehicle)
-        self.wire = Wire(port, kind.dialect)
+        self.wire = None
         self.parameters = dict(kind.parameters)
         self.marks, self.acks, self.acted, self.sent = {}, {}, [], []
         self.timesync, self.silent_until, self.uid = (lambda t: t), -inf, 7
-        self.error = None
         self._script, self._replies, self._heard = list(script), [], []
 
     def say(self, name, **fields):
         """Send a message of its own in the next step."""
         self._replies += self.telemetry.pack(name, fields)
 
-    def end(self):
-        """Stop, and raise what broke in here."""
-        self.wire.ending.set()
-        self.join(10.0)
-        self.wire.close()
-        if self.error is not None:
-            raise self.error
+    @property
+    def beacon_ms(self):
+        """The time that the beacon of this step tells."""
+        return round(1000.0 * self.vehicle.t)
 
-    def run(self):
+    @property
+    def over(self):
+        """Whether it has lived long enough."""
+        return self.vehicle.t >= LONGEST_S
+
+    def begin(self):
+        """Begin at a time that is not 0."""
+        self.vehicle.t = 1.0
+        self.mark("start")
+        self._act()
+
+    def step(self, heard):
+        """Go on by a step after these messages; returns the frames that leave in it."""
         vehicle = self.vehicle
-        try:
-            vehicle.t, frames = 1.0, []
-            self.mark("start")
-            self._act()
-            while not self.wire.ending.is_set() and vehicle.t < LONGEST_S:
-                self._heard = self.wire.exchange(frames, round(1000.0 * vehicle.t))
-                self._handle()
-                self._act()
-                vehicle.step(STEP_S)
-                self._note()
-                frames = [*self.telemetry.due(), *self._replies]
-                frames = frames if vehicle.t >= self.silent_until else []
-                self._replies = []
-        except Exception as error:  # for the test, which waits in another thread
-            self.error = error
+        self._heard = heard
+        self._handle()
+        self._act()
+        vehicle.step(STEP_S)
+        self._note()
+        frames = [*self.telemetry.due(), *self._replies]
+        frames = frames if vehicle.t >= self.silent_until else []
+        self._replies = []
+        return frames
 
     def _act(self):
         """Do what the script says for now."""

@@ -1,6 +1,8 @@
 """Flies the companion against a hostile autopilot, and holds every flight to the same rules."""
 
+import asyncio
 import socket
+from dataclasses import replace
 from typing import NamedTuple
 from unittest.mock import patch
 
@@ -11,11 +13,14 @@ from companion.files.yaml_file import parse
 from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
+from companion.testing import environment
 from companion.vehicle import link
 from companion.vehicle.clock import VehicleClock
-from tests.flight.fly import decline, merged
+from tests.flight.fly import merged
+from tests.flight.sockets import decline
 from tests.hostile.autopilot import HostileAutopilot
 from tests.hostile.body import HOVER_THRUST
+from tests.hostile.wire import MemoryWorld, SocketThread, Wire
 
 lockstep._SPIN_S = 0.0  # the cores are busy with other flights
 
@@ -58,23 +63,47 @@ class Flown(NamedTuple):
     config: Config
 
 
-def fly(kind, script, folder, *, mode=None, prepare=None, **changes):
-    """One flight; `prepare` may change the autopilot before it starts."""
+def fly(kind, script, folder, *, mode=None, **changes):
+    """One flight in memory."""
+    autopilot = HostileAutopilot(kind, script, mode)
+    world = MemoryWorld(autopilot, kind.dialect)
+    surroundings = replace(environment, open_transport=world.open)
+    config = _config("udpin://127.0.0.1:1", changes)
+    session = Session(config, None, Silent(), decline, environment=surroundings)
+    with _own_clock(), asyncio.Runner(loop_factory=world.make_loop) as runner:
+        summary = runner.run(session.fly())
+    return _flown(summary, autopilot, config)
+
+
+def fly_over_sockets(kind, script, folder, *, mode=None, late_by=None, **changes):
+    """One flight over UDP; `late_by` is called with the vehicle's wire before its first step."""
     port = _free_port()
-    autopilot = HostileAutopilot(kind, port, script, mode)
-    if prepare is not None:
-        prepare(autopilot)
-    endpoint = {"link": {"endpoint": f"udpin://127.0.0.1:{port}"}}
-    text = yaml.safe_dump(merged(merged(CONFIG, endpoint), changes))
-    config = parse(text, "test", Config)
+    autopilot = HostileAutopilot(kind, script, mode)
+    vehicle = SocketThread(autopilot, Wire(port, kind.dialect))
+    if late_by is not None:
+        vehicle.late_by = lambda: late_by(vehicle.wire)
+    config = _config(f"udpin://127.0.0.1:{port}", changes)
     session = Session(config, folder, Silent(), decline)
-    autopilot.start()
+    vehicle.start()
     try:
-        # The steps only pace the flight: a hostile vehicle's clock is not taken for ours.
-        with patch.object(link, "VehicleClock", lambda **_: VehicleClock()):
+        with _own_clock():
             summary = lockstep.run(session.fly())
     finally:
-        autopilot.end()
+        vehicle.end()
+    return _flown(summary, autopilot, config)
+
+
+def _config(endpoint, changes):
+    text = yaml.safe_dump(merged(merged(CONFIG, {"link": {"endpoint": endpoint}}), changes))
+    return parse(text, "test", Config)
+
+
+def _own_clock():
+    """The steps only pace the flight: a hostile vehicle's clock is not taken for ours."""
+    return patch.object(link, "VehicleClock", lambda **_: VehicleClock())
+
+
+def _flown(summary, autopilot, config):
     events = "; ".join(text for _, text in summary.events)
     return Flown(summary.result, events, autopilot, config)
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.hostile.flying import fly
+from tests.hostile.flying import fly, fly_over_sockets
 from tests.hostile.judge import judge
 from tests.hostile.personality import BOTH, Personality
 
@@ -22,6 +22,7 @@ class Scenario(NamedTuple):
         mode: in which the vehicle begins.
         rules: keywords of `judge`.
         changes: to the configuration.
+        over_sockets: fly it over UDP, because its ports matter.
     """
 
     name: str
@@ -32,10 +33,12 @@ class Scenario(NamedTuple):
     mode: str | None = None
     rules: Mapping[str, bool] = {}
     changes: Mapping[str, object] = {}
+    over_sockets: bool = False
 
     def fly(self, kind, folder):
         """Fly it, and hold it to the rules and to its demands."""
-        flown = fly(kind, self.script, folder, mode=self.mode, **self.changes)
+        take_off = fly_over_sockets if self.over_sockets else fly
+        flown = take_off(kind, self.script, folder, mode=self.mode, **self.changes)
         judge(flown, **self.rules)
         for demand in self.demands:
             demand(flown)

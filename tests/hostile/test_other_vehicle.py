@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import common
 from tests.hostile import personality as kinds
 from tests.hostile.actions import arms, boots_again, switches
 from tests.hostile.endings import never_took_over, ok, says, stops_within
-from tests.hostile.flying import fly
+from tests.hostile.flying import fly_over_sockets
 from tests.hostile.judge import commands, judge
 from tests.hostile.personality import ARDUPILOT, PX4
 from tests.hostile.scenario import Scenario, flights
@@ -47,6 +47,7 @@ def on_the_ground(kind):
             mode=MODES[kind.name],
             rules=RESTARTED,
             changes=PILOT_ARMS,
+            over_sockets="port" in name,
         )
 
 
@@ -87,18 +88,12 @@ def test_datagrams_of_a_stranger_before_the_vehicle_speaks(tmp_path):
     sender = common.MAVLink(None, srcSystem=9, srcComponent=1)
     theirs = common.MAVLink_heartbeat_message(2, 12, 29, 0x03040000, 3, 3).pack(sender)
 
-    def interfere(autopilot):
-        run = autopilot.run
+    def interfere(wire):
+        for _ in range(50):
+            wire.send_from_stranger(theirs)
+            wire.send_from_stranger(b"\xfd\x00 no frame at all")
+            time.sleep(0.01)
 
-        def late():
-            for _ in range(50):
-                autopilot.wire.send_from_stranger(theirs)
-                autopilot.wire.send_from_stranger(b"\xfd\x00 no frame at all")
-                time.sleep(0.01)
-            run()
-
-        autopilot.run = late
-
-    flown = fly(PX4, (), tmp_path, prepare=interfere)
+    flown = fly_over_sockets(PX4, (), tmp_path, late_by=interfere)
     judge(flown)
     ok(flown)

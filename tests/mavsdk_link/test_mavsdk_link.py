@@ -15,7 +15,8 @@ from companion.attitude import BodyRates
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, InvalidSetpoint, LinkError
 from companion.mavlink.settings import LinkSettings
-from tests.flight.fly import QUICK_FLIGHT, free_port, merged, mock_vehicle
+from tests.flight.fly import QUICK_FLIGHT, merged
+from tests.flight.sockets import free_port, mock_vehicle
 
 pytest.importorskip("mavsdk")
 

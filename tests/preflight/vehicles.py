@@ -9,7 +9,8 @@ from companion.files import bounded_yaml
 from companion.flight.assembly import open_link
 from companion.preflight.session import open_session
 from companion.vehicle.parameter_rules import CheckResult
-from tests.flight.fly import CONFIGS, merged, mock_vehicle
+from tests.flight.fly import CONFIGS, merged
+from tests.flight.sockets import mock_vehicle
 
 FAMILIES = ("px4", "ardupilot")
 

@@ -95,7 +95,10 @@ def _figures(rows: list[dict], title: str, figures) -> str:
     lines = [
         _line(key, flown, kinds.get((f"mock-{key[0]}", *key[1:]))) for key, flown in kinds.items()
     ]
-    return _table(title, _HEAD, lines) if lines else ""
+    if not lines:
+        return ""
+    filled = [k for k in range(len(_HEAD)) if any(line[k] for line in lines)]  # no empty columns
+    return _table(title, [_HEAD[k] for k in filled], [[line[k] for k in filled] for line in lines])
 
 
 def _line(key: tuple[str, str, str], flown: list[dict], mocks: list[dict] | None) -> list[str]:

@@ -53,11 +53,11 @@ from companion.guidance.trajectory.csv_file import Table as Table
 from companion.guidance.trajectory.csv_file import read_csv as read_csv
 from companion.guidance.trajectory.demand import Motion as Motion
 from companion.guidance.trajectory.derived import Slowed as Slowed
+from companion.guidance.trajectory.derived import evenly_slowed as evenly_slowed
 from companion.guidance.trajectory.derived import turned_first as turned_first
 from companion.guidance.trajectory.feasibility import Envelope as Envelope
 from companion.guidance.trajectory.feasibility import Violation as Violation
 from companion.guidance.trajectory.feasibility import judge as judge
-from companion.guidance.trajectory.feasibility import slow_down as slow_down
 from companion.guidance.trajectory.feasibility import violations as violations
 from companion.guidance.trajectory.figures import Hover as Hover
 from companion.guidance.trajectory.figures import Laps as Laps
@@ -79,4 +79,8 @@ from companion.guidance.trajectory.sample import Trajectory as Trajectory
 from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryError
 from companion.guidance.trajectory.sample import Vector as Vector
 from companion.guidance.trajectory.sample import computable as computable
+from companion.guidance.trajectory.slower_time import SlowerTime as SlowerTime
+from companion.guidance.trajectory.slowing import SlowDown as SlowDown
+from companion.guidance.trajectory.slowing import SlowedPart as SlowedPart
+from companion.guidance.trajectory.slowing import slow_down as slow_down
 from companion.guidance.trajectory.waypoints import waypoints as waypoints

@@ -1,0 +1,50 @@
+"""Connects the link's callbacks to a flight."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from companion.flight.assembly import Assembled
+from companion.flight.observer import StateLogger
+from companion.vehicle.link import Link
+from companion.vehicle.records import AttitudeSample
+
+
+@contextmanager
+def connected(link: Link, assembled: Assembled) -> Iterator[None]:
+    """Connect the link to the flight while the block runs: samples, errors, and the mode.
+
+    Only one flight at a time may be connected to a link.
+    """
+    flight, context = assembled.flight, assembled.context
+    loop, guidance_loop = context.loop, context.guidance_loop
+    dead_time_watch = assembled.dead_time_watch
+
+    def on_attitude(sample: AttitudeSample) -> None:
+        loop.on_sample(sample)
+        guidance_loop.note_attitude(sample)
+        if loop.offboard_active:
+            dead_time_watch.after_answer(sample.received)
+
+    state_logger = StateLogger(link.state, flight.note)
+
+    def on_heartbeat(_: object) -> None:
+        state_logger.log_changes()
+        flight.on_heartbeat()
+
+    def on_current_mode(_: object) -> None:
+        state_logger.log_changes()
+        flight.on_current_mode()
+
+    link.on_attitude = on_attitude
+    link.on_error = flight.fail
+    ends = (
+        link.subscribe("HEARTBEAT", on_heartbeat),
+        link.subscribe("CURRENT_MODE", on_current_mode),
+    )
+    try:
+        yield
+    finally:
+        link.on_attitude = link.on_error = None
+        for end in ends:
+            end()
+        state_logger.log_changes()

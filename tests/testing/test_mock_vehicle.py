@@ -1,0 +1,209 @@
+"""The public harness: a mock vehicle in memory, its pilot, its faults, and what it received."""
+
+import asyncio
+import gc
+import threading
+from pathlib import Path
+
+import pytest
+
+from companion.files.yaml_file import ConfigError
+from companion.flight.observer import Silent
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.settings import LinkSettings
+from companion.testing import MockVehicle, UnseenError, environment, fly, open_wire, run, session
+from companion.vehicle.link import Link
+from sitl_mock.config.section import ConfigError as MockConfigError
+from tests.flight.fly import quick_flight, quick_vehicle
+
+CONFIG = Path(__file__).parents[2] / "configs" / "mock-px4.yaml"
+BOTH_WAYS = pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "free"])
+SHORT = {"hover": {"duration_s": 1.0}}
+
+
+def vehicle(autopilot="px4", **settings):
+    return MockVehicle(**quick_vehicle(autopilot, settings))
+
+
+def config(mock, **changes):
+    return quick_flight(mock.autopilot, {**SHORT, **changes})
+
+
+@BOTH_WAYS
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_it_flies_lands_and_writes_nothing_that_nobody_asked_for(autopilot, lockstep, tmp_path):
+    mock = vehicle(autopilot, lockstep=lockstep)
+    threads = threading.active_count()
+    summary = fly(config(mock), mock)
+    assert (summary.result, summary.phase, summary.log) == ("ok", "disarm", None)
+    assert summary.tracking()["position_max_m"] < 0.1
+    assert summary.as_dict()["latency_us"] == {"p50": 0.0, "p99": 0.0, "max": 0.0}
+    state = mock.state()
+    assert (state["armed"], state["landed"], state["crashed"]) == (False, True, False)
+    # ArduPilot takes none any more once it has been told to land.
+    assert len(mock.setpoints) == summary.counts.setpoints >= state["setpoints"] > 250
+    assert threading.active_count() == threads
+
+
+@BOTH_WAYS
+def test_equal_flights_are_equal_to_the_bit(lockstep, tmp_path):
+    logs, received = [], []
+    for name in ("one", "two"):
+        wind = {"speed_m_s": 2.0, "gust_m_s": 1.0}
+        faults = [{"kind": "delay", "probability": 0.2, "delay_ms": 11.0}]
+        mock = vehicle(lockstep=lockstep, delay_s=0.0007, wind=wind, faults=faults, seed=5)
+        summary = fly(config(mock), mock, tmp_path / name)
+        assert summary.result == "ok", summary.events
+        logs.append((tmp_path / name / "flight.tlog").read_bytes())
+        received.append(mock.setpoints)
+    assert logs[0] == logs[1]
+    assert received[0] == received[1]
+
+
+def test_without_lockstep_a_sample_is_answered_when_it_arrives_and_a_wire_takes_its_time():
+    later = {}
+    for delay in (0.0, 0.003):
+        mock = vehicle(lockstep=False, delay_s=delay)
+        assert fly(config(mock), mock).result == "ok"
+        own = [each for each in mock.setpoints if each.answers]
+        later[delay] = {round(1e6 * (each.time - each.answers / 1e3)) for each in own}
+    # The autopilot takes a setpoint in the 4 ms between two of its steps.
+    assert later[0.0] == {0}
+    assert later[0.003] == {4000}
+
+
+def test_the_pilot_takes_over_and_what_was_asked_at_a_time_or_condition_happens_once():
+    mock, done = vehicle(), []
+    mock.at(2.0, lambda: done.append(mock.time))
+    mock.when(lambda: mock.state()["setpoints"] > 600, lambda: done.append("enough"))
+    mock.when(lambda: len(mock.setpoints) > 600, mock.take_over)
+    summary = fly(config(mock), mock)
+    assert done == [pytest.approx(2.0), "enough"]
+    assert summary.result == "the pilot or another station took over: mode POSCTL"
+    assert mock.state()["mode"] == "POSCTL"
+    assert not mock.after_step
+
+
+def test_a_ground_station_commands():
+    mock = vehicle()
+    mock.run(1.0)
+    mock.command(400, 1)  # MAV_CMD_COMPONENT_ARM_DISARM
+    assert mock.until(lambda state: state["armed"], 1.0)["time"] < 1.1
+    with pytest.raises(AssertionError, match="not within"):
+        mock.until(lambda state: not state["armed"], 0.5)
+
+
+def test_faults_begin_and_end():
+    mock = vehicle()
+    mock.inject({"kind": "refuse_arming"})
+    summary = fly(config(mock, flight={"ready_timeout_s": 2.0}), mock)
+    assert (summary.phase, mock.state()["armed"]) == ("checks", False)
+    mock.clear_faults()
+    assert fly(config(mock), mock).result == "ok"
+    with pytest.raises(MockConfigError, match="fault"):
+        mock.inject({"kind": "bad weather"})
+
+
+def test_a_clock_that_slips_and_runs_in_bursts_is_met_as_over_udp():
+    """As ArduPilot's simulator on a busy computer; ages are known by TIMESYNC."""
+    oldest = []
+    for slips in ((), ({"kind": "slip_clock", "slip_ms": 30.0, "after_offboard_s": 0.5},)):
+        mock = vehicle("ardupilot", lockstep=False, delay_s=0.0005, burst_ms=5.6, faults=slips)
+        summary = fly(config(mock), mock)
+        assert summary.result == "ok", summary.events
+        oldest.append(summary.as_dict()["dead_time_s"]["sample_age_p99"])
+    assert 0.0 < oldest[0] < 0.01
+    assert oldest[1] == pytest.approx(oldest[0] + 0.03, abs=0.006)
+
+
+def test_the_configuration_may_be_a_file_or_the_keys_that_differ(tmp_path):
+    file = tmp_path / "my.yaml"
+    file.write_text("flight: {arm: true, maneuvers: [hover]}\nhover: {duration_s: 1}\n")
+    hot = MockVehicle(config=CONFIG, prearm_delay_s=0.2)
+    assert fly(file, hot).result == "ok"
+    cold = vehicle()
+    assert fly(str(file), cold, tmp_path / "log").log == tmp_path / "log"
+    assert "the pilot to arm" in fly({"flight": {"arming_timeout_s": 1.0}}, vehicle()).result
+
+
+def test_what_cannot_be_flown_in_memory_is_refused():
+    mock = vehicle()
+    with pytest.raises(ConfigError, match=r"link\.backend mavsdk"):
+        fly({"link": {"backend": "mavsdk"}}, mock)
+    with pytest.raises(MockConfigError, match="windd"):
+        MockVehicle(windd={})
+    settings = LinkSettings("udpin://127.0.0.1:1", lockstep=True)
+
+    async def twice():
+        async with Link(settings, opener=open_wire), Link(settings, opener=open_wire):
+            pass
+
+    with pytest.raises(EndpointError, match="open already"):
+        run(mock, twice())
+
+    async def elsewhere():
+        async with Link(LinkSettings("udpin://127.0.0.1:1"), opener=open_wire):
+            pass
+
+    with pytest.raises(EndpointError, match=r"companion\.testing\.run"):
+        asyncio.run(elsewhere())
+
+
+def test_a_link_of_ones_own_runs_on_the_vehicles_clock():
+    mock = vehicle("ardupilot")
+
+    async def listen():
+        settings = LinkSettings("udpin://127.0.0.1:1", lockstep=True)
+        async with Link(settings, opener=environment.open_transport) as link:
+            heartbeat = await link.wait_connected(3.0)
+            await asyncio.sleep(2.0)
+            return heartbeat.armed, asyncio.get_running_loop().time()
+
+    armed, now = run(mock, listen())
+    assert not armed
+    assert 2.0 < now < 3.1
+    assert mock.time == pytest.approx(now, abs=0.01)
+
+
+def test_an_error_that_nobody_takes_is_raised():
+    async def careless():
+        asyncio.get_running_loop().call_soon(lambda: 1 / 0)
+        await asyncio.sleep(0.1)
+
+    with pytest.raises(UnseenError) as raised:
+        run(vehicle(), careless())
+    assert isinstance(raised.value.__cause__, ZeroDivisionError)
+
+
+class Interrupts(Silent):
+    def __init__(self):
+        self.session = None
+
+    def waiting(self, name, detail, elapsed, timeout):
+        if name == "maneuvers":
+            self.session.interrupt("enough")
+
+
+def test_a_session_can_be_interrupted():
+    mock, observer = vehicle(), Interrupts()
+    observer.session = session(config(mock, hover={"duration_s": 9.0}), mock, observer=observer)
+    assert run(mock, observer.session.fly()).result == "enough"
+    assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", True)
+
+
+def test_many_flights_leave_nothing_behind():
+    def once():
+        mock = vehicle()
+        assert fly(config(mock, flight={"arming_timeout_s": 0.5, "arm": False}), mock).log is None
+
+    once()
+    gc.collect()
+    files = len(list(Path("/proc/self/fd").iterdir()))
+    threads = threading.active_count()
+    objects = len(gc.get_objects())
+    for _ in range(5):
+        once()
+    gc.collect()
+    assert len(list(Path("/proc/self/fd").iterdir())) == files
+    assert threading.active_count() == threads
+    assert len(gc.get_objects()) - objects < 200
