@@ -83,7 +83,7 @@ def test_a_limit_that_only_just_suffices_is_refused_for_it_would_end_a_flight(mo
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (8 << 20, 8 << 20))
     (why,) = refusals(Wishes(lock_memory=True))
-    assert "may lock 8192 KiB only" in why
+    assert "may lock only 8192 KiB" in why
     assert "memlock unlimited" in why
 
 
