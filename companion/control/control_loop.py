@@ -194,7 +194,7 @@ class ControlLoop:
         """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
-        latency = self._clock_ns() - sample.received_ns
+        latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
         if self.offboard_active:

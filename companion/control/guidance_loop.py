@@ -1,7 +1,7 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees, nan
+from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -13,6 +13,7 @@ from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.control.ticker import Ticker
+from companion.control.tracking_record import TrackingRecord
 from companion.guidance import (
     GRAVITY,
     GuidanceInput,
@@ -51,6 +52,7 @@ class GuidanceLoop:
             None.
         estimate: estimates the motion.
         learning: learns the hover thrust.
+        record: records how the reference is tracked.
     """
 
     def __init__(
@@ -81,7 +83,7 @@ class GuidanceLoop:
         self._guidance = guidance
         self._state = state
         self._ground = ground
-        self._trace = trace
+        self.record = TrackingRecord(trace, self.flown)
         self._max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
@@ -199,7 +201,7 @@ class GuidanceLoop:
             )
         if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
-            self._record_tracking(measured_at, reference, inputs.now)
+            self.record.add(now, measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; return the reference from which it was made."""
@@ -262,13 +264,3 @@ class GuidanceLoop:
         limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.hold_here()
-
-    def _record_tracking(
-        self, vehicle_time: float, reference: Reference, motion: VehicleMotion
-    ) -> None:
-        north, east, down = reference.position_ned
-        if not reference.holds_position:
-            north = east = nan  # only the height is a reference in open loop
-        if not reference.holds_height:
-            down = nan
-        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

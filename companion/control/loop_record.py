@@ -72,6 +72,7 @@ class LoopRecord:
         missed_deadlines: setpoints sent later than `Deadlines.deadline` after their sample.
         unanswered: unanswered samples, by reason.
         reason: why the newest sample is unanswered, or None.
+        latency_ns: time from the arrival of the last answered sample to its setpoint, ns.
         thrust: thrust last sent, 0..1.
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
@@ -87,6 +88,7 @@ class LoopRecord:
     missed_deadlines: int = 0
     unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
     reason: Unanswered | None = None
+    latency_ns: int = 0
     thrust: float = 0.0
     last_sample: float = -inf
     last_vehicle_time: float = -inf

@@ -1,11 +1,14 @@
-"""STATUSTEXT: joins the pieces of a long text and removes PX4's trailing tab."""
+"""STATUSTEXT: joins the pieces of received texts, and makes frames of texts for a log."""
 
 from collections import deque
 from typing import NamedTuple
 
-from companion.mavlink.messages import Message
+from companion.files.ascii_text import ascii_for
+from companion.mavlink.framing import build_frame
+from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
+_MOST_ID = 0xFFFF
 _KEPT = 100
 _SAME_WITHIN_S = 1.0
 
@@ -84,3 +87,45 @@ class TextAssembler:
 def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
     """Whether `texts` has the same words from the last second."""
     return any(one.text == words for one in texts if one.time >= now - _SAME_WITHIN_S)
+
+
+class TextFrames:
+    """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
+
+    Their component is MAV_COMP_ID_LOG. With the component id of the frames that are sent, their
+    sequence numbers would look as if frames had been lost.
+
+    Args:
+        system: system id of the frames.
+    """
+
+    def __init__(self, system: int) -> None:
+        self._system = system
+        self._sequence = self._id = 0
+
+    def frames(self, words: str) -> list[bytes]:
+        """The frames of a text, in ASCII, with at most 50 characters each, in order."""
+        text = ascii_for(words)
+        pieces = [
+            text[at : at + _CHUNK_CHARACTERS] for at in range(0, len(text) + 1, _CHUNK_CHARACTERS)
+        ]
+        # A piece with a zero byte ends a text; a text of one piece has no number.
+        number = 0
+        if len(pieces) > 1:
+            number = self._id = self._id % _MOST_ID + 1
+        return [self._frame(piece, number, order) for order, piece in enumerate(pieces)]
+
+    def _frame(self, piece: str, number: int, order: int) -> bytes:
+        message = dialect.MAVLink_statustext_message(
+            dialect.MAV_SEVERITY_INFO, piece.encode("ascii"), number, order
+        )
+        kind = message.get_msgId()
+        self._sequence = (self._sequence + 1) & 0xFF
+        return build_frame(
+            kind,
+            encode(message),
+            CRC_EXTRA[kind],
+            sequence=self._sequence,
+            system=self._system,
+            component=dialect.MAV_COMP_ID_LOG,
+        )

@@ -34,14 +34,21 @@ class SafetyLadder:
 
     Attributes:
         note: called with a message when an alarm is raised or over.
+        breaches: name of the monitor of each breach so far, by the breach in words.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:
         self.note: Callable[[str], None] = lambda _: None
+        self.breaches: dict[str, str] = {}
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
         self._held_at: float | None = None
         self._held_for = ""
+
+    @property
+    def raised(self) -> tuple[str, ...]:
+        """The names of the monitors whose alarm is raised now."""
+        return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
         """Judge one snapshot; return the action to take now, or None."""
@@ -72,6 +79,7 @@ class SafetyLadder:
         if alarm.reason is None:
             self.note(f"safety: {name} is over")
         else:
+            self.breaches[alarm.reason] = name
             self.note(f"safety: {name}: {alarm.reason} → {alarm.monitor.action.value}")
         return alarm.reason is not None
 

@@ -78,3 +78,17 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
     axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
     axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)
     axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")
+
+
+def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
+    """Say below the title of a panel that an axis is magnified beside another one.
+
+    Args:
+        axes: the panel.
+        axis: name of the axis.
+        span: of the axis.
+        other: name of the axis that it is compared with.
+        other_span: of that axis.
+    """
+    share = other_span / span
+    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{share:.0f} of {other}")

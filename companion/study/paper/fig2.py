@@ -14,6 +14,7 @@ from companion.study.drawing import (
     draw_reference,
     draw_response,
     new_figure,
+    say_magnified,
 )
 from companion.study.measures import (
     best_and_worst,
@@ -87,7 +88,8 @@ def run(tick: Tick) -> Outcome:
         figure=_figure(responses, reference),
         caption=(
             "Every method at one heading, for Euler angles the worst: both coefficients, distance"
-            " from the first-order reference, and the path in the plane of the coefficients."
+            " from the first-order reference, and the path in the plane of the coefficients. In the"
+            " panels `Response, east` and `Path` the axis of a_E is magnified."
         ),
         tables=(
             Table(
@@ -146,8 +148,16 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         ylim=(1e-5, 0.1),
     )
     draw_plane(plane, curves, np.array([FIGURE_2.start, FIGURE_2.target]))
+    north_span, east_span = _span(north.get_ylim()), _span(east.get_ylim())
+    say_magnified(east, "this axis", east_span, "that of north", north_span)
+    east_span, north_span = _span(plane.get_xlim()), _span(plane.get_ylim())
+    say_magnified(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
     north.legend(loc="lower right")
     return figure
+
+
+def _span(limits: tuple[float, float]) -> float:
+    return limits[1] - limits[0]
 
 
 def _findings(
