@@ -13,8 +13,38 @@ STARTS = {"px4": "px4", "ardupilot": "ardupilot", "mock": "mock-px4"}
 """The shipped file that `init` begins with, by the name the user gives."""
 
 
+def add_serve(commands: Commands) -> None:
+    """Add `serve`."""
+    serve = commands.add_parser(
+        "serve",
+        help="let other programs use the link: ground stations, MAVSDK, scripts",
+        description="Own the link to the autopilot and pass everything between it and the clients "
+        "at serve.clients, until Ctrl-C.",
+    )
+    serve.add_argument(
+        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
+    )
+    serve.add_argument("--endpoint", help="instead of link.endpoint")
+    serve.add_argument(
+        "--client",
+        action="append",
+        default=[],
+        metavar="ENDPOINT",
+        help="instead of serve.clients, such as udpin://127.0.0.1:14551; as often as needed",
+    )
+    serve.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="instead of the configuration's, such as link.target_system=2; as often as needed",
+    )
+    serve.add_argument("--json", action="store_true", help="end with the counters as one JSON line")
+    serve.set_defaults(run="serve.serve")
+
+
 def add_benches(commands: Commands) -> None:
-    """Add `bench link` and `bench planner`."""
+    """Add `bench link`, `bench planner` and `bench flight`."""
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
     link = benches.add_parser(
@@ -30,7 +60,12 @@ def add_benches(commands: Commands) -> None:
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument("--seconds", type=number(0.001, 3600.0), default=5.0, help="of measuring (5)")
     step.set_defaults(run="tools.bench_planner")
-    for each in (link, step):
+    flight = benches.add_parser("flight", help="whole flights in one process, times real time")
+    flight.add_argument(
+        "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
+    )
+    flight.set_defaults(run="tools.bench_flight")
+    for each in (link, step, flight):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
 

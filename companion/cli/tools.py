@@ -31,6 +31,16 @@ def bench_planner(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
+def bench_flight(options: argparse.Namespace) -> int:
+    """Measure how quickly one core flies."""
+    from companion.bench import flight  # noqa: PLC0415  no other command needs it
+
+    figures = flight.run(options.seconds, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
 def study(options: argparse.Namespace) -> int:
     """Fly the paper's experiments and ours."""
     if options.json and not all(study.prints_json for study in registry.chosen(options.name)):

@@ -22,6 +22,7 @@ from companion.config.flight import (
 from companion.config.guidance import AUTO, GuidanceConfig, PlannerConfig
 from companion.config.limits import DeadmanConfig, LimitsConfig
 from companion.config.safety import SafetyConfig
+from companion.config.serve import ServeConfig
 from companion.config.vehicle import ThrustConfig, VehicleConfig
 from companion.files.yaml_file import Section
 from companion.guidance.thrust import FOR_TILT, ThrustCurve, largest_tilt
@@ -62,6 +63,7 @@ class Config(Section):
     identify: IdentifyConfig = IdentifyConfig()
     realtime: RealtimeConfig = RealtimeConfig()
     recording: RecordingConfig = RecordingConfig()
+    serve: ServeConfig = ServeConfig()
     mock: dict[str, Any] | None = None
     """Section of the mock vehicle, read by `python -m sitl_mock`."""
     include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(

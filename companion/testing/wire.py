@@ -118,48 +118,54 @@ class FreeWire(Wire):
         super().__init__(vehicle, clock)
         self._delay = vehicle.delay_s
         self._burst = vehicle.settings.burst_ms * 1e-3
-        self._under_way: list[tuple[float, int, Callable[[bytes], None], bytes]] = []
+        self._under_way: list[tuple[float, int, bool, bytes]] = []
         self._order = count()
         self._slipped = clock.now - vehicle.time
         vehicle.set_clock(lambda: round((clock.now - self._slipped) * 1e9))
 
     def deliver_due(self) -> None:
         """Deliver what arrives at the present time, in the order of sending."""
-        under_way = self._under_way
-        while under_way and under_way[0][0] <= self._clock.now:
-            _, _, deliver, datagram = heapq.heappop(under_way)
-            deliver(datagram)
+        self._reached_application()
 
     def advance(self, until: float) -> None:
-        """Go on to the next arrival, the vehicle's next step or `until`."""
+        """Go on until something reaches the application, at most to `until`."""
         clock, vehicle = self._clock, self._vehicle
-        step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
-        arrival = self._under_way[0][0] if self._under_way else step_at
-        clock.now = max(clock.now, min(until, arrival, step_at))
-        self.deliver_due()
-        if clock.now >= step_at:
-            self._send(vehicle.begin())
-            self._send(vehicle.step())
-            self._slipped += vehicle.take_slip()
-            self.deliver_due()
+        while True:
+            step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
+            arrival = self._under_way[0][0] if self._under_way else step_at
+            clock.now = max(clock.now, min(until, arrival, step_at))
+            reached = self._reached_application()
+            if clock.now >= step_at:
+                self._send(vehicle.begin())
+                self._send(vehicle.step())
+                self._slipped += vehicle.take_slip()
+                reached = self._reached_application() or reached
+            if reached or clock.now >= until:
+                return
+
+    def _reached_application(self) -> bool:
+        """Deliver what is due; returns whether some of it went to the application."""
+        under_way, reached = self._under_way, False
+        while under_way and under_way[0][0] <= self._clock.now:
+            _, _, to_application, datagram = heapq.heappop(under_way)
+            if to_application:
+                reached = True
+                self._deliver(datagram, self._clock.now)
+            else:
+                self._vehicle.receive(datagram)
+                self._send(self._vehicle.sent())
+        return reached
 
     def _take(self, frame: bytes) -> None:
-        self._put(self._hand_over, frame)
-
-    def _hand_over(self, datagram: bytes) -> None:
-        self._vehicle.receive(datagram)
-        self._send(self._vehicle.sent())
+        self._put(frame, to_application=False)
 
     def _send(self, datagrams: list[bytes]) -> None:
         for datagram in datagrams:
-            self._put(self._arrive, datagram)
+            self._put(datagram, to_application=True)
 
-    def _arrive(self, datagram: bytes) -> None:
-        self._deliver(datagram, self._clock.now)
-
-    def _put(self, deliver: Callable[[bytes], None], datagram: bytes) -> None:
+    def _put(self, datagram: bytes, *, to_application: bool) -> None:
         due = self._clock.now + self._delay
-        heapq.heappush(self._under_way, (due, next(self._order), deliver, datagram))
+        heapq.heappush(self._under_way, (due, next(self._order), to_application, datagram))
 
 
 def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:

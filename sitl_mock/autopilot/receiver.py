@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.commander import DENIED
 from sitl_mock.autopilot.commands import Command
+from sitl_mock.autopilot.mission_protocol import MissionProtocol
 from sitl_mock.autopilot.personality import Personality, Rules
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
@@ -54,7 +55,7 @@ class Receiver:
             "PARAM_REQUEST_LIST": rules.parameter_protocol.request_list,
             "PARAM_REQUEST_READ": rules.parameter_protocol.request_read,
             "PARAM_SET": rules.parameter_protocol.set,
-            "MISSION_REQUEST_LIST": self._mission_list,
+            **MissionProtocol().handlers,
             **rules.handlers,
         }
 
@@ -136,10 +137,3 @@ class Receiver:
                     message.get_srcComponent(),
                 )
             )
-
-    def _mission_list(self, message: Message, link: Link) -> None:
-        link.send(
-            dialect.MAVLink_mission_count_message(
-                message.get_srcSystem(), message.get_srcComponent(), 0, message.mission_type
-            )
-        )

@@ -1,0 +1,1 @@
+"""Other programs on our link: a MAVLink router, and control by their setpoints."""

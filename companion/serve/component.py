@@ -1,0 +1,126 @@
+"""Our component on the clients' network: heartbeat, texts, values, and answers to commands."""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from companion.mavlink.framing import Frame, build_frame
+from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
+from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
+from companion.serve.network.client import Client
+from companion.serve.network.network import Network
+from companion.serve.network.routing import Channel
+
+_HEARTBEAT_PERIOD = 1.0
+_TEXT_BYTES = 50
+"""Bytes of a text that one STATUSTEXT carries; longer texts come in pieces."""
+_LONGEST_TEXT = 200
+_SAME_TEXT = 5.0
+"""The same text is told to the same client at most this often, s."""
+_AUTOPILOT_INVALID, _STATE_ACTIVE, _VERSION = 8, 4, 3
+_COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
+
+WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
+
+
+class Component:
+    """Speaks to the clients as the companion computer, and answers those who command it.
+
+    Args:
+        settings: our ids, and the key with which our frames are signed.
+        network: to the clients.
+        to_vehicle: sends a message over the link, so that a pilot behind the autopilot reads it.
+    """
+
+    def __init__(
+        self, settings: LinkSettings, network: Network, to_vehicle: Callable[[Message], bool]
+    ) -> None:
+        self._settings, self._network, self._to_vehicle = settings, network, to_vehicle
+        self._loop = asyncio.get_running_loop()
+        self._sequence = self._text_id = 0
+        self._began = time.monotonic()
+        self._told: dict[tuple[Client | None, str], float] = {}
+
+    async def run(self) -> None:
+        """Send heartbeats until cancelled."""
+        while True:
+            self._network.send(self._frame(_heartbeat()))
+            await asyncio.sleep(_HEARTBEAT_PERIOD)
+
+    def tell(self, text: str, severity: int = NOTICE) -> None:
+        """Tell everybody what a pilot must know: all clients, and who listens to the autopilot."""
+        if self._is_new(None, text):
+            for piece in self._pieces(text, severity):
+                self._network.send(self._frame(piece))
+                self._to_vehicle(piece)
+
+    def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
+        """Tell one client, for example why it is refused."""
+        if self._is_new(client, text):
+            for piece in self._pieces(text, severity):
+                self._network.send_to(client, self._frame(piece))
+
+    def value(self, name: str, value: float) -> None:
+        """Send a NAMED_VALUE_FLOAT; the name has at most 10 characters."""
+        boot_ms = round((time.monotonic() - self._began) * 1e3) & 0xFFFFFFFF
+        message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
+        self._network.send(self._frame(message))
+
+    def acknowledge(self, client: Client, frame: Frame, result: int) -> None:
+        """Answer a client's command (COMMAND_LONG or COMMAND_INT) with a MAV_RESULT."""
+        command = decode(frame.message_id, frame.payload)
+        message = dialect.MAVLink_command_ack_message(
+            command.command,
+            result,
+            target_system=frame.system,
+            target_component=frame.component,
+        )
+        self._network.send_to(client, self._frame(message))
+
+    def on_own(self, client: Channel, frame: Frame) -> None:
+        """Answer what is addressed to us alone: we carry out no commands."""
+        if frame.message_id in _COMMANDS and isinstance(client, Client):
+            self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED)
+
+    def _is_new(self, client: Client | None, text: str) -> bool:
+        now = self._loop.time()
+        self._told = {who: at for who, at in self._told.items() if now - at < _SAME_TEXT}
+        if (client, text) in self._told:
+            return False
+        self._told[client, text] = now
+        return True
+
+    def _pieces(self, text: str, severity: int) -> list[Message]:
+        """STATUSTEXTs of one text; a long one is numbered, and a short last piece ends it."""
+        words = text.encode("ascii", "replace")[:_LONGEST_TEXT]
+        if len(words) <= _TEXT_BYTES:
+            return [dialect.MAVLink_statustext_message(severity, words)]
+        self._text_id = self._text_id % 0xFFFF + 1
+        cuts = range(0, len(words) + 1, _TEXT_BYTES)
+        return [
+            dialect.MAVLink_statustext_message(
+                severity, words[at : at + _TEXT_BYTES], self._text_id, number
+            )
+            for number, at in enumerate(cuts)
+        ]
+
+    def _frame(self, message: Message) -> bytes:
+        number, settings = message.get_msgId(), self._settings
+        signing = settings.signing
+        frame = build_frame(
+            number,
+            encode(message),
+            CRC_EXTRA[number],
+            sequence=self._sequence,
+            system=settings.source_system,
+            component=settings.source_component,
+            signed=signing is not None,
+        )
+        self._sequence = (self._sequence + 1) & 0xFF
+        return frame if signing is None else signing.sign(frame)
+
+
+def _heartbeat() -> Message:
+    return dialect.MAVLink_heartbeat_message(
+        MAV_TYPE_ONBOARD_CONTROLLER, _AUTOPILOT_INVALID, 0, 0, _STATE_ACTIVE, _VERSION
+    )

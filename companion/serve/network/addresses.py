@@ -1,0 +1,62 @@
+"""To whom a frame is addressed. Source: "Routing" of the MAVLink guide."""
+
+import struct
+from typing import NamedTuple
+
+from companion.mavlink.framing import Frame
+from companion.mavlink.messages import dialect
+
+_MANUAL_CONTROL = 69
+"""Its field `target` is a system id."""
+
+
+class Address(NamedTuple):
+    """A system and one of its components; as a target, 0 means all of them."""
+
+    system: int
+    component: int
+
+
+EVERYBODY = Address(0, 0)
+
+
+def source_of(frame: Frame) -> Address:
+    """The system and component that sent a frame."""
+    return Address(frame.system, frame.component)
+
+
+def target_of(frame: Frame) -> Address:
+    """The target of a frame; everybody for a message without one, or of an unknown kind.
+
+    MAVLink 2 cuts trailing zeros off a payload, so a field that is not there is 0.
+    """
+    system_at, component_at = _TARGET_FIELDS.get(frame.message_id, (None, None))
+    if system_at is None:
+        return EVERYBODY
+    payload, length = frame.payload, len(frame.payload)
+    system = payload[system_at] if system_at < length else 0
+    if system == 0 or component_at is None or component_at >= length:
+        return Address(system, 0)
+    return Address(system, payload[component_at])
+
+
+def _target_fields() -> dict[int, tuple[int, int | None]]:
+    """Offsets of target system and component in the payload, by message id."""
+    found: dict[int, tuple[int, int | None]] = {}
+    for number, kind in dialect.mavlink_map.items():
+        offsets, at = {}, 0
+        for name, code, count in zip(
+            kind.ordered_fieldnames,
+            kind.native_format.decode()[1:],
+            kind.array_lengths,
+            strict=True,
+        ):
+            offsets[name] = at
+            at += struct.calcsize(f"<{code}") * max(1, count)
+        system_at = offsets.get("target" if number == _MANUAL_CONTROL else "target_system")
+        if system_at is not None:
+            found[number] = system_at, offsets.get("target_component")
+    return found
+
+
+_TARGET_FIELDS = _target_fields()

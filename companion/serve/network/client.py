@@ -1,0 +1,140 @@
+"""One client's channel: the frames that wait for it, and the frames that come from it."""
+
+import ipaddress
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from companion.mavlink.framing import Frame, FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
+from companion.mavlink.stats import LinkStats
+
+_MOST_WAITING = 32_768
+"""Largest number of bytes that wait for one client."""
+
+
+@dataclass
+class ClientStats:
+    """Counters of one client, in frames.
+
+    Attributes:
+        received: intact, from the client.
+        sent: handed to the kernel.
+        dropped: not sent, because the client or its line is too slow.
+    """
+
+    received: int = 0
+    sent: int = 0
+    dropped: int = 0
+
+
+class Clients(Protocol):
+    """Takes what the endpoints of clients find."""
+
+    def attach(self, client: "Client") -> None:
+        """A client has connected."""
+
+    def detach(self, client: "Client") -> None:
+        """A client has gone."""
+
+    def received(self, client: "Client", frames: Iterable[Frame]) -> None:
+        """A client has sent frames."""
+
+
+class Client(ABC):
+    """A client's channel. Frames wait until `flush`; none is ever cut, late ones are dropped.
+
+    Args:
+        name: what the user calls it.
+        host: IP address of the client, or None.
+        device: its serial device, or None.
+        streaming: whether a frame may go on in the next bytes.
+
+    Attributes:
+        name, host, device: as given.
+        stats: counters.
+    """
+
+    def __init__(
+        self, name: str, *, host: str | None = None, device: str | None = None, streaming: bool
+    ) -> None:
+        self.name, self.host, self.device = name, host, device
+        self.stats = ClientStats()
+        self._scanner = FrameScanner(
+            CRC_EXTRA, streaming=streaming, stats=LinkStats(), keep_unknown=True
+        )
+        self._waiting: deque[bytes] = deque()
+        self._bytes = 0
+
+    @property
+    def is_local(self) -> bool:
+        """Whether the client runs on this computer."""
+        return self.host is not None and ipaddress.ip_address(self.host).is_loopback
+
+    def put(self, frame: bytes) -> None:
+        """Queue one frame; drop it if too many bytes wait."""
+        if self._bytes + len(frame) > _MOST_WAITING:
+            self.stats.dropped += 1
+            return
+        self._waiting.append(frame)
+        self._bytes += len(frame)
+
+    def scan(self, data: bytes) -> list[Frame]:
+        """The intact frames that these bytes complete."""
+        frames = self._scanner.feed(data)
+        self.stats.received += len(frames)
+        return frames
+
+    def flush(self) -> None:
+        """Send what waits, as far as it can leave now; never block."""
+        if self._waiting:
+            self._flush()
+
+    @abstractmethod
+    def _flush(self) -> None:
+        """As `flush`; something waits."""
+
+    def _take(self, most: int) -> tuple[bytes, int]:
+        """Remove waiting frames, whole ones, at least one.
+
+        Args:
+            most: bytes of all together, if they are several.
+
+        Returns:
+            The bytes, and the number of frames in them.
+        """
+        taken = [self._waiting.popleft()]
+        size = len(taken[0])
+        while self._waiting and size + len(self._waiting[0]) <= most:
+            size += len(self._waiting[0])
+            taken.append(self._waiting.popleft())
+        self._bytes -= size
+        return b"".join(taken), len(taken)
+
+    def _drop_waiting(self) -> None:
+        """Drop all that waits."""
+        self.stats.dropped += len(self._waiting)
+        self._waiting.clear()
+        self._bytes = 0
+
+
+class Flood:
+    """Tells when a client sends faster than any program has reason to."""
+
+    WINDOW = 0.02
+    """Reading pauses until the end of such a window, s."""
+    _MOST = 64
+    """Frames or datagrams in one window."""
+
+    def __init__(self) -> None:
+        self._began = 0.0
+        self._count = 0
+
+    def count(self, number: int, now: float) -> bool:
+        """Count what came at `now`, s; whether reading must pause."""
+        if now - self._began > self.WINDOW:
+            self._began, self._count = now, 0
+        self._count += number
+        return self._count > self._MOST

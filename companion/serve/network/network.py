@@ -1,0 +1,166 @@
+"""The network: joins the link to the vehicle and the clients' endpoints by the routing rules.
+
+Forwarding comes after the control loop: what arrives is only noted, and passed on once an attitude
+sample has been answered, when the next one is a whole period away. Without samples it is passed on
+within `_LONGEST_WAIT`.
+"""
+
+import asyncio
+from collections.abc import Iterable
+
+from companion.mavlink.codec import ATTITUDE_QUATERNION
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.framing import Frame
+from companion.mavlink.transport.endpoint import (
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpIn,
+    UdpOut,
+    parse_endpoint,
+)
+from companion.serve.network.addresses import Address
+from companion.serve.network.client import Client
+from companion.serve.network.routing import Routing
+from companion.serve.network.serial_line import SerialLine
+from companion.serve.network.tcp import TcpPort, open_tcp_client, open_tcp_server
+from companion.serve.network.udp import UdpPort, open_udp
+from companion.serve.network.uplink import Uplink, uplink_rate
+from companion.vehicle.link import Link
+
+_LONGEST_WAIT = 0.004
+"""What came waits no longer than this to be passed on, s."""
+_MOST_NOTED = 4096
+"""Frames of the vehicle that may wait to be passed on; more come only after a stall."""
+
+Port = UdpPort | TcpPort | SerialLine
+
+
+class Network:
+    """Use it as `async with Network(link, endpoints) as network:`, inside the open link.
+
+    Args:
+        link: to the vehicle, open; its `on_frame` is taken.
+        endpoints: of the clients, in the notation of `companion.mavlink.transport.endpoint`.
+
+    Attributes:
+        routing: the rules and their counters; takes hooks for setpoints and for our component.
+        uplink: the clients' frames on their way to the vehicle.
+        ports: the open endpoints, in their order.
+        overflowed: frames of the vehicle that were dropped after a stall.
+    """
+
+    def __init__(self, link: Link, endpoints: Iterable[str]) -> None:
+        settings, self._loop = link.settings, asyncio.get_running_loop()
+        clock = self._loop.time
+        rate, burst = uplink_rate(parse_endpoint(settings.endpoint))
+        self.uplink = Uplink(link.forward, rate, burst, clock)
+        self.routing = Routing(
+            self.uplink,
+            Address(settings.target_system, settings.target_component),
+            Address(settings.source_system, settings.source_component),
+            clock,
+        )
+        self.ports: list[Port] = []
+        self.overflowed = 0
+        self._link = link
+        self._endpoints = [parse_endpoint(each) for each in endpoints]
+        self._clients: list[Client] = []
+        self._noted: list[Frame] = []
+        self._timer: asyncio.TimerHandle | None = None
+        self._soon: asyncio.Handle | None = None
+
+    async def __aenter__(self) -> "Network":
+        try:
+            for endpoint in self._endpoints:
+                self.ports.append(await self._open(endpoint))
+        except EndpointError:
+            await self.__aexit__()
+            raise
+        self._link.on_frame = self._note
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        self._link.on_frame = None
+        self.flush()
+        for port in self.ports:
+            port.close()
+        self.ports.clear()
+        for handle in (self._timer, self._soon):
+            if handle is not None:
+                handle.cancel()
+        await asyncio.sleep(0)  # lets closed connections end
+
+    @property
+    def clients(self) -> tuple[Client, ...]:
+        """The clients there are now."""
+        return tuple(self._clients)
+
+    def send(self, frame: bytes) -> None:
+        """Send a frame of our own component to every client."""
+        self.routing.to_clients(frame)
+        self._flush_later()
+
+    def send_to(self, client: Client, frame: bytes) -> None:
+        """Send a frame of our own component to one client."""
+        client.put(frame)
+        self._flush_later()
+
+    def attach(self, client: Client) -> None:
+        """A client has connected."""
+        self._clients.append(client)
+        self.routing.attach(client)
+
+    def detach(self, client: Client) -> None:
+        """A client has gone."""
+        if client in self._clients:
+            self._clients.remove(client)
+            self.routing.detach(client)
+            self.uplink.forget(client)
+
+    def received(self, client: Client, frames: Iterable[Frame]) -> None:
+        """A client has sent frames."""
+        for frame in frames:
+            self.routing.from_client(client, frame)
+        self._flush_later()
+
+    def flush(self) -> None:
+        """Pass on all that waits, to the vehicle first."""
+        self._soon = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        noted, self._noted = self._noted, []
+        left = self.uplink.drain()
+        for frame in noted:
+            self.routing.from_vehicle(frame)
+        for client in self._clients:
+            client.flush()
+        if left:
+            self._flush_later()
+
+    def _note(self, frame: Frame) -> None:
+        """Take a frame from the link; called where the next sample may already wait."""
+        if len(self._noted) >= _MOST_NOTED:
+            self.overflowed += 1
+            return
+        self._noted.append(frame)
+        if frame.message_id == ATTITUDE_QUATERNION and self._soon is None:
+            self._soon = self._loop.call_soon(self.flush)
+        elif self._timer is None:
+            self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
+
+    def _flush_later(self) -> None:
+        if self._timer is None and self._soon is None:
+            self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
+
+    async def _open(self, endpoint: UdpIn | UdpOut | TcpClient | TcpServer | SerialPort) -> Port:
+        match endpoint:
+            case UdpIn() | UdpOut():
+                return await open_udp(endpoint, self)
+            case TcpServer():
+                return await open_tcp_server(endpoint, self)
+            case TcpClient():
+                return open_tcp_client(endpoint, self)
+            case SerialPort():
+                return SerialLine(endpoint, self)

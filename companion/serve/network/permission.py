@@ -1,0 +1,84 @@
+"""Who may command the vehicle: programs on this computer, those that sign, and those we trust.
+
+Everybody else may listen and read: parameters, missions, logs, files, single messages.
+"""
+
+from collections.abc import Iterable
+
+from companion.mavlink.framing import Frame
+from companion.mavlink.messages import dialect
+from companion.mavlink.peer import plain_host
+from companion.mavlink.signing import Signing
+from companion.mavlink.stamps import SignatureResult
+from companion.serve.network.client import Client
+
+_READING = frozenset(
+    {
+        dialect.MAVLINK_MSG_ID_HEARTBEAT,
+        dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
+        dialect.MAVLINK_MSG_ID_PING,
+        dialect.MAVLINK_MSG_ID_TIMESYNC,
+        dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
+        dialect.MAVLINK_MSG_ID_PARAM_REQUEST_LIST,
+        dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
+        dialect.MAVLINK_MSG_ID_MISSION_REQUEST,
+        dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        dialect.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
+        dialect.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
+        dialect.MAVLINK_MSG_ID_LOG_REQUEST_END,
+    }
+)
+"""Messages that change nothing on the vehicle."""
+_READING_COMMANDS = frozenset(
+    {
+        dialect.MAV_CMD_REQUEST_MESSAGE,
+        dialect.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+        dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+    }
+)
+_COMMANDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
+_COMMAND_AT = 28
+"""Offset of the command's number in both payloads, which begin with seven numbers of four bytes."""
+_FTP = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
+_OPCODE_AT = 6
+"""Offset of the FTP opcode: after three bytes of addresses and a running number and session."""
+_READING_OPCODES = frozenset({0, 1, 2, 3, 4, 5, 14, 15})
+"""None, TerminateSession, ResetSessions, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and
+BurstReadFile. Source: "File Transfer Protocol" of the MAVLink guide."""
+
+
+def reads_only(frame: Frame) -> bool:
+    """Whether a frame changes nothing on the vehicle."""
+    if frame.message_id in _COMMANDS:
+        whole = frame.payload.ljust(_COMMAND_AT + 2, b"\0")
+        return int.from_bytes(whole[_COMMAND_AT : _COMMAND_AT + 2], "little") in _READING_COMMANDS
+    if frame.message_id == _FTP:
+        return frame.payload.ljust(_OPCODE_AT + 1, b"\0")[_OPCODE_AT] in _READING_OPCODES
+    return frame.message_id in _READING
+
+
+class Permission:
+    """Decides which frames of a client are passed on.
+
+    Args:
+        trusted: hosts and serial devices that the configuration trusts.
+        signing: checks signatures; None: no signature proves anything.
+    """
+
+    def __init__(self, trusted: Iterable[str], signing: Signing | None) -> None:
+        self._trusted = frozenset(map(plain_host, trusted))
+        self._signing = signing
+
+    def trusts(self, client: Client) -> bool:
+        """Whether a client may command without a signature."""
+        return client.is_local or (client.host or client.device) in self._trusted
+
+    def refusal(self, client: Client, frame: Frame) -> str | None:
+        """Why a frame is not passed on, in words for its sender; None if it is."""
+        if reads_only(frame) or self.trusts(client):
+            return None
+        if self._signing is None:
+            return "read-only: name this host in serve.trusted"
+        if self._signing.check(frame) is SignatureResult.GOOD:
+            return None
+        return "read-only: sign with the vehicle's key, or see serve.trusted"

@@ -1,0 +1,16 @@
+"""Why an endpoint for clients cannot be opened, in words."""
+
+import errno
+
+_HINTS = {
+    errno.EADDRINUSE: "the port is in use by another program; end it or choose another port",
+    errno.EACCES: "not permitted; use a port of 1024 or above",
+    errno.EPERM: "not permitted; use a port of 1024 or above",
+    errno.EADDRNOTAVAIL: "no interface of this computer has that address",
+}
+
+
+def refusal(where: str, error: OSError) -> str:
+    """The message for an endpoint of `serve.clients` that cannot be opened."""
+    hint = _HINTS.get(error.errno or 0, error.strerror or str(error))
+    return f"serve.clients: {where}: {hint}"

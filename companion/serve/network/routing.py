@@ -1,0 +1,182 @@
+"""Where a frame goes: learned addresses, targets, no loops. Source: "Routing" of the MAVLink guide.
+
+Pure: channels are told what to queue, the clock is given.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from companion.mavlink.framing import Frame
+from companion.serve.network.addresses import EVERYBODY, Address, source_of, target_of
+from companion.serve.network.repeats import Repeats
+
+
+class Channel(Protocol):
+    """The connection of a client, behind which there may be several nodes."""
+
+    @property
+    def name(self) -> str:
+        """What the user calls it, such as `udp 127.0.0.1:14550`."""
+        ...
+
+    def put(self, frame: bytes) -> None:
+        """Queue one whole frame, or drop and count it. It never blocks and never raises."""
+        ...
+
+
+class VehicleChannel(Protocol):
+    """The way to the vehicle, and to whatever is connected to its autopilot."""
+
+    def put(self, frame: bytes, origin: Channel) -> None:
+        """Queue one whole frame of a client, as `Channel.put`."""
+        ...
+
+
+Intercept = Callable[[Channel, Frame], bool]
+"""Takes a client's frame before it is forwarded; true if it must not be."""
+
+
+@dataclass
+class RoutingStats:
+    """What became of frames.
+
+    Attributes:
+        to_clients: frames of the vehicle that were queued for clients, each client counted.
+        to_vehicle: clients' frames that were queued for the vehicle.
+        between_clients: clients' frames that were queued for other clients.
+        looped: frames that had come just before, or claim to be the autopilot's or ours; dropped.
+        no_route: targeted frames whose target was never heard; dropped.
+    """
+
+    to_clients: int = 0
+    to_vehicle: int = 0
+    between_clients: int = 0
+    looped: int = 0
+    no_route: int = 0
+
+
+class Routing:
+    """Forwards each frame, byte for byte, to the channels that should hear it.
+
+    - A frame without a target, or for everybody, goes to all channels but its own.
+    - A targeted frame goes where its target was heard. Unheard components of the vehicle's system
+      are looked for behind the vehicle.
+    - Frames for our own component end here.
+    - Messages of unknown kinds go to everybody, as their target is not known.
+
+    Args:
+        vehicle: the channel to the autopilot.
+        autopilot: its address.
+        own: our component's address.
+        clock: our clock, s.
+
+    Attributes:
+        stats: what became of frames.
+        intercept: see `Intercept`; None forwards everything.
+        on_own: called with each client's frame that is for our component alone, or None.
+    """
+
+    def __init__(
+        self, vehicle: VehicleChannel, autopilot: Address, own: Address, clock: Callable[[], float]
+    ) -> None:
+        self.stats = RoutingStats()
+        self.intercept: Intercept | None = None
+        self.on_own: Callable[[Channel, Frame], None] | None = None
+        self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
+        self._heard: dict[Channel | VehicleChannel, set[Address]] = {vehicle: {autopilot}}
+        self._clients: tuple[Channel, ...] = ()
+        self._repeats = Repeats(clock)
+
+    @property
+    def clients(self) -> tuple[Channel, ...]:
+        """The channels of the clients."""
+        return self._clients
+
+    def attach(self, client: Channel) -> None:
+        """Forward to a further client from now on."""
+        self._heard[client] = set()
+        self._clients = (*self._clients, client)
+
+    def detach(self, client: Channel) -> None:
+        """Forget a client and the addresses that were heard on its channel."""
+        self._heard.pop(client, None)
+        self._clients = tuple(each for each in self._clients if each is not client)
+
+    def addresses(self, channel: Channel) -> frozenset[Address]:
+        """The addresses heard on a channel."""
+        return frozenset(self._heard.get(channel, ()))
+
+    def from_vehicle(self, frame: Frame) -> None:
+        """Forward a frame that came over the link to the vehicle."""
+        source = source_of(frame)
+        if source != self._autopilot:  # another component, or a station behind the autopilot
+            if source == self._own or self._repeats.came(frame.raw):
+                self.stats.looped += 1
+                return
+            self._heard[self._vehicle].add(source)
+        target = target_of(frame)
+        if target == EVERYBODY:
+            receivers = self._clients
+        elif target == self._own:
+            return
+        else:
+            receivers = tuple(each for each in self._clients if self._reaches(each, target))
+            self.stats.no_route += not receivers
+        self.stats.to_clients += len(receivers)
+        for client in receivers:
+            client.put(frame.raw)
+
+    def from_client(self, client: Channel, frame: Frame) -> None:
+        """Forward a client's frame, unless it is intercepted."""
+        source = source_of(frame)
+        if (
+            source in (self._autopilot, self._own)
+            or client not in self._heard
+            or self._repeats.came(frame.raw)
+        ):
+            self.stats.looped += 1
+            return
+        if source.system != 0:
+            self._heard[client].add(source)
+        target = target_of(frame)
+        if target == self._own:
+            if self.on_own is not None:
+                self.on_own(client, frame)
+            return
+        if self.intercept is not None and self.intercept(client, frame):
+            return
+        self._forward(client, frame.raw, target)
+
+    def to_clients(self, frame: bytes) -> None:
+        """Send a frame of our own component to every client."""
+        for client in self._clients:
+            client.put(frame)
+
+    def _forward(self, origin: Channel, raw: bytes, target: Address) -> None:
+        others = [each for each in self._clients if each is not origin]
+        if target != EVERYBODY:
+            others = [each for each in others if self._reaches(each, target)]
+        if self._is_behind_vehicle(target, known_to_client=bool(others)):
+            self.stats.to_vehicle += 1
+            self._vehicle.put(raw, origin)
+        elif not others:
+            self.stats.no_route += 1
+        self.stats.between_clients += len(others)
+        for each in others:
+            each.put(raw)
+
+    def _is_behind_vehicle(self, target: Address, *, known_to_client: bool) -> bool:
+        if target.system in (0, self._autopilot.system) and target.component == 0:
+            return True
+        if self._reaches(self._vehicle, target):
+            return True
+        return target.system == self._autopilot.system and not known_to_client
+
+    def _reaches(self, channel: Channel | VehicleChannel, target: Address) -> bool:
+        heard = self._heard.get(channel, ())
+        if target.system == 0:
+            return True
+        if target.component == 0:
+            return any(each.system == target.system for each in heard)
+        return target in heard

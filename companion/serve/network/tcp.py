@@ -1,0 +1,181 @@
+"""Clients over TCP: those that connect to our port, or a program that listens."""
+
+import asyncio
+import socket
+
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.transport.endpoint import TcpClient as TcpOut
+from companion.mavlink.transport.endpoint import TcpServer
+from companion.serve.network.client import Client, Clients, Flood
+from companion.serve.network.refusal import refusal
+
+_MOST_CLIENTS = 16
+_MOST_UNSENT = 65_536
+"""Bytes that the operating system has not taken yet; while there are more, frames are dropped."""
+_KERNEL_BUFFER = 65_536
+"""Bytes that the operating system keeps for a client. After a stop it reads these first."""
+_RETRY = 2.0
+"""Pause before connecting again, s."""
+_CONNECT_TIMEOUT = 5.0
+
+
+async def open_tcp_server(endpoint: TcpServer, clients: Clients) -> "TcpPort":
+    """Listen for clients.
+
+    Raises:
+        EndpointError: port in use or not permitted.
+    """
+    named = await resolve(endpoint.peers, socket.SOCK_STREAM)
+    port = TcpPort(clients, named)
+    try:
+        server = await asyncio.get_running_loop().create_server(
+            port.protocol, endpoint.host, endpoint.port
+        )
+    except OSError as error:
+        where = f"TCP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(refusal(where, error)) from error
+    port.listen(server)
+    return port
+
+
+def open_tcp_client(endpoint: TcpOut, clients: Clients) -> "TcpPort":
+    """Connect to a program that listens, now or later, and again when the connection is lost."""
+    port = TcpPort(clients, NamedPeers())
+    port.connect(endpoint)
+    return port
+
+
+class TcpPort:
+    """The TCP connections of one endpoint.
+
+    Attributes:
+        local: (host, port) listened on, or None.
+    """
+
+    def __init__(self, clients: Clients, named: NamedPeers) -> None:
+        self._clients, self._named = clients, named
+        self._server: asyncio.Server | None = None
+        self._dialling: asyncio.Task[None] | None = None
+        self._open: set[TcpClient] = set()
+        self._closed = False
+        self.local: tuple[str, int] | None = None
+
+    def protocol(self) -> "_Connection":
+        """The protocol of a new connection."""
+        return _Connection(self)
+
+    def listen(self, server: asyncio.Server) -> None:
+        """Accept clients from `server`."""
+        self._server = server
+        self.local = server.sockets[0].getsockname()[:2]
+
+    def connect(self, endpoint: TcpOut) -> None:
+        """Keep a connection to `endpoint` open."""
+        self._dialling = asyncio.get_running_loop().create_task(self._dial(endpoint))
+
+    async def _dial(self, endpoint: TcpOut) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                async with asyncio.timeout(_CONNECT_TIMEOUT):
+                    _, connection = await loop.create_connection(
+                        self.protocol, endpoint.host, endpoint.port
+                    )
+                await connection.lost.wait()
+            except OSError:
+                pass  # TimeoutError is one, too
+            await asyncio.sleep(_RETRY)
+
+    def accept(self, transport: asyncio.Transport) -> "TcpClient | None":
+        """A client for a new connection; None if it is not let in."""
+        address = transport.get_extra_info("peername")
+        full = len(self._open) >= _MOST_CLIENTS
+        if self._closed or full or address is None or not self._named.admit(address):
+            return None
+        opened = transport.get_extra_info("socket")
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
+        client = TcpClient(name, host, transport)
+        self._open.add(client)
+        self._clients.attach(client)
+        return client
+
+    def received(self, client: "TcpClient", data: bytes) -> int:
+        """Pass on what a client sent; returns the number of frames."""
+        frames = client.scan(data)
+        self._clients.received(client, frames)
+        return len(frames)
+
+    def lost(self, client: "TcpClient") -> None:
+        """A connection is gone."""
+        if client in self._open:
+            self._open.discard(client)
+            self._clients.detach(client)
+
+    def close(self) -> None:
+        """Close all connections at once."""
+        self._closed = True
+        if self._dialling is not None:
+            self._dialling.cancel()
+        if self._server is not None:
+            self._server.close()
+        for client in tuple(self._open):
+            client.abort()
+            self.lost(client)
+
+
+class TcpClient(Client):
+    """One connection."""
+
+    def __init__(self, name: str, host: str, transport: asyncio.Transport) -> None:
+        super().__init__(name, host=host, streaming=True)
+        self._transport = transport
+
+    def abort(self) -> None:
+        """Close the connection; what was not sent never will be."""
+        self._transport.abort()
+
+    def _flush(self) -> None:
+        transport = self._transport
+        if transport.is_closing() or transport.get_write_buffer_size() > _MOST_UNSENT:
+            self._drop_waiting()
+        else:
+            data, frames = self._take(_MOST_UNSENT)
+            transport.write(data)
+            self.stats.sent += frames
+
+
+class _Connection(asyncio.Protocol):
+    def __init__(self, port: TcpPort) -> None:
+        self._port = port
+        self._loop = asyncio.get_running_loop()
+        self._client: TcpClient | None = None
+        self._transport: asyncio.Transport | None = None
+        self._flood = Flood()
+        self.lost = asyncio.Event()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        self._client = self._port.accept(transport)
+        if self._client is None:
+            transport.abort()
+
+    def data_received(self, data: bytes) -> None:
+        if self._client is None or self._transport is None:
+            return
+        number = self._port.received(self._client, data)
+        if self._flood.count(number, self._loop.time()) and not self._transport.is_closing():
+            self._transport.pause_reading()
+            self._loop.call_later(Flood.WINDOW, self._resume)
+
+    def _resume(self) -> None:
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.resume_reading()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.lost.set()
+        if self._client is not None:
+            self._port.lost(self._client)

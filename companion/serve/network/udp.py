@@ -1,0 +1,164 @@
+"""Clients over UDP: any number that send to our port, or one at a known address."""
+
+import asyncio
+import socket
+from typing import Any
+
+from companion.mavlink.errors import EndpointError
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.transport.endpoint import UdpIn, UdpOut
+from companion.serve.network.client import Client, Clients, Flood
+from companion.serve.network.refusal import refusal
+
+_LARGEST_READ = 4_096
+_LARGEST_SENT = 1_400
+"""Several frames travel in one datagram, as long as no network has to split it, bytes."""
+_BURST = 8
+"""Datagrams read before the loop does other work."""
+_SILENT = 15.0
+"""A client that sent nothing for this long has gone, s: ground stations send once a second."""
+_MOST_CLIENTS = 16
+
+
+async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
+    """Open a UDP endpoint for clients.
+
+    Raises:
+        EndpointError: port in use, host unknown, no permission.
+    """
+    loop = asyncio.get_running_loop()
+    where = f"UDP {endpoint.host}:{endpoint.port}"
+    try:
+        found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=socket.SOCK_DGRAM)
+    except OSError as error:
+        raise EndpointError(
+            f"serve.clients: {where}: host unknown ({error.strerror}); check the name or use its "
+            "IP address"
+        ) from error
+    family, _, _, _, address = found[0]
+    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), socket.SOCK_DGRAM)
+    opened = socket.socket(family, socket.SOCK_DGRAM)
+    opened.setblocking(False)
+    try:
+        if isinstance(endpoint, UdpIn):
+            opened.bind(address)
+        else:
+            opened.bind(("", 0) if family == socket.AF_INET else ("::", 0))
+    except OSError as error:
+        opened.close()
+        raise EndpointError(refusal(where, error)) from error
+    port = UdpPort(opened, clients, named)
+    if isinstance(endpoint, UdpOut):
+        port.call(address)
+    return port
+
+
+class UdpPort:
+    """A socket with its clients, told apart by their addresses.
+
+    Attributes:
+        local: the (host, port) it is bound to.
+    """
+
+    def __init__(self, opened: socket.socket, clients: Clients, named: NamedPeers) -> None:
+        self._socket, self._clients, self._named = opened, clients, named
+        self.local: tuple[str, int] = opened.getsockname()[:2]
+        self._loop = asyncio.get_running_loop()
+        self._by_address: dict[Any, UdpClient] = {}
+        self._only: Any = None
+        self._flood = Flood()
+        self._pause: asyncio.TimerHandle | None = None
+        self._timer = self._loop.call_later(_SILENT, self._expire)
+        self._loop.add_reader(opened.fileno(), self._read)
+
+    def call(self, address: Any) -> None:
+        """Send to one client, which need not have sent anything; hear no other."""
+        self._only = address
+        self._attach(address)
+
+    def close(self) -> None:
+        """Close the socket; its clients are gone."""
+        self._timer.cancel()
+        if self._pause is not None:
+            self._pause.cancel()
+        self._loop.remove_reader(self._socket.fileno())
+        self._socket.close()
+        for client in self._by_address.values():
+            self._clients.detach(client)
+        self._by_address.clear()
+
+    def send(self, data: bytes, address: Any) -> bool:
+        """Send a datagram; false if the kernel does not take it now."""
+        try:
+            self._socket.sendto(data, address)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True  # nobody listens there now; the next datagram may find somebody
+        return True
+
+    def _read(self) -> None:
+        for _ in range(_BURST):
+            try:
+                data, address = self._socket.recvfrom(_LARGEST_READ)
+            except OSError:
+                return  # nothing left, or an ICMP refusal of something sent before
+            self._take(data, address)
+            if self._flood.count(1, self._loop.time()):
+                self._loop.remove_reader(self._socket.fileno())
+                self._pause = self._loop.call_later(Flood.WINDOW, self._resume)
+                return
+
+    def _resume(self) -> None:
+        self._pause = None
+        self._loop.add_reader(self._socket.fileno(), self._read)
+
+    def _take(self, data: bytes, address: Any) -> None:
+        client = self._by_address.get(address)
+        if client is None:
+            if self._only is not None or not self._named.admit(address):
+                return
+            client = UdpClient(self, address)
+            frames = client.scan(data)
+            if not frames or len(self._by_address) >= _MOST_CLIENTS:
+                return
+            self._attach(address, client)
+        else:
+            frames = client.scan(data)
+        client.heard_at = self._loop.time()
+        self._clients.received(client, frames)
+
+    def _attach(self, address: Any, client: "UdpClient | None" = None) -> None:
+        client = self._by_address[address] = client or UdpClient(self, address)
+        self._clients.attach(client)
+
+    def _expire(self) -> None:
+        self._timer = self._loop.call_later(1.0, self._expire)
+        now = self._loop.time()
+        for address, client in tuple(self._by_address.items()):
+            if address != self._only and now - client.heard_at > _SILENT:
+                del self._by_address[address]
+                self._clients.detach(client)
+
+
+class UdpClient(Client):
+    """One client's address.
+
+    Attributes:
+        heard_at: when its last datagram came, s.
+    """
+
+    def __init__(self, port: UdpPort, address: Any) -> None:
+        host = plain_host(str(address[0]))
+        super().__init__(f"udp {host_and_port(address)}", host=host, streaming=False)
+        self._port, self._address = port, address
+        self.heard_at = asyncio.get_running_loop().time()
+
+    def _flush(self) -> None:
+        while self._waiting:
+            datagram, frames = self._take(_LARGEST_SENT)
+            if self._port.send(datagram, self._address):
+                self.stats.sent += frames
+            else:
+                self.stats.dropped += frames
+                self._drop_waiting()

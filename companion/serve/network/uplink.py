@@ -1,0 +1,85 @@
+"""Clients' frames on their way to the vehicle: bounded, fair, and never in the way of setpoints."""
+
+from collections import deque
+from collections.abc import Callable
+
+from companion.mavlink.transport.endpoint import Endpoint, SerialPort
+
+_QUEUE = 64
+"""Largest number of frames that wait for one client."""
+_LARGEST_FRAME = 280
+_SERIAL_SHARE = 0.5
+"""Share of a serial line that clients may use; our setpoints and requests need the rest."""
+_BITS_PER_BYTE = 10
+_NETWORK_RATE = 500_000.0
+"""Clients' bytes per second over a network."""
+_NETWORK_BURST = 50_000.0
+
+
+def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
+    """What clients may send to the vehicle at this endpoint: bytes per second, and at once."""
+    if isinstance(endpoint, SerialPort):
+        rate = _SERIAL_SHARE * endpoint.baud / _BITS_PER_BYTE
+        return rate, max(float(_LARGEST_FRAME), 0.01 * rate)
+    return _NETWORK_RATE, _NETWORK_BURST
+
+
+class Uplink:
+    """Queues the frames of each client and sends them in turn, as fast as the link allows.
+
+    Args:
+        send: sends a whole frame now; false if it could not leave.
+        rate: bytes per second.
+        burst: bytes that may leave at once.
+        clock: our clock, s.
+
+    Attributes:
+        sent: frames that left.
+        dropped: frames that found their client's queue full.
+    """
+
+    name = "vehicle"
+
+    def __init__(
+        self, send: Callable[[bytes], bool], rate: float, burst: float, clock: Callable[[], float]
+    ) -> None:
+        self.sent = self.dropped = 0
+        self._send, self._rate, self._burst, self._clock = send, rate, burst, clock
+        self._allowed, self._since = burst, clock()
+        self._queues: dict[object, deque[bytes]] = {}
+        self._turns: deque[object] = deque()
+
+    def put(self, frame: bytes, origin: object) -> None:
+        """Queue a frame of the client `origin`; drop it if that client has too many waiting."""
+        queue = self._queues.get(origin)
+        if queue is None:
+            queue = self._queues[origin] = deque()
+            self._turns.append(origin)
+        if len(queue) >= _QUEUE:
+            self.dropped += 1
+            return
+        queue.append(frame)
+
+    def drain(self) -> bool:
+        """Send what may leave now, one frame of each client in turn; whether some are left."""
+        now = self._clock()
+        self._allowed = min(self._burst, self._allowed + self._rate * (now - self._since))
+        self._since = now
+        while self._turns and self._allowed > 0.0:
+            origin = self._turns[0]
+            queue = self._queues[origin]
+            if not self._send(queue[0]):
+                return True
+            self._allowed -= len(queue.popleft())
+            self.sent += 1
+            self._turns.popleft()
+            if queue:
+                self._turns.append(origin)
+            else:
+                del self._queues[origin]
+        return bool(self._turns)
+
+    def forget(self, origin: object) -> None:
+        """Drop what waits for a client that is gone."""
+        if self._queues.pop(origin, None) is not None:
+            self._turns.remove(origin)

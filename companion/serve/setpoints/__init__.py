@@ -1,0 +1,1 @@
+"""Clients' setpoints: what is commanded, and the reference that follows from it."""

@@ -1,0 +1,68 @@
+"""SET_ATTITUDE_TARGET: an attitude or body rates, with thrust.
+
+Sources: MAVLink common (ATTITUDE_TARGET_TYPEMASK); "Offboard Mode" of the PX4 guide; "Copter
+Commands in Guided Mode" of ArduPilot's developer wiki. Both know two kinds: attitude and thrust,
+and body rates and thrust. With other masks they differ, or fall back to something else (measured).
+"""
+
+from math import isfinite
+
+from companion.attitude import AttitudeError, BodyRates
+from companion.attitude.representation import normalised
+from companion.mavlink.messages import Message
+from companion.serve.setpoints.request import AttitudeRequest, RatesRequest, RefusedSetpoint
+
+_NO_ROLL_RATE, _NO_PITCH_RATE, _NO_YAW_RATE = 1, 2, 4
+_ALL_RATES = _NO_ROLL_RATE | _NO_PITCH_RATE | _NO_YAW_RATE
+_THRUST_BODY, _NO_THRUST, _NO_ATTITUDE = 32, 64, 128
+_RESERVED = 8 | 16
+_LARGEST_RATE = 100.0
+"""No vehicle turns faster, rad/s."""
+
+
+def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
+    """What a SET_ATTITUDE_TARGET commands.
+
+    Raises:
+        RefusedSetpoint: it is contradictory, incomplete, or not finite.
+    """
+    mask, thrust = message.type_mask, message.thrust
+    if mask & _RESERVED:
+        raise RefusedSetpoint(f"type_mask {mask} has reserved bits")
+    if mask & _THRUST_BODY:
+        raise RefusedSetpoint("thrust_body is not flown: give thrust, clear THRUST_BODY_SET")
+    if mask & _NO_THRUST:
+        raise RefusedSetpoint("thrust is missing: clear THROTTLE_IGNORE")
+    if not 0.0 <= thrust <= 1.0:
+        raise RefusedSetpoint(f"thrust is outside 0..1: {thrust:g}")
+    ignored = mask & _ALL_RATES
+    if mask & _NO_ATTITUDE:
+        if ignored:
+            raise RefusedSetpoint("body rates are incomplete: give roll, pitch and yaw rate")
+        return RatesRequest(_rates(message), thrust)
+    if ignored & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
+        raise RefusedSetpoint("attitude and body rates contradict each other: ignore one")
+    return AttitudeRequest(
+        _attitude(message), 0.0 if ignored & _NO_YAW_RATE else _rate(message.body_yaw_rate), thrust
+    )
+
+
+def _rates(message: Message) -> BodyRates:
+    return BodyRates(
+        _rate(message.body_roll_rate),
+        _rate(message.body_pitch_rate),
+        _rate(message.body_yaw_rate),
+    )
+
+
+def _rate(rate: float) -> float:
+    if not (isfinite(rate) and abs(rate) <= _LARGEST_RATE):
+        raise RefusedSetpoint(f"a body rate is not finite or too large: {rate:g}")
+    return rate
+
+
+def _attitude(message: Message) -> tuple[float, float, float, float]:
+    try:
+        return normalised(tuple(message.q))
+    except AttitudeError as error:
+        raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error

@@ -1,0 +1,210 @@
+"""SET_POSITION_TARGET_LOCAL_NED and _GLOBAL_INT: masks and frames.
+
+Sources: MAVLink common; "Offboard Mode" of the PX4 guide; "Copter Commands in Guided Mode" of
+ArduPilot's developer wiki. Where the two autopilots take a setpoint differently (a position in
+MAV_FRAME_BODY_NED, a yaw in a body frame), it is refused or follows the vehicle's autopilot.
+"""
+
+from math import cos, hypot, isfinite, pi, radians
+from typing import NamedTuple
+
+from companion.guidance.fence import EARTH_RADIUS
+from companion.guidance.reference import Vector, rotated
+from companion.mavlink.messages import Message, dialect
+from companion.serve.setpoints.request import (
+    AxisDemand,
+    MotionRequest,
+    Origin,
+    RefusedSetpoint,
+    Situation,
+)
+
+_POSITION, _VELOCITY, _ACCELERATION = (1, 2, 4), (8, 16, 32), (64, 128, 256)
+_FORCE, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
+_NO_ACCELERATION = 64 | 128 | 256
+_KNOWN_BITS = 4095
+_HORIZONTAL, _VERTICAL = (0, 1), (2,)
+
+_FARTHEST, _FASTEST, _STRONGEST, _FASTEST_YAW = 10_000.0, 100.0, 100.0, 20.0
+"""Larger numbers are taken for errors; m, m/s, m/s², rad/s."""
+
+
+class _Frame(NamedTuple):
+    """A frame of SET_POSITION_TARGET_LOCAL_NED.
+
+    Attributes:
+        offset: whether positions count from where the vehicle is.
+        body: whether directions count from where it points to.
+        position: whether a position in it means the same to PX4 and ArduPilot.
+    """
+
+    offset: bool
+    body: bool
+    position: bool = True
+
+
+_LOCAL_FRAMES = {
+    dialect.MAV_FRAME_LOCAL_NED: _Frame(offset=False, body=False),
+    dialect.MAV_FRAME_LOCAL_OFFSET_NED: _Frame(offset=True, body=False),
+    dialect.MAV_FRAME_BODY_NED: _Frame(offset=False, body=True, position=False),
+    dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(offset=True, body=True),
+    dialect.MAV_FRAME_BODY_FRD: _Frame(offset=True, body=True),
+}
+_AMSL = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT
+_ABOVE_HOME = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+_TERRAIN = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT
+
+
+def local_target(
+    message: Message, situation: Situation, *, body_yaw_is_relative: bool
+) -> MotionRequest:
+    """What a SET_POSITION_TARGET_LOCAL_NED commands.
+
+    Args:
+        message: decoded.
+        situation: of the vehicle now.
+        body_yaw_is_relative: whether a yaw in a body frame counts from the present one (ArduPilot),
+            not from north (PX4).
+
+    Raises:
+        RefusedSetpoint: it is contradictory, incomplete, or not finite.
+    """
+    frame = _LOCAL_FRAMES.get(message.coordinate_frame)
+    if frame is None:
+        raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not flown")
+    groups = _groups(message, (message.x, message.y, message.z))
+    position, velocity, acceleration = groups
+    if not frame.position and any(value is not None for value in position):
+        raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED, BODY_OFFSET_NED")
+    turn = situation.yaw if frame.body else 0.0
+    start = situation.position_ned if frame.offset else (0.0, 0.0, 0.0)
+    position = _shifted(_turned(position, turn), start)
+    yaw, yaw_rate = _heading(message)
+    if frame.body and body_yaw_is_relative and yaw is not None:
+        yaw += situation.yaw
+    return _request(
+        message, (position, _turned(velocity, turn), _turned(acceleration, turn)), yaw, yaw_rate
+    )
+
+
+def global_target(message: Message, situation: Situation) -> MotionRequest:
+    """What a SET_POSITION_TARGET_GLOBAL_INT commands.
+
+    Raises:
+        RefusedSetpoint: it is contradictory, incomplete, or not finite; or the origin of the local
+            frame is not known.
+    """
+    frame = message.coordinate_frame
+    if frame in _TERRAIN:
+        raise RefusedSetpoint("heights above terrain are not known here: use AMSL or above home")
+    if frame not in (*_AMSL, *_ABOVE_HOME):
+        raise RefusedSetpoint(f"coordinate_frame {frame} is not flown")
+    position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
+    if any(value is not None for value in position):
+        if situation.origin is None:
+            raise RefusedSetpoint("the vehicle's global position is not known yet")
+        place = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME)
+        position = tuple(
+            None if value is None else here for value, here in zip(position, place, strict=True)
+        )
+    yaw, yaw_rate = _heading(message)
+    return _request(message, (position, velocity, acceleration), yaw, yaw_rate)
+
+
+_Values = tuple[float | None, ...]
+
+
+def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Values]:
+    """Position, velocity and acceleration; None where the mask says so."""
+    mask = message.type_mask
+    if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
+        raise RefusedSetpoint("forces are not flown: clear FORCE_SET")
+    if mask & ~_KNOWN_BITS:
+        raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
+    return (
+        _masked(mask, _POSITION, position, _FARTHEST, "position"),
+        _masked(mask, _VELOCITY, (message.vx, message.vy, message.vz), _FASTEST, "velocity"),
+        _masked(
+            mask, _ACCELERATION, (message.afx, message.afy, message.afz), _STRONGEST, "acceleration"
+        ),
+    )
+
+
+def _masked(
+    mask: int, bits: tuple[int, int, int], values: Vector, largest: float, name: str
+) -> _Values:
+    used = tuple(None if mask & bit else value for bit, value in zip(bits, values, strict=True))
+    for value in used:
+        if value is not None and not (isfinite(value) and abs(value) <= largest):
+            raise RefusedSetpoint(f"{name} is not finite or too large: {value:g}")
+    if (used[0] is None) != (used[1] is None):
+        raise RefusedSetpoint(f"{name} of x without y, or y without x")
+    return used
+
+
+def _heading(message: Message) -> tuple[float | None, float | None]:
+    """Yaw and yaw rate; None where the mask says so."""
+    mask = message.type_mask
+    yaw = None if mask & _NO_YAW else message.yaw
+    rate = None if mask & _NO_YAW_RATE else message.yaw_rate
+    if yaw is not None and not (isfinite(yaw) and abs(yaw) <= 4.0 * pi):
+        raise RefusedSetpoint(f"yaw is not finite or too large: {yaw:g}")
+    if rate is not None and not (isfinite(rate) and abs(rate) <= _FASTEST_YAW):
+        raise RefusedSetpoint(f"yaw_rate is not finite or too large: {rate:g}")
+    return yaw, rate
+
+
+def _turned(values: _Values, angle: float) -> _Values:
+    north, east, down = values
+    if north is None or east is None or angle == 0.0:
+        return values
+    return (*rotated(north, east, angle), down)
+
+
+def _shifted(values: _Values, start: Vector) -> _Values:
+    return tuple(
+        None if value is None else value + first for value, first in zip(values, start, strict=True)
+    )
+
+
+def _request(
+    message: Message,
+    groups: tuple[_Values, _Values, _Values],
+    yaw: float | None,
+    yaw_rate: float | None,
+) -> MotionRequest:
+    return MotionRequest(
+        _demand(groups, _HORIZONTAL, "horizontal"),
+        _demand(groups, _VERTICAL, "vertical"),
+        yaw,
+        yaw_rate,
+        message.time_boot_ms,
+    )
+
+
+def _demand(
+    groups: tuple[_Values, _Values, _Values], axes: tuple[int, ...], name: str
+) -> AxisDemand:
+    position, velocity, acceleration = (_picked(values, axes) for values in groups)
+    if position is velocity is acceleration is None:
+        raise RefusedSetpoint(f"nothing {name} is commanded: give position, velocity or accel.")
+    if position is not None and velocity is None and acceleration is not None:
+        raise RefusedSetpoint("position and acceleration without velocity")
+    if position is not None and hypot(*position) > _FARTHEST:
+        raise RefusedSetpoint(f"the position is farther than {_FARTHEST:g} m")
+    return AxisDemand(position, velocity, acceleration)
+
+
+def _picked(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
+    picked = tuple(value for value in (values[axis] for axis in axes) if value is not None)
+    return picked if len(picked) == len(axes) else None
+
+
+def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
+    """A place in the local frame, which is flat over the distances flown."""
+    degrees = 1e-7
+    north = radians(message.lat_int * degrees - origin.latitude) * EARTH_RADIUS
+    east = radians((message.lon_int * degrees - origin.longitude + 180.0) % 360.0 - 180.0)
+    east *= EARTH_RADIUS * cos(radians(origin.latitude))
+    reference = origin.home_altitude if above_home else 0.0
+    return north, east, origin.altitude - reference - message.alt

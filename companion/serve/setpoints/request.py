@@ -1,0 +1,103 @@
+"""What a setpoint commands, and the error for one that is not understood."""
+
+from typing import NamedTuple
+
+from companion.attitude import BodyRates, Quaternion
+from companion.guidance.reference import Vector
+
+
+class RefusedSetpoint(ValueError):  # noqa: N818 - it is refused, and nothing failed
+    """A setpoint that is not flown; the message tells its sender why."""
+
+
+class AxisDemand(NamedTuple):
+    """What is commanded along some axes: one of the three, or more of them together.
+
+    A position may come with a velocity, and both with an acceleration; a velocity may come with an
+    acceleration. What is missing is None.
+
+    Attributes:
+        position: m, in the autopilot's local frame.
+        velocity: m/s.
+        acceleration: m/s².
+    """
+
+    position: tuple[float, ...] | None
+    velocity: tuple[float, ...] | None
+    acceleration: tuple[float, ...] | None
+
+
+class MotionRequest(NamedTuple):
+    """A commanded motion, NED, SI units and radians.
+
+    Attributes:
+        horizontal: (north, east).
+        vertical: (down,).
+        yaw: rad from north; None: as it is, or as `yaw_rate` turns it.
+        yaw_rate: rad/s; None: none is commanded.
+        time_boot_ms: the sender's own time stamp, ms.
+    """
+
+    horizontal: AxisDemand
+    vertical: AxisDemand
+    yaw: float | None
+    yaw_rate: float | None
+    time_boot_ms: int = 0
+
+
+class AttitudeRequest(NamedTuple):
+    """A commanded attitude.
+
+    Attributes:
+        q: body to world, unit, w first.
+        yaw_rate: feed-forward, rad/s.
+        thrust: normalised, 0..1.
+    """
+
+    q: Quaternion
+    yaw_rate: float
+    thrust: float
+
+
+class RatesRequest(NamedTuple):
+    """Commanded body rates.
+
+    Attributes:
+        rates: rad/s about body x, y, z (FRD).
+        thrust: normalised, 0..1.
+    """
+
+    rates: BodyRates
+    thrust: float
+
+
+Request = MotionRequest | AttitudeRequest | RatesRequest
+
+
+class Situation(NamedTuple):
+    """What is known of the vehicle when a setpoint comes; frames are relative to it.
+
+    Attributes:
+        position_ned: in the autopilot's local frame, m.
+        yaw: of the body, rad from north.
+        origin: of the local frame, or None while it is not known.
+    """
+
+    position_ned: Vector
+    yaw: float
+    origin: "Origin | None" = None
+
+
+class Origin(NamedTuple):
+    """Where the local frame begins, WGS84.
+
+    Attributes:
+        latitude, longitude: degrees.
+        altitude: above mean sea level, m.
+        home_altitude: the same of home, m.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+    home_altitude: float

@@ -1,0 +1,103 @@
+"""The mission protocol: upload, download and clearing of plans. No plan is flown.
+
+Source: "Mission Protocol" of the MAVLink guide.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sitl_mock.link.framing import Message
+from sitl_mock.link.link import Link
+
+_ACCEPTED = dialect.MAV_MISSION_ACCEPTED
+_TYPES = range(3)
+"""Mission, fence and rally points."""
+_MOST_ITEMS = 1000
+
+
+class _Upload(NamedTuple):
+    """A plan that is being uploaded, by whom, and its items so far."""
+
+    mission_type: int
+    size: int
+    client: tuple[int, int]
+    items: list[Message]
+
+
+class MissionProtocol:
+    """Keeps one plan of each type and passes it on as it came."""
+
+    def __init__(self) -> None:
+        self.plans: dict[int, list[Message]] = {kind: [] for kind in _TYPES}
+        self._upload: _Upload | None = None
+        self.handlers: dict[str, Callable[[Message, Link], None]] = {
+            "MISSION_REQUEST_LIST": self._send_count,
+            "MISSION_REQUEST_INT": self._send_item,
+            "MISSION_REQUEST": self._send_item,
+            "MISSION_COUNT": self._begin_upload,
+            "MISSION_ITEM_INT": self._take_item,
+            "MISSION_CLEAR_ALL": self._clear,
+        }
+
+    def _send_count(self, message: Message, link: Link) -> None:
+        count = len(self.plans.get(message.mission_type, ()))
+        link.send(dialect.MAVLink_mission_count_message(*_to(message), count, message.mission_type))
+
+    def _send_item(self, message: Message, link: Link) -> None:
+        plan = self.plans.get(message.mission_type, [])
+        if message.seq >= len(plan):
+            _acknowledge(message, link, dialect.MAV_MISSION_INVALID_SEQUENCE)
+            return
+        item = plan[message.seq]
+        fields = {name: getattr(item, name) for name in item.get_fieldnames()}
+        fields["target_system"], fields["target_component"] = _to(message)
+        link.send(dialect.MAVLink_mission_item_int_message(**fields))
+
+    def _begin_upload(self, message: Message, link: Link) -> None:
+        if message.mission_type not in self.plans:
+            _acknowledge(message, link, dialect.MAV_MISSION_UNSUPPORTED)
+        elif message.count > _MOST_ITEMS:
+            _acknowledge(message, link, dialect.MAV_MISSION_NO_SPACE)
+        elif message.count == 0:
+            self.plans[message.mission_type] = []
+            _acknowledge(message, link, _ACCEPTED)
+        else:
+            self._upload = _Upload(message.mission_type, message.count, _to(message), [])
+            self._request_item(link, self._upload)
+
+    def _take_item(self, message: Message, link: Link) -> None:
+        upload = self._upload
+        if upload is None or upload.client != _to(message):
+            _acknowledge(message, link, dialect.MAV_MISSION_ERROR)
+            return
+        if message.seq != len(upload.items):
+            self._request_item(link, upload)
+            return
+        upload.items.append(message)
+        if len(upload.items) < upload.size:
+            self._request_item(link, upload)
+            return
+        self.plans[upload.mission_type], self._upload = upload.items, None
+        _acknowledge(message, link, _ACCEPTED)
+
+    @staticmethod
+    def _request_item(link: Link, upload: _Upload) -> None:
+        number, kind = len(upload.items), upload.mission_type
+        link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
+
+    def _clear(self, message: Message, link: Link) -> None:
+        all_of_them = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
+        for kind in _TYPES if all_of_them else (message.mission_type,):
+            self.plans[kind] = []
+        _acknowledge(message, link, _ACCEPTED)
+
+
+def _to(message: Message) -> tuple[int, int]:
+    """The sender of a message, as the target of the answer."""
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
+def _acknowledge(message: Message, link: Link, result: int) -> None:
+    link.send(dialect.MAVLink_mission_ack_message(*_to(message), result, message.mission_type))

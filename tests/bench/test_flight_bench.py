@@ -1,0 +1,19 @@
+"""Flights in one process are measured, and are quicker than real time."""
+
+import json
+
+from companion.bench import flight
+from companion.cli.main import main
+
+
+def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
+    monkeypatch.setattr(flight, "FILES", {"px4": flight.FILES["px4"]})
+    monkeypatch.setattr(flight, "_FLIGHTS", 1)
+    assert main(["bench", "flight", "--seconds", "0.2", "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    for clocks in figures.values():
+        assert set(clocks) == {"lockstep", "free"}
+        for flown in clocks.values():
+            assert flown["vehicle_s"] > 5.0
+            assert flown["setpoints"] > 100
+            assert flown["times_real_time"] == flown["vehicle_s"] / flown["cpu_s"] > 2.0
