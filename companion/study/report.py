@@ -1,4 +1,4 @@
-"""Writes the files of a study, and one page that opens offline in any browser."""
+"""Writes the files of a study, and an HTML page with all figures embedded."""
 
 import base64
 import io
@@ -30,7 +30,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
     """Write the page; the figures of `write_outcome` must be in its folder.
 
     Raises:
-        OSError: it cannot be written, or a figure is missing.
+        OSError: the page cannot be written, or a figure is missing.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("companion.study", "."),
