@@ -32,7 +32,7 @@ from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
 
 RECORDED = "flights/2026-11-22T10-54-16Z"
 FLYING = {"demo", "fly", "identify"}
-FOR_LONG = {"bench", "study", "doctor"}  # minutes, or a vehicle; test_docs.py reads them
+FOR_LONG = {"bench", "study", "doctor", "serve"}  # or a vehicle; test_docs.py reads them
 SOFTWARE = ("make px4_sitl", "sim_vehicle.py")  # of the autopilots, not in this repository
 
 
@@ -63,7 +63,8 @@ def all_command_lines() -> list[tuple[str, list[str]]]:
 
 def placed(arguments: list[str]) -> list[str]:
     """The arguments with the names of files that stand for the reader's own."""
-    return ["my.yaml" if word == "FILE" else word for word in arguments]
+    names = {"FILE": "my.yaml", "FOLDER/config.yaml": f"{RECORDED}/config.yaml"}
+    return [names.get(word, word) for word in arguments]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from companion.demo import check_mock
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
 from companion.flight.maneuvers import configured_maneuvers
+from companion.guidance.follow import Follow
 from companion.mavlink.transport.endpoint import parse_endpoint
 
 
@@ -78,8 +79,11 @@ def check(options: argparse.Namespace) -> int:
     """Check a configuration file, with what it includes and flies."""
     config = load(options.file)
     parse_endpoint(link_settings(config).endpoint)
-    configured_maneuvers(config)  # the trajectory too
+    maneuvers = configured_maneuvers(config)
     if config.mock is not None:
         check_mock(options.file)
+    for part in maneuvers.parts:
+        if isinstance(part, Follow):
+            print("\n".join(part.notes))
     print(f"{options.file}: ok")
     return EXIT_OK

@@ -13,6 +13,7 @@ from companion.control.inner_loop import thrust_limits
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.fence_check import FenceCheck
+from companion.flight.trajectory_notes import overview, slowing
 from companion.guidance import (
     GRAVITY,
     Corners,
@@ -172,18 +173,22 @@ def _follow(config: Config) -> Follow:
     path = config.flight.trajectory
     if path is None:
         raise ConfigError("flight.trajectory: name a file, or fly with --trajectory FILE")
-    trajectory, envelope = trajectory_file.load(path), _envelope(config)
-    factor = 1.0
+    loaded, envelope = trajectory_file.read(path), _envelope(config)
+    trajectory = loaded.trajectory
+    notes = loaded.notes
     if config.flight.slow_down:
         try:
-            trajectory, factor = slow_down(trajectory, envelope)
+            slower = slow_down(trajectory, envelope)
         except TrajectoryError as error:
             raise ConfigError(f"{path}: {error}") from error
+        notes = (*notes, *slowing(trajectory, slower))
+        trajectory = slower.trajectory
     elif broken := violations(trajectory, envelope):
         first = min(broken, key=lambda one: one.slowing_helps)
         drag = assumption(config) if first.slowing_helps else ""
         raise ConfigError(f"{path}: {first}; {first.remedy}{drag}")
-    return Follow(trajectory, config.limits.max_yaw_rate, factor)
+    notes = (*notes, overview(trajectory))
+    return Follow(trajectory, config.limits.max_yaw_rate, notes)
 
 
 def _envelope(config: Config) -> Envelope:

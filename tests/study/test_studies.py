@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from rich.console import Console
@@ -84,6 +85,16 @@ def test_the_table_of_figure_2_has_the_known_numbers(results, method, deviation,
     if cross_track is not None:
         assert number(table, method, "cross-track") == pytest.approx(cross_track, rel=0.02)
         assert number(table, method, "difference between headings") < 1e-9
+
+
+def test_figure_2_says_which_of_its_axes_are_magnified(monkeypatch):
+    short = replace(fig2.FIGURE_2, headings=EIGHT[:2], seconds=0.5)
+    monkeypatch.setattr(fig2, "FIGURE_2", short)
+    (north, east, away, plane) = fig2.run(lambda _: None).figure.axes
+    span = {axes: abs(np.subtract(*axes.get_ylim())) for axes in (north, east)}
+    assert f"magnified: this axis spans 1/{span[north] / span[east]:.0f}" in east.get_title()
+    assert "magnified: the $a_E$ axis spans 1/" in plane.get_title()
+    assert "magnified" not in north.get_title() + away.get_title()
 
 
 def test_the_table_of_figure_3_is_of_period_pi_and_spans_that_of_figure_2(results):

@@ -10,10 +10,10 @@ from companion.guidance.trajectory import (
     Envelope,
     Hover,
     Laps,
-    Slowed,
     TrajectoryError,
     bernoulli_eight,
     circle,
+    evenly_slowed,
     gerono_eight,
     helix,
     line,
@@ -116,7 +116,7 @@ def test_the_last_lap_of_a_helix_is_looked_at():
         (circle(0.5, Laps(2.0, 1000.0, acceleration=0.003)), "it takes .* samples, and 80000 are"),
         (line((1.0, 0.0, 0.0), 1e-4, 1.0, 1.0), "it lasts 1e.04 s"),
         (line((9e4, 0.0, 0.0), 100.0, 9.0, 9.0), "too long to be checked"),
-        (Slowed(circle(3.0, Laps(2.0, 1000.0)), 2.0), "3600 s is the longest"),
+        (evenly_slowed(circle(3.0, Laps(2.0, 1000.0)), 2.0), "3600 s is the longest"),
     ],
 )
 def test_what_would_take_long_to_judge_is_refused(trajectory, words):

@@ -10,13 +10,10 @@ from companion.guidance.trajectory import (
     Envelope,
     Hover,
     Laps,
-    Slowed,
-    TrajectoryError,
-    Violation,
     circle,
+    evenly_slowed,
     gerono_eight,
     line,
-    slow_down,
     turned_first,
     violations,
     waypoints,
@@ -124,43 +121,10 @@ def test_free_fall_demands_no_thrust_and_no_turning():
     assert np.isfinite(found.tilt_rate).all()
 
 
-@pytest.mark.parametrize(
-    "envelope",
-    [
-        Envelope(max_tilt=radians(35.0), drag=Drag(1.0)),
-        Envelope(max_tilt_rate=radians(90.0), drag=Drag(1.0)),
-        Envelope(max_yaw_rate=1.0),
-        Envelope(max_speed=1.0),
-        Envelope(max_tilt=radians(2.0), drag=Drag(1.0)),
-    ],
-)
-def test_slowed_down_just_enough(envelope):
-    eight = gerono_eight(3.0, Laps(5.0, 2, along=True))
-    slower, factor = slow_down(eight, envelope)
-    assert slower.duration == pytest.approx(factor * eight.duration)
-    assert factor > 1.0
-    assert violations(slower, envelope) == ()
-    assert violations(Slowed(eight, 0.998 * factor), envelope)
-
-
-def test_the_factor_for_a_speed_is_the_ratio_of_speeds():
-    assert slow_down(EIGHT, Envelope(max_speed=2.0))[1] == pytest.approx(2.5, rel=2e-3)
-
-
-def test_what_can_be_flown_is_not_slowed():
-    assert slow_down(EIGHT, Envelope(max_speed=5.0)) == (EIGHT, 1.0)
-
-
-def test_what_slowness_does_not_mend_is_told_at_its_own_time():
-    wall = Violation("limits.fence_radius_m", 1.0, 2.0, "it leaves", "shrink it", False)
-    with pytest.raises(TrajectoryError, match=r"gerono eight: it leaves; shrink it"):
-        slow_down(EIGHT, Envelope(max_tilt=0.3, fence=lambda _: wall))
-
-
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_a_slowed_trajectory_has_right_derivatives_and_the_same_way(factor):
     along = gerono_eight(3.0, Laps(2.0, 1, along=True))
-    slowed = Slowed(along, factor)
+    slowed = evenly_slowed(along, factor)
     assert_derivatives_agree(slowed, inner_times(slowed))
     assert_rests_at_both_ends(slowed)
     assert (slowed.name, slowed.holds_heading) == (along.name, False)

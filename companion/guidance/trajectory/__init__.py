@@ -6,8 +6,8 @@
     >>> limits = Envelope(max_tilt=radians(35.0))
     >>> print(violations(path, limits)[0].limit)
     limits.max_tilt_deg
-    >>> slower, factor = slow_down(path, limits)
-    >>> violations(slower, limits)
+    >>> slowed = slow_down(path, limits)
+    >>> violations(slowed.trajectory, limits)
     ()
 
 World NED, SI units, radians; positions are relative to where the trajectory begins. Each name below
@@ -38,9 +38,11 @@ Made from a table
 Checked
     Envelope         limits; None is no limit
     violations       the limits that a trajectory breaks: each a `Violation`
-    slow_down        the trajectory stretched in time until it keeps them
+    slow_down        slowed down, where it must be, until it keeps them: a `SlowDown`
+    SlowDown         the slower trajectory, and what slowed it; parts: SlowedPart
+    evenly_slowed    all of a trajectory slowed down by one factor
     Violation        the limit, when it is broken, and what to do
-    Slowed           a trajectory stretched in time
+    Slowed           a trajectory in another time; SlowerTime: that time
     Motion, judge    the same for a motion given as arrays
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`
@@ -53,11 +55,11 @@ from companion.guidance.trajectory.csv_file import Table as Table
 from companion.guidance.trajectory.csv_file import read_csv as read_csv
 from companion.guidance.trajectory.demand import Motion as Motion
 from companion.guidance.trajectory.derived import Slowed as Slowed
+from companion.guidance.trajectory.derived import evenly_slowed as evenly_slowed
 from companion.guidance.trajectory.derived import turned_first as turned_first
 from companion.guidance.trajectory.feasibility import Envelope as Envelope
 from companion.guidance.trajectory.feasibility import Violation as Violation
 from companion.guidance.trajectory.feasibility import judge as judge
-from companion.guidance.trajectory.feasibility import slow_down as slow_down
 from companion.guidance.trajectory.feasibility import violations as violations
 from companion.guidance.trajectory.figures import Hover as Hover
 from companion.guidance.trajectory.figures import Laps as Laps
@@ -79,4 +81,8 @@ from companion.guidance.trajectory.sample import Trajectory as Trajectory
 from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryError
 from companion.guidance.trajectory.sample import Vector as Vector
 from companion.guidance.trajectory.sample import computable as computable
+from companion.guidance.trajectory.slower_time import SlowerTime as SlowerTime
+from companion.guidance.trajectory.slowing import SlowDown as SlowDown
+from companion.guidance.trajectory.slowing import SlowedPart as SlowedPart
+from companion.guidance.trajectory.slowing import slow_down as slow_down
 from companion.guidance.trajectory.waypoints import waypoints as waypoints

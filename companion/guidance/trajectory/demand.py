@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from companion.drag import Drag
 from companion.guidance.trajectory.sample import Trajectory
+from companion.guidance.trajectory.time_laws import Progress, derivatives
 
 Floats = NDArray[np.float64]
 
@@ -23,16 +24,23 @@ class Motion:
     jerk: Floats
     heading_rate: Floats
 
-    def slowed(self, factor: float) -> "Motion":
-        """Motion of the trajectory stretched in time by `factor`."""
-        return Motion(
-            self.times * factor,
-            self.position,
-            self.velocity / factor,
-            self.acceleration / factor**2,
-            self.jerk / factor**3,
-            self.heading_rate / factor,
+    def retimed(self, times: Floats, progress: Progress) -> "Motion":
+        """The motion at other times (m,), with the progress there: numbers or (m,) each."""
+        velocity, acceleration, jerk = derivatives(
+            progress, _columns(self.velocity), _columns(self.acceleration), _columns(self.jerk)
         )
+        return Motion(
+            times,
+            self.position,
+            np.stack(velocity, axis=1),
+            np.stack(acceleration, axis=1),
+            np.stack(jerk, axis=1),
+            self.heading_rate * progress.first,
+        )
+
+    def slowed(self, factor: "float | Floats") -> "Motion":
+        """Motion of the trajectory stretched in time by `factor`, one for all or (m,)."""
+        return self.retimed(self.times * factor, Progress(0.0, 1.0 / factor))  # type: ignore[arg-type]
 
 
 def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:

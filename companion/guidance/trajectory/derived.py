@@ -3,21 +3,28 @@
 from dataclasses import dataclass
 from math import remainder, tau
 
-from companion.guidance.trajectory.sample import Sample, Trajectory, Vector
-from companion.guidance.trajectory.time_laws import Cruise
+import numpy as np
+
+from companion.guidance.trajectory.sample import Sample, Trajectory
+from companion.guidance.trajectory.slower_time import SlowerTime
+from companion.guidance.trajectory.time_laws import Cruise, derivatives
+from companion.guidance.trajectory.timed_curve import require_duration
 
 
 @dataclass(frozen=True, slots=True)
 class Slowed:
-    """A trajectory stretched in time.
+    """A trajectory flown more slowly, all along or in parts; its path is the same.
 
     Attributes:
         trajectory: as it was.
-        factor: by which its duration grows.
+        law: its time over ours.
+        moments: of the trajectory at which to check it, s; none: its own check times, which do
+            where it is slowed down evenly.
     """
 
     trajectory: Trajectory
-    factor: float
+    law: SlowerTime
+    moments: tuple[float, ...] = ()
 
     @property
     def name(self) -> str:
@@ -27,7 +34,7 @@ class Slowed:
     @property
     def duration(self) -> float:
         """How long it lasts, s."""
-        return self.factor * self.trajectory.duration
+        return self.law.duration
 
     @property
     def holds_heading(self) -> bool:
@@ -35,25 +42,29 @@ class Slowed:
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, stretched, s."""
-        return [self.factor * time for time in self.trajectory.check_times()]
+        """Check times, s.
+
+        Raises:
+            TrajectoryError: it is too long to be checked.
+        """
+        times, _ = self.law.of(np.array(self.moments or self.trajectory.check_times()))
+        require_duration(float(times[-1]))
+        return [float(time) for time in times]
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""
-        rate = 1.0 / self.factor
-        sample = self.trajectory.at(time * rate)
-        return Sample(
-            sample.position,
-            _scaled(sample.velocity, rate),
-            _scaled(sample.acceleration, rate**2),
-            _scaled(sample.jerk, rate**3),
-            sample.heading,
-            sample.heading_rate * rate,
+        progress = self.law.at(time)
+        sample = self.trajectory.at(progress.phase)
+        velocity, acceleration, jerk = derivatives(
+            progress, sample.velocity, sample.acceleration, sample.jerk
         )
+        turn = sample.heading_rate * progress.first
+        return Sample(sample.position, velocity, acceleration, jerk, sample.heading, turn)
 
 
-def _scaled(vector: Vector, by: float) -> Vector:
-    return vector[0] * by, vector[1] * by, vector[2] * by
+def evenly_slowed(trajectory: Trajectory, factor: float) -> Slowed:
+    """The trajectory stretched in time by `factor`."""
+    return Slowed(trajectory, SlowerTime(trajectory.duration, (factor,) * 4))
 
 
 _REST = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Whether a trajectory can be flown within limits, and how much slower if not."""
+"""Whether a trajectory can be flown within limits."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -9,17 +9,10 @@ import numpy as np
 
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
-from companion.guidance.trajectory.derived import Slowed
-from companion.guidance.trajectory.sample import Trajectory, TrajectoryError, computable
+from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
 """Share of a limit by which it may be exceeded: the fastest place may lie exactly on it."""
-
-_SLOWEST = 64.0
-"""The largest factor tried."""
-
-_PRECISION = 1e-3
-"""Of the factor, as a share of it."""
 
 _DEGREES = 180.0 / pi
 
@@ -104,54 +97,29 @@ class _Need(NamedTuple):
 def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a trajectory breaks, in order of time; empty if it can be flown."""
     with computable():
-        return _broken(sampled(trajectory), envelope)
+        return broken_limits(sampled(trajectory), envelope)
+
+
+def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
+    """By how much each limit is exceeded, (m,) as a share of it, negative where it is kept.
+
+    The fence is not among them: it is checked for a motion as a whole.
+    """
+    return {
+        need.limit: _excess(need) / max(abs(need.allowed), _ROUNDING) - _ROUNDING
+        for need in _needs(motion, envelope)
+        if need.allowed is not None
+    }
 
 
 def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a motion breaks, in the order of time."""
     with computable():
-        return _broken(motion, envelope)
+        return broken_limits(motion, envelope)
 
 
-def slow_down(trajectory: Trajectory, envelope: Envelope) -> tuple[Trajectory, float]:
-    """The trajectory, stretched in time by the smallest factor that keeps all limits.
-
-    Returns:
-        The trajectory itself if it can be flown as it is, else the stretched one; and the factor.
-
-    Raises:
-        TrajectoryError: however slowly it is flown, it breaks a limit.
-    """
-    with computable():
-        return _slowed_down(trajectory, sampled(trajectory), envelope)
-
-
-def _slowed_down(
-    trajectory: Trajectory, motion: Motion, envelope: Envelope
-) -> tuple[Trajectory, float]:
-    broken = _broken(motion, envelope)
-    if not broken:
-        return trajectory, 1.0
-    for one in broken:
-        if not one.slowing_helps:
-            raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
-    too_fast, slow = 1.0, 2.0
-    while found := _broken(motion.slowed(slow), envelope):
-        too_fast, slow = slow, 2.0 * slow
-        if slow > _SLOWEST:
-            raise TrajectoryError(
-                f"{trajectory.name}: however slowly it is flown, {found[0]}; {found[0].remedy}"
-            )
-    while slow - too_fast > _PRECISION * too_fast:
-        middle = 0.5 * (too_fast + slow)
-        if _broken(motion.slowed(middle), envelope):
-            too_fast = middle
-        else:
-            slow = middle
-    return Slowed(trajectory, slow), slow
-
-
-def _broken(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
+def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
+    """As `judge`, within `computable`."""
     found = [_violation(motion.times, need) for need in _needs(motion, envelope)]
     if envelope.fence is not None:
         found.append(envelope.fence(motion))
@@ -176,17 +144,21 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
     yield _Need("safety.max_speed_m_s", e.max_speed, speed, " m/s of speed")
 
 
+def _excess(need: _Need) -> Floats:
+    """(m,) in the unit of the limit."""
+    allowed = need.allowed or 0.0
+    return allowed - need.needed if need.least else need.needed - allowed
+
+
 def _violation(times: Floats, need: _Need) -> Violation | None:
     if need.allowed is None:
         return None
-    excess = need.needed - need.allowed
-    if need.least:
-        excess = -excess
-    broken = excess > _ROUNDING * max(abs(need.allowed), 1.0)
+    over = _excess(need)
+    broken = over > _ROUNDING * max(abs(need.allowed), 1.0)
     if not broken.any():
         return None
-    begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(excess)])
-    needed = float(need.needed[np.argmax(excess)]) * need.shown_in
+    begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(over)])
+    needed = float(need.needed[np.argmax(over)]) * need.shown_in
     text = (
         f"at {time:.2f} s it needs {needed:.4g}{need.what}, {need.limit} allows "
         f"{'no less than ' if need.least else ''}{need.allowed * need.shown_in:.4g}"

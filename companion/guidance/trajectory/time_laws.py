@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from companion.guidance.trajectory.sample import TrajectoryError
 
@@ -23,6 +23,38 @@ class Progress(NamedTuple):
     first: float = 0.0
     second: float = 0.0
     third: float = 0.0
+
+
+Triple = tuple[Any, Any, Any]
+"""A vector of numbers, or of arrays that hold it at many times."""
+
+
+def derivatives(
+    progress: Progress, first: Triple, second: Triple, third: Triple
+) -> tuple[Triple, Triple, Triple]:
+    """Velocity, acceleration and jerk along a curve, by the chain rule.
+
+    Args:
+        progress: along the curve.
+        first: derivative of the curve by its phase.
+        second: its second derivative.
+        third: its third derivative.
+    """
+    _, r, s, t = progress
+    return (
+        _sum(first, r, second, 0.0, third, 0.0),
+        _sum(first, s, second, r * r, third, 0.0),
+        _sum(first, t, second, 3.0 * r * s, third, r * r * r),
+    )
+
+
+def _sum(a: Triple, x: Any, b: Triple, y: Any, c: Triple, z: Any) -> Triple:
+    """x·a + y·b + z·c."""
+    return (
+        x * a[0] + y * b[0] + z * c[0],
+        x * a[1] + y * b[1] + z * c[1],
+        x * a[2] + y * b[2] + z * c[2],
+    )
 
 
 class Piece(NamedTuple):

@@ -15,9 +15,9 @@ from typing import Protocol
 import numpy as np
 
 from companion.guidance.trajectory.curves import Curve, CurvePoint, Looks, require_looks
-from companion.guidance.trajectory.sample import LONGEST, Sample, TrajectoryError, Vector
+from companion.guidance.trajectory.sample import LONGEST, Sample, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
-from companion.guidance.trajectory.time_laws import Piece, TimeLaw
+from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
 _LOOKS_A_PIECE = 256
 """Fewest check times in each smooth part of a time law whose rate changes."""
@@ -178,24 +178,8 @@ class TimedCurve:
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""
-        phase, r, s, t = self.law.at(time)
-        point = self.curve.at(phase)
-        position, first, second, third = point
-        heading, turn = self.heading.at(phase, point)
-        return Sample(
-            position,
-            _sum(first, r, second, 0.0, third, 0.0),
-            _sum(first, s, second, r * r, third, 0.0),
-            _sum(first, t, second, 3.0 * r * s, third, r * r * r),
-            heading,
-            turn * r,
-        )
-
-
-def _sum(a: Vector, x: float, b: Vector, y: float, c: Vector, z: float) -> Vector:
-    """x·a + y·b + z·c."""
-    return (
-        x * a[0] + y * b[0] + z * c[0],
-        x * a[1] + y * b[1] + z * c[1],
-        x * a[2] + y * b[2] + z * c[2],
-    )
+        progress = self.law.at(time)
+        point = self.curve.at(progress.phase)
+        velocity, acceleration, jerk = derivatives(progress, *point[1:])
+        heading, turn = self.heading.at(progress.phase, point)
+        return Sample(point.position, velocity, acceleration, jerk, heading, turn * progress.first)

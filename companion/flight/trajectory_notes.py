@@ -1,0 +1,62 @@
+"""What a user is told of a trajectory: its size, and what was slowed down of it and why."""
+
+import numpy as np
+
+from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
+from companion.guidance.trajectory.demand import sampled
+
+_PARTS_TOLD = 4
+
+
+def overview(trajectory: Trajectory) -> str:
+    """How long it lasts, how fast it is, and how far it leads, in one sentence."""
+    motion = sampled(trajectory)
+    fastest = float(np.linalg.norm(motion.velocity, axis=1).max())
+    lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
+    north, east = (_range(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
+    return (
+        f"{trajectory.name}: {trajectory.duration:.1f} s, at most {fastest:.2f} m/s; from its "
+        f"start {north} m north, {east} m east, {_range(-highs[2], -lows[2])} m up"
+    )
+
+
+def slowing(before: Trajectory, found: SlowDown) -> tuple[str, ...]:
+    """What was slowed down, where, by which limit, and what is left; nothing if nothing was."""
+    if not found.parts:
+        return ()
+    after = found.trajectory
+    left = (
+        f"it lasts {after.duration:.1f} s instead of {before.duration:.1f} s, at most "
+        f"{_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
+    )
+    if found.even:
+        (whole,) = found.parts
+        told = (
+            f"{before.name} is slowed down {whole.factor:.2f} times all along, for {found.reason}; "
+            f"{_limit(after, whole)}"
+        )
+        return (f"{told}; {left}",)
+    parts = "; ".join(
+        f"from {part.begin:.1f} to {part.end:.1f} s up to {part.factor:.2f} times, "
+        f"{_limit(after, part)}"
+        for part in found.parts[:_PARTS_TOLD]
+    )
+    more = len(found.parts) - _PARTS_TOLD
+    parts += f"; and {more} more" if more > 0 else ""
+    return (f"{before.name} is slowed down where limits ask for it: {parts}", left)
+
+
+def _limit(trajectory: Trajectory, part: SlowedPart) -> str:
+    north, east, down = trajectory.at(part.time).position
+    return (
+        f"most by {part.limit} at {part.time:.1f} s ({north:.1f} m north, {east:.1f} m east, "
+        f"{0.0 - down:.1f} m up)"
+    )
+
+
+def _fastest(trajectory: Trajectory) -> float:
+    return float(np.linalg.norm(sampled(trajectory).velocity, axis=1).max())
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low + 0.0:.1f} to {high + 0.0:.1f}"

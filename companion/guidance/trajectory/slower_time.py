@@ -1,0 +1,129 @@
+"""A slower time law: by how much each moment of a trajectory is stretched, smoothly."""
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from companion.guidance.trajectory.septic_spline import Floats
+from companion.guidance.trajectory.time_laws import Progress
+
+_NEWTON_STEPS = 20
+_NEAR = 1e-14
+"""Share of a piece within which a time is found."""
+
+Number = Any
+"""A number, or an array of them."""
+
+
+class _Piece(NamedTuple):
+    """One piece of the spline as a polynomial in u, 0..1: a + b·u + c·u² + d·u³."""
+
+    a: Number
+    b: Number
+    c: Number
+    d: Number
+
+    def factor(self, u: Number) -> Number:
+        """The slowness there."""
+        return self.a + u * (self.b + u * (self.c + u * self.d))
+
+    def slope(self, u: Number) -> Number:
+        """Its derivative by u."""
+        return self.b + u * (2.0 * self.c + u * 3.0 * self.d)
+
+    def bend(self, u: Number) -> Number:
+        """Its second derivative by u."""
+        return 2.0 * self.c + 6.0 * self.d * u
+
+    def area(self, u: Number) -> Number:
+        """Its integral from 0 to u."""
+        return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
+
+
+def _piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
+    """The piece between four coefficients of a uniform cubic B-spline."""
+    return _Piece(
+        (p + 4.0 * q + r) / 6.0,
+        (r - p) / 2.0,
+        (p - 2.0 * q + r) / 2.0,
+        (s - p + 3.0 * (q - r)) / 6.0,
+    )
+
+
+@dataclass(frozen=True)
+class SlowerTime:
+    """The time σ of a trajectory over ours, t: dt/dσ = w(σ), a uniform cubic B-spline.
+
+    Its second derivative is continuous, and so is the jerk of the trajectory that it slows down. It
+    lies between its smallest and its largest coefficient, piece by piece.
+
+    Attributes:
+        length: duration of the trajectory as it was, s.
+        coefficients: of w, three more than pieces; all alike stretch time evenly.
+    """
+
+    length: float
+    coefficients: tuple[float, ...]
+    _ends: tuple[float, ...] = field(init=False, repr=False, compare=False, default=())
+
+    def __post_init__(self) -> None:
+        areas = np.array([float(np.asarray(piece.area(1.0))) for piece in self._pieces()])
+        ends = np.concatenate(([0.0], np.cumsum(areas * self._width)))
+        object.__setattr__(self, "_ends", tuple(ends.tolist()))
+
+    def _pieces(self) -> list[_Piece]:
+        c = self.coefficients
+        return [_piece(*four) for four in zip(c, c[1:], c[2:], c[3:], strict=False)]
+
+    @property
+    def _width(self) -> float:
+        """Of a piece, s of the trajectory."""
+        return self.length / (len(self.coefficients) - 3)
+
+    @property
+    def duration(self) -> float:
+        """How long the trajectory lasts now, s."""
+        return self._ends[-1]
+
+    def at(self, time: float) -> Progress:
+        """The trajectory's time at ours, and its derivatives; at its ends beyond them."""
+        if time <= 0.0:
+            return self._progress(_piece(*self.coefficients[:4]), 0.0, 0.0)
+        last = len(self.coefficients) - 4
+        if time >= self.duration:
+            return self._progress(_piece(*self.coefficients[last:]), 1.0, last)
+        which = min(bisect_right(self._ends, time) - 1, last)
+        piece = _piece(*self.coefficients[which : which + 4])
+        area = (time - self._ends[which]) / self._width
+        u = area / float(piece.area(1.0))
+        for _ in range(_NEWTON_STEPS):
+            step = (float(piece.area(u)) - area) / float(piece.factor(u))
+            u = min(max(u - step, 0.0), 1.0)
+            if abs(step) < _NEAR:
+                break
+        return self._progress(piece, u, which)
+
+    def of(self, moments: Floats) -> tuple[Floats, Progress]:
+        """Our times (m,) at moments (m,) of the trajectory, and the progress there, (m,) each."""
+        count = len(self.coefficients) - 3
+        which = np.clip((moments / self._width).astype(int), 0, count - 1)
+        c = np.array(self.coefficients)
+        piece = _piece(c[which], c[which + 1], c[which + 2], c[which + 3])
+        u = moments / self._width - which
+        times = np.array(self._ends)[which] + self._width * np.asarray(piece.area(u))
+        return times, self._progress(piece, u, which)
+
+    def _progress(self, piece: _Piece, u: Number, which: Number) -> Progress:
+        """With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵."""
+        width = self._width
+        w, slope, bend = piece.factor(u), piece.slope(u) / width, piece.bend(u) / (width * width)
+        rate = 1.0 / w
+        cube = rate * rate * rate
+        return Progress(
+            width * (which + u),
+            rate,
+            -slope * cube,
+            cube * rate * (3.0 * slope * slope * rate - bend),
+        )

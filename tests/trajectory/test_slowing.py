@@ -1,0 +1,212 @@
+"""Slowing down in parts: limits hold everywhere, the path is the same, and no more is slowed."""
+
+import pickle
+from math import radians
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from companion.drag import Drag
+from companion.flight.trajectory_notes import overview, slowing
+from companion.guidance.trajectory import (
+    Envelope,
+    Frame,
+    Laps,
+    SampleOptions,
+    SlowerTime,
+    TrajectoryError,
+    Violation,
+    circle,
+    evenly_slowed,
+    from_samples,
+    gerono_eight,
+    line,
+    slow_down,
+    violations,
+    waypoints,
+)
+from companion.guidance.trajectory.csv_file import table
+from tests.trajectory.finite_differences import (
+    assert_derivatives_agree,
+    assert_rests_at_both_ends,
+    inner_times,
+)
+
+G = 9.80665
+ENVELOPE = Envelope(
+    max_tilt=radians(35.0),
+    max_tilt_rate=radians(90.0),
+    max_yaw_rate=1.0,
+    min_thrust=2.0,
+    max_thrust=16.0,
+    max_climb=2.0,
+    max_descent=1.0,
+    max_speed=8.0,
+    drag=Drag(0.6, 0.03),
+)
+EIGHT = gerono_eight(3.0, Laps(5.0, 2, along=True))
+CORNERS = waypoints([(20.0, 0, 0), (20.0, 3.0, 0), (0, 3.0, -2.0)], 6.0, 9.0)
+
+
+def _angular(side=12.0, speed=3.0):
+    """Samples of three legs with sharp corners, at a steady speed."""
+    lines = ["t,x,y,z"]
+    for k in range(int(3 * side / speed * 20) + 1):
+        way = k / 20 * speed
+        x = min(way, side) - min(max(way - 2 * side, 0.0), side)
+        lines.append(f"{k / 20},{x},{min(max(way - side, 0.0), side)},0")
+    return from_samples(table(lines, "angular"), SampleOptions(Frame.NED, cutoff=1.0), "angular")
+
+
+ANGULAR = _angular()
+TRAJECTORIES = {
+    "eight": EIGHT,
+    "corners": CORNERS,
+    "angular": ANGULAR,
+    "fast line": line((30.0, 10.0, 0.0), 7.0, 9.0, 30.0),
+    "many laps": gerono_eight(3.0, Laps(5.0, 12)),
+    "circle": circle(5.0, Laps(6.0, 2.0)),
+}
+
+
+def needs_by_differences(trajectory, count=2001):
+    """Tilt, tilt rate, thrust, climb and speed from the positions alone, by central differences."""
+    times = np.linspace(0.02, trajectory.duration - 0.02, count)
+    h = 1e-3
+    around = np.array(
+        [[trajectory.at(t + k * h).position for k in (-2, -1, 0, 1, 2)] for t in times]
+    )
+    before2, before, here, after, after2 = (around[:, k] for k in range(5))
+    velocity = (after - before) / (2 * h)
+    acceleration = (after - 2 * here + before) / h**2
+    jerk = (after2 - 2 * after + 2 * before - before2) / (2 * h**3)
+    speed = np.linalg.norm(velocity, axis=1)
+    linear, quadratic = ENVELOPE.drag.linear, ENVELOPE.drag.quadratic
+    force = acceleration + (linear + quadratic * speed)[:, None] * velocity - [0.0, 0.0, G]
+    along = np.einsum("ij,ij->i", velocity, acceleration) / np.maximum(speed, 1e-9)
+    growth = (
+        jerk
+        + (linear + quadratic * speed)[:, None] * acceleration
+        + (quadratic * along)[:, None] * velocity
+    )
+    thrust = np.linalg.norm(force, axis=1)
+    tilt = np.arccos(-force[:, 2] / thrust)
+    tilt_rate = np.linalg.norm(np.cross(force, growth), axis=1) / thrust**2
+    return tilt, tilt_rate, thrust, -velocity[:, 2], speed
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES)
+def test_the_limits_hold_everywhere_by_differences_of_the_positions(name):
+    before = TRAJECTORIES[name]
+    after = slow_down(before, ENVELOPE).trajectory
+    tilt, tilt_rate, thrust, climb, speed = needs_by_differences(after)
+    assert tilt.max() <= 1.003 * ENVELOPE.max_tilt
+    assert tilt_rate.max() <= 1.01 * ENVELOPE.max_tilt_rate
+    assert thrust.min() >= ENVELOPE.min_thrust
+    assert thrust.max() <= 1.003 * ENVELOPE.max_thrust
+    assert -1.003 * ENVELOPE.max_descent <= climb.min()
+    assert climb.max() <= 1.003 * ENVELOPE.max_climb
+    assert speed.max() <= 1.003 * ENVELOPE.max_speed
+    rates = [abs(after.at(t).heading_rate) for t in inner_times(after, 3001)]
+    assert max(rates) <= 1.003 * ENVELOPE.max_yaw_rate
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES)
+def test_the_path_and_its_heading_are_the_same_and_the_derivatives_right(name):
+    before = TRAJECTORIES[name]
+    after = slow_down(before, ENVELOPE).trajectory
+    assert (after.name, after.holds_heading) == (before.name, before.holds_heading)
+    path = [before.at(t) for t in np.linspace(0.0, before.duration, 40_001)]
+    tree = cKDTree([sample.position for sample in path])
+    flown = [after.at(t).position for t in np.linspace(0.0, after.duration, 2001)]
+    assert tree.query(flown)[0].max() < 2e-3
+    assert flown[0] == (0.0, 0.0, 0.0)
+    assert flown[-1] == pytest.approx(before.at(before.duration).position)
+    assert_derivatives_agree(after, inner_times(after), jumps=40.0 if "line" in name else 0.0)
+    assert_rests_at_both_ends(after)
+    copy = pickle.loads(pickle.dumps(after))
+    assert copy.at(1.7) == after.at(1.7)
+
+
+def test_two_corners_are_slowed_down_and_the_legs_are_not():
+    found = slow_down(ANGULAR, ENVELOPE)
+    assert not found.even
+    even = evenly_slowed(ANGULAR, max(part.factor for part in found.parts))
+    assert found.trajectory.duration < 0.9 * even.duration
+    as_before = [
+        t
+        for t in inner_times(found.trajectory, 400)
+        if not any(part.begin <= t <= part.end for part in found.parts)
+    ]
+    assert len(as_before) > 100
+    for t in as_before:
+        assert found.trajectory.law.at(t).first > 0.97
+    notes = slowing(ANGULAR, found)
+    assert notes[0].startswith("angular is slowed down where limits ask for it: from ")
+    assert "most by limits.max_tilt" in notes[0]
+    assert f"instead of {ANGULAR.duration:.1f} s, at most" in notes[1]
+    assert f"{found.trajectory.duration:.1f} s, at most" in overview(found.trajectory)
+
+
+@pytest.mark.parametrize(
+    "envelope",
+    [
+        Envelope(max_tilt=radians(35.0), drag=Drag(1.0)),
+        Envelope(max_tilt_rate=radians(90.0), drag=Drag(1.0)),
+        Envelope(max_yaw_rate=1.0),
+        Envelope(max_speed=1.0),
+        Envelope(max_tilt=radians(2.0), drag=Drag(1.0)),
+    ],
+)
+def test_it_is_as_quick_as_an_even_slowing_at_least_and_no_quicker_than_allowed(envelope):
+    found = slow_down(EIGHT, envelope)
+    assert violations(found.trajectory, envelope) == ()
+    assert found.trajectory.duration > EIGHT.duration
+    factor = found.trajectory.duration / EIGHT.duration
+    assert violations(evenly_slowed(EIGHT, 0.97 * factor), envelope)
+
+
+def test_a_steady_speed_is_slowed_evenly_by_the_ratio_of_speeds():
+    steady = circle(30.0, Laps(5.0, 1.0, acceleration=50.0))
+    found = slow_down(steady, Envelope(max_speed=2.0))
+    fastest = max(
+        np.linalg.norm(found.trajectory.at(t).velocity) for t in inner_times(found.trajectory, 500)
+    )
+    assert fastest == pytest.approx(2.0, rel=5e-3)
+
+
+def test_what_can_be_flown_is_not_slowed():
+    found = slow_down(EIGHT, Envelope(max_speed=5.0))
+    assert (found.trajectory, found.parts) == (EIGHT, ())
+    assert slowing(EIGHT, found) == ()
+
+
+def test_what_is_too_long_is_slowed_evenly_and_says_so():
+    laps = gerono_eight(3.0, Laps(5.0, 150.0))
+    found = slow_down(laps, ENVELOPE)
+    assert found.even
+    assert violations(found.trajectory, ENVELOPE) == ()
+    (note,) = slowing(laps, found)
+    assert "all along, for it is too long to be slowed down in parts; most by limits." in note
+
+
+def test_what_slowness_does_not_mend_is_told_at_its_own_time():
+    wall = Violation("limits.fence_radius_m", 1.0, 2.0, "it leaves", "shrink it", False)
+    with pytest.raises(TrajectoryError, match=r"gerono eight: it leaves; shrink it"):
+        slow_down(EIGHT, Envelope(max_tilt=0.3, fence=lambda _: wall))
+
+
+def test_a_slower_time_has_right_derivatives_and_is_found_again():
+    law = SlowerTime(6.0, (1.0, 1.0, 1.0, 2.5, 1.7, 1.0, 1.2, 1.0, 1.0))
+    h = 1e-4
+    for time in np.linspace(0.01, law.duration - 0.01, 97):
+        before, here, after = (law.at(time + k * h) for k in (-1, 0, 1))
+        assert here.first == pytest.approx((after.phase - before.phase) / (2 * h), rel=1e-6)
+        assert here.second == pytest.approx((after.first - before.first) / (2 * h), abs=1e-6)
+        assert here.third == pytest.approx((after.second - before.second) / (2 * h), abs=2e-4)
+        assert 1 / 2.5 <= here.first <= 1.0
+        times, _ = law.of(np.array([here.phase]))
+        assert times[0] == pytest.approx(time, abs=1e-12)
+    assert law.at(-1.0).phase == 0.0
+    assert law.at(law.duration + 1.0).phase == pytest.approx(6.0)
