@@ -7,7 +7,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.attitude.reference_model import rates_along
 from companion.config import Config
 from companion.control.inner_loop import slower_tilt, tilt_response
-from companion.control.outer_loop import hold_delay, hold_gains, hold_weights
+from companion.control.outer_loop import attitude_delay, hold_gains, hold_weights
 from companion.guidance import InnerResponse
 
 LARGEST_PRODUCT = 0.45
@@ -126,7 +126,7 @@ def expectations(config: Config) -> list[str]:
 
 def hold_sentence(config: Config) -> str:
     """For the user: the gains of the position hold, and the weights that they follow from."""
-    gains, weights, delay = hold_gains(config), hold_weights(config), hold_delay(config)
+    gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
     return (
         f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "
         f"velocity and {gains.acceleration:.2f} on acceleration, from the weights "

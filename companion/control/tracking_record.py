@@ -14,9 +14,9 @@ class FlownPart(NamedTuple):
     """What is flown now: a maneuver, or a source that another program commands.
 
     Attributes:
-        name: shown to the user.
+        name: name to show to the user.
         elapsed: time since it began, s.
-        duration: s; None: it ends when its source says so.
+        duration: its duration, s; None: the source decides when it ends.
         part: the maneuver or the source itself.
     """
 
@@ -27,7 +27,7 @@ class FlownPart(NamedTuple):
 
 
 def flown_part(flown: FlownSource, now: float) -> FlownPart | None:
-    """What is flown at `now` (s on our clock); None: a pose is held, or nothing."""
+    """What is flown at `now` (s of event-loop time); None: a pose is held, or nothing."""
     source, begun_at = flown.source, flown.begun_at
     if source is None or begun_at is None or source.finished(now):
         return None
@@ -38,14 +38,14 @@ def flown_part(flown: FlownSource, now: float) -> FlownPart | None:
 
 
 class TrackingRecord:
-    """Writes reference and position, and the beginning of each maneuver, into the trace.
-
-    Attributes:
-        note: takes a message for each maneuver that begins.
+    """Writes reference, position, and the beginning of each maneuver to the trace.
 
     Args:
-        trace: takes the record.
-        flown: what guidance flies.
+        trace: the trace of the flight.
+        flown: the source that guidance flies.
+
+    Attributes:
+        note: called with a message for each maneuver that begins.
     """
 
     def __init__(self, trace: FlightTrace, flown: FlownSource) -> None:
@@ -60,10 +60,10 @@ class TrackingRecord:
         """Record one step of guidance.
 
         Args:
-            now: s on our clock.
+            now: s of event-loop time.
             vehicle_time: s.
-            reference: at that time.
-            motion: of the vehicle at that time.
+            reference: reference at that time.
+            motion: motion of the vehicle at that time.
         """
         flown = flown_part(self._flown, now)
         part = None if flown is None else flown.part
@@ -74,7 +74,7 @@ class TrackingRecord:
             if name is not None:
                 self.note(f"maneuver: {name}")
         north, east, down = reference.position_ned
-        if not reference.position_is_meant:
+        if not reference.holds_position:
             north = east = nan  # only the height is a reference in open loop
         if not reference.holds_height:
             down = nan

@@ -38,7 +38,7 @@ from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _SAME = 1e-9
-"""Paths at two headings that differ by less are the same."""
+"""Paths at two headings that differ by less count as the same."""
 _METHODS = (*PAPERS, EXACT)
 PARTS = len(_METHODS) + 1
 
@@ -46,10 +46,10 @@ PARTS = len(_METHODS) + 1
 def _printed_quaternion_law(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error that section 4.2 prints.
+    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error as printed in section 4.2.
 
-    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹: this is the body-frame error rotated to the world
-    frame. Using it as body rates shows the effect of the misprint.
+    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹ is the body-frame error rotated to the world frame.
+    Using it as body rates shows the effect of this misprint.
     """
     w, x, y, z = q
     i, j, k = body_error.quaternion(q, target, dt, constants)
