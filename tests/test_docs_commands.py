@@ -26,6 +26,7 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files import yaml_file
+from companion.files.yaml_file import ConfigError
 from companion.testing import MockVehicle, fly
 from sitl_mock.settings import load_settings
 from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
@@ -80,7 +81,12 @@ def test_the_command_runs(
     if command == "fly" and "--config" not in rest:  # the text names an option
         rest += ["--config", "my.yaml"]
     if command in FLYING:
-        ready_to_fly(command_line.parse([command, *rest]))
+        text = (ROOT / page).read_text("utf-8")
+        if re.search(re.escape(shlex.join(arguments)) + r" +# refused", text):
+            with pytest.raises(ConfigError):
+                ready_to_fly(command_line.parse([command, *rest]))
+        else:
+            ready_to_fly(command_line.parse([command, *rest]))
         return
     for out in (Path(b) for a, b in pairwise(rest) if a == "--out"):
         out.unlink(missing_ok=True)
