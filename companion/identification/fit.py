@@ -28,7 +28,7 @@ LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Times that the largest change of command takes at the slew limits tried first, s."""
+"""First tried slew limits, each as the time (s) of the largest change of command at the limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
 """Starts of the search with a slew limit, as shares of lag and dead time found without one."""
