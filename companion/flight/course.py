@@ -1,5 +1,6 @@
 """What a flight that is over says of its course: phases, where it ended, what to set."""
 
+import asyncio
 from collections.abc import Sequence
 
 from companion.flight.assembly import Assembled
@@ -54,7 +55,8 @@ def course_of(
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     early_end = None
     if flight.failed_in is not None:
-        time = next((at for at, text in flight.events if text == result), flight.events[-1][0])
+        now = asyncio.get_running_loop().time() - began  # of a flight that was left, without event
+        time = next((at for at, text in flight.events if text == result), now)
         early_end = _early_end(
             time,
             began,

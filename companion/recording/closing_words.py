@@ -103,7 +103,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     remedy = "nothing is to be mended" if interrupted else what_to_do(end["monitor"], end["phase"])
     if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
         remedy = f"take the vehicle over or land it, for it is armed; then: {remedy}"
-    return f"The flight ended early: {figures['result']}.", [
+    return f"The flight ended early: {figures['result'].rstrip('.')}.", [
         f"  when: {_when(end)}",
         f"  vehicle now: {_vehicle(figures['at_the_end'])}",
         f"  what to do: {remedy}",
