@@ -42,7 +42,7 @@ _EXCITED = 0.02
 _MEMORY = 4.0
 """Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
 _COARSE = 500
-"""Approximate number of samples used to find the start."""
+"""Approximate number of samples used to find the start of the search."""
 _FINE = 4000
 """Largest number of samples used for the fit: more take longer and change nothing."""
 _FEWEST = 10
