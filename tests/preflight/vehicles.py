@@ -28,10 +28,11 @@ def config_file(folder, mock, **changes):
     """configs/mock-FAMILY.yaml with the vehicle's place and other changes."""
     data = yaml.safe_load((CONFIGS / f"mock-{mock.autopilot}.yaml").read_text())
     del data["mock"]
-    data["include"] = str(CONFIGS / data["include"])
+    times = yaml.safe_load((CONFIGS / data.pop("include")).read_text())["vehicle"]
     places = {
         "link": {"endpoint": f"udpin://127.0.0.1:{mock.port}", "lockstep": mock.in_lockstep},
         "recording": {"directory": str(folder / "flights")},
+        "vehicle": {"identified": "a flight of the mock vehicle", **times},
     }
     path = folder / "my.yaml"
     path.write_text(bounded_yaml.dump(merged(merged(data, places), changes)))
