@@ -15,7 +15,8 @@ def between(times: Sequence[float], time: float) -> tuple[int, float]:
         The index i of the later neighbour, and the share of the way from times[i − 1] to times[i]:
         below 0 before the first time, above 1 after the last.
     """
-    later = min(max(bisect_right(times, time), 1), len(times) - 1)
+    later, last = bisect_right(times, time), len(times) - 1
+    later = 1 if later < 1 else last if later > last else later
     start = times[later - 1]
     return later, (time - start) / (times[later] - start)
 

@@ -38,6 +38,7 @@ def load(path: Path) -> Config:
     merged = Contents({}, {})
     _Reading(merged).add_included((path,), own.keys)
     _merge(merged, own)
+    _unmark_times(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
 
@@ -52,6 +53,18 @@ def _read(path: Path) -> Contents:
         if isinstance(name, str) and yaml_file.is_path(name):
             values[key] = str(path.parent / name)
     return contents
+
+
+def _unmark_times(merged: Contents) -> None:
+    """Drop `vehicle.identified` where a key of another file replaces one that was identified."""
+    mark = merged.places.get(("vehicle", "identified"))
+    times = {
+        place.file
+        for where, place in merged.places.items()
+        if where[:1] == ("vehicle",) and len(where) > 1
+    }
+    if mark is not None and times != {mark.file}:
+        merged.keys["vehicle"]["identified"] = None
 
 
 class _Reading:

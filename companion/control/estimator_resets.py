@@ -16,7 +16,7 @@ corrected heading improves them at once.
 from collections import deque
 from math import asin, atan2, cos, hypot, radians, sin, sqrt
 
-from companion.attitude import BodyRates, Quaternion, Target, is_unit
+from companion.attitude import Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned
 from companion.guidance.reference import Vector, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -135,8 +135,9 @@ def _attitude_jump(
     before: AttitudeSample, now: AttitudeSample, dt: float
 ) -> tuple[float, float, float]:
     """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
-    old, new = before.body_rates, now.body_rates
-    mean = BodyRates(*(0.5 * (a + b) for a, b in zip(old, new, strict=True)))
+    p, q, r = before.body_rates
+    new_p, new_q, new_r = now.body_rates
+    mean = 0.5 * (p + new_p), 0.5 * (q + new_q), 0.5 * (r + new_r)
     w, x, y, z = turned(before.q, mean, dt)
     a, b, c, d = now.q
     # now ⊗ predicted⁻¹: the unexplained rotation, about world axes.
@@ -146,7 +147,7 @@ def _attitude_jump(
     r_z = -a * z - b * y + c * x + d * w
     yaw = short_way(2.0 * atan2(r_z, r_w))
     tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
-    change = sqrt(sum((p - q) ** 2 for p, q in zip(new, old, strict=True)))
+    change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
     return yaw, tilt, _ANGLE + 0.5 * change * dt
 
 

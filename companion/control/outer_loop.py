@@ -30,6 +30,7 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.guidance.feedback import ChainGains
 from companion.guidance.follow import Follow
 from companion.guidance.linear import Guidance
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
@@ -118,16 +119,20 @@ def make_guidance(config: Config) -> Guidance:
     return made
 
 
+def hold_gains(config: Config) -> ChainGains:
+    """The gains of the position hold that follow from its weights."""
+    weights = _CALM if _flies_identify(config) else hold_weights(config)
+    return chain_gains(weights, _feedback_delay(config), drag_prior(config).drag.linear)
+
+
 def linear_settings(config: Config) -> LinearSettings:
     """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
-    drag = drag_prior(config).drag.linear
-    weights = _CALM if _flies_identify(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearSettings(
-        gains=chain_gains(weights, _feedback_delay(config), drag),
+        gains=hold_gains(config),
         height=HeightGains(
             height=guidance.height_gain_per_s,
             climb=guidance.climb_gain_per_s,

@@ -1,10 +1,12 @@
 """Response of the attitude loop to its targets, and the lead that compensates this response."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import exp, inf
 
 from companion.attitude import Coefficients
+from companion.attitude.reference import first_order_step
 from companion.attitude.representation import wrap_angle
 
 Path = Callable[[float], Coefficients]
@@ -12,6 +14,10 @@ Path = Callable[[float], Coefficients]
 
 _STEP = 2e-3
 """Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
+_MOMENT = 1e-3
+"""Step in which a response to a step is followed, s."""
+_LONGEST_STEP = 60_000
+_COVERED = 1.0 - exp(-1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,29 @@ class InnerResponse:
     def effective_delay(self) -> float:
         """Delay of the response behind a target that moves steadily, s."""
         return 1.0 / self.gain + self.lag + self.dead_time
+
+    def step_time(self, size: float, max_speed: float = inf) -> float:
+        """Time after which a step of the target has covered 63 % of its way, s.
+
+        Args:
+            size: of the step, a coefficient.
+            max_speed: largest speed of the coefficients, 1/s.
+
+        Returns:
+            The time; infinite if it is longer than 60 s.
+        """
+        held = 0.0 if self.follows_model else self.dead_time
+        seen = deque([0.0] * (1 + round(held / _MOMENT)))
+        c = speed = 0.0
+        for k in range(_LONGEST_STEP):
+            if c >= _COVERED * size:
+                return k * _MOMENT + (self.dead_time if self.follows_model else 0.0)
+            # Feedback that is late compares the target with what was, and its answer acts later.
+            seen.append(min(self.gain * (size - c), max_speed))
+            aim = seen.popleft()
+            moved, speed = first_order_step(speed, aim, max(self.lag, _MOMENT), _MOMENT)
+            c += moved
+        return inf
 
     def target(self, path: Path, time: float) -> Coefficients:
         """The target at `time` with which the coefficients follow `path` without error."""

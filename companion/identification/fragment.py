@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
+from companion.files import bounded_yaml
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
@@ -41,7 +42,9 @@ class AxisValues(NamedTuple):
         return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
 
 
-def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
+def vehicle_fragment(
+    vehicle: IdentifiedVehicle, gravity: float, known: Known, flight: str = ""
+) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
     An axis with a good fit gets its fitted values. An axis with a bad fit keeps its configured
@@ -56,6 +59,7 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
         known: present configuration of each axis; axes and values may be missing.
+        flight: name of the flight; empty: it is not written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
@@ -68,7 +72,8 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
     axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
-    lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
+    mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
+    lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 

@@ -173,11 +173,12 @@ class LockstepEventLoop(LinkEventLoop):
         self._clock: LockstepClock = clock
         self._stepping = selector
         self._scheduled_so_far = 0
+        self._read_clock = clock.read  # asyncio and the link ask a dozen times a step
         super().__init__(self._stepping)
 
     def time(self) -> float:
         """Vehicle time in s."""
-        return self._clock.read()
+        return self._read_clock()
 
     def call_at(
         self,
