@@ -107,7 +107,7 @@ class Predictive:
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """Take the solver's answer for now, else `linear`, and request the next answer.
+        """Take the solver's answer for this step, else `linear`, and request the next answer.
 
         Args:
             linear: target and downward acceleration (m/s²) of linear guidance.
