@@ -22,7 +22,7 @@ from companion import demo
 from companion.attitude import BodyRates
 from companion.cli import command_line, flying
 from companion.cli.main import main
-from companion.config import Config
+from companion.config import Config, trajectory_file
 from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files import yaml_file
@@ -161,10 +161,14 @@ def yaml_blocks() -> list[tuple[Path, str]]:
 
 
 @pytest.mark.parametrize(("page", "block"), yaml_blocks(), ids=lambda value: str(value)[-30:])
-def test_configurations_on_pages_are_valid(page: Path, block: str) -> None:
+def test_configurations_on_pages_are_valid(page: Path, block: str, tmp_path: Path) -> None:
     data = yaml.safe_load(block)
     if "make real REAL=" in block:  # describes a build of an autopilot
         assert {"autopilot", "start", "folder"} <= set(data)
+    elif "--trajectory" in block:
+        path = tmp_path / "my-path.yaml"
+        path.write_text(block, "utf-8")
+        assert trajectory_file.load(path)
     elif "mock" in data:
         assert load_settings(None, {**data["mock"]}).autopilot == data["mock"]["autopilot"]
     else:

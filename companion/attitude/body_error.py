@@ -17,7 +17,7 @@ def quaternion(
     """Body rates ω = 2p·vec(q⁻¹ ⊗ q_d), rad/s, by the shorter rotation."""
     north, east, heading, heading_rate = target
     error = body_error(q, attitude_of(north, east, heading))
-    return _along(error, 2.0 * constants.gain, heading_rate, constants)
+    return _scaled_rates(error, 2.0 * constants.gain, heading_rate, constants)
 
 
 def so3(
@@ -28,10 +28,10 @@ def so3(
     error = body_error(q, attitude_of(north, east, heading))
     w, x, y, z = error
     scale = constants.gain * angle_per_sine(w, sqrt(x * x + y * y + z * z))
-    return _along(error, scale, heading_rate, constants)
+    return _scaled_rates(error, scale, heading_rate, constants)
 
 
-def _along(
+def _scaled_rates(
     error: Quaternion, scale: float, heading_rate: float, constants: Constants
 ) -> tuple[float, float, float]:
     """`scale` times the vector part of the error as body rates, rad/s, within the limits."""

@@ -137,7 +137,7 @@ class PlanHistory:
         self.yaw: History[PlannedYaw] = History(span)
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
-        """Add the plan of a time `dt` seconds after the newest one."""
+        """Add a plan for a time `dt` seconds later than that of the newest plan."""
         self.time += dt
         self.tilt.add(self.time, tilt)
         self.yaw.add(self.time, yaw)

@@ -115,8 +115,8 @@ class ModelFollowingPlanner:
         c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
         heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
         model = self._model
-        model.place(c, Coefficients(north, east))
-        self._heading.place(heading, turn_rate)
+        model.start_at(c, Coefficients(north, east))
+        self._heading.start_at(heading, turn_rate)
         self._body.start(yaw_rate)
         self._frame.forget()
         x, y, self._still = model.rates()

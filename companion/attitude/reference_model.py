@@ -43,7 +43,7 @@ def model_lag(gain: float, lag: float) -> float:
     return max(0.25 / gain, lag)
 
 
-def braking(gain: float, lag: float) -> float:
+def braking_lead(gain: float, lag: float) -> float:
     """κ of the model, s: how far ahead it brakes, so that it overshoots by 1 % at most.
 
     The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more if κ is 0.
@@ -53,7 +53,7 @@ def braking(gain: float, lag: float) -> float:
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
     """P' (1/s) and τ' (s) with which the model of p and τ is c̈ = (p'·(c_d − c) − ċ)/τ'."""
-    slowed = 1.0 + gain * braking(gain, lag)
+    slowed = 1.0 + gain * braking_lead(gain, lag)
     return gain / slowed, lag / slowed
 
 
@@ -100,15 +100,15 @@ class ReferenceModel:
         square: float = 0.0,
     ) -> None:
         self._constants = constants
-        self._braking = braking(constants.gain, lag)
+        self._braking = braking_lead(constants.gain, lag)
         self._lag = Lag(lag, square)
         self._acceleration = acceleration
         # Near the target v falls by p·v a second.
         slowed_in_time = acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
-        self.place(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
+        self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
-    def place(self, c: Coefficients, speed: Coefficients) -> None:
+    def start_at(self, c: Coefficients, speed: Coefficients) -> None:
         """Start at these coefficients, moving at this speed (1/s)."""
         length = hypot(c.north, c.east)
         scale = _LONGEST_REFERENCE / length if length > _LONGEST_REFERENCE else 1.0

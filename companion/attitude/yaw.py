@@ -33,9 +33,9 @@ class HeadingModel:
         self._fastest = constants.max_yaw_rate
         if self._gain > 0.0:
             self._fastest = min(self._fastest, yaw.acceleration / self._gain)
-        self.place(0.0, 0.0)
+        self.start_at(0.0, 0.0)
 
-    def place(self, heading: float, turn_rate: float) -> None:
+    def start_at(self, heading: float, turn_rate: float) -> None:
         """Start at this heading (rad), turning at this rate (rad/s)."""
         self.heading = heading
         self.turn_rate = self._v = turn_rate

@@ -42,21 +42,23 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """
     figures: dict[str, Any] = {}
     for autopilot in FILES:
-        figures[autopilot] = {name: _measured(autopilot, CLOCKS[name], seconds) for name in CLOCKS}
+        figures[autopilot] = {
+            name: _best_flight(autopilot, CLOCKS[name], seconds) for name in CLOCKS
+        }
     if not as_json:
         _print(figures)
     return figures
 
 
-def _measured(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
-    _flown(autopilot, lockstep, _WARM_UP_S)
+def _best_flight(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+    _fly_once(autopilot, lockstep, _WARM_UP_S)
     return min(
-        (_flown(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
+        (_fly_once(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
         key=lambda flight: flight["cpu_s"],
     )
 
 
-def _flown(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
     """Figures of one flight."""
     path = shipped(FILES[autopilot])
     config = _hovering(load(path), seconds)

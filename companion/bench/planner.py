@@ -95,7 +95,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 
 
 def _flight_cases() -> list[_Case]:
-    """Cases with the same target for both samples, as mostly in a flight, and with a new one."""
+    """Cases of two steps: with the same target, as in most steps of a flight, and with another."""
     vehicle = _fleet(2)
     held, other = (Target(*column) for column in vehicle.targets.T.tolist())
     values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "held": held, "other": other}

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.bench.process import Contestant, ContestantError
 
 Stamp = Callable[[bytes], int]
-"""Finds in a setpoint the time stamp (ms) of the sample that it answers, modulo the modulus."""
+"""From the bytes of a setpoint: time stamp (ms) of its sample, modulo `Sender`'s `modulus`."""
 
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82

@@ -1,4 +1,4 @@
-"""The response that a configuration will have, and what keeps it from being quicker."""
+"""Predicts the step response of a configuration, and finds which setting or delay limits it."""
 
 from dataclasses import dataclass, replace
 from math import asin, degrees, hypot
@@ -11,9 +11,10 @@ from companion.control.outer_loop import attitude_delay, hold_gains, hold_weight
 from companion.guidance import InnerResponse
 
 LARGEST_PRODUCT = 0.45
-"""Largest sensible gain · (lag + dead time): beyond it a higher gain makes no quicker response."""
+"""Largest sensible gain · (lag + dead time); above it, a higher gain is hardly quicker."""
 
 _NOTICEABLE = 0.99
+"""A change is reported if it reduces the time constant to less than this share."""
 
 _GAIN, _RATE = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
 _LAG, _DEAD_TIME = "the vehicle's lag", "the vehicle's dead time"
@@ -24,12 +25,12 @@ class ExpectedResponse:
     """The response to the largest step of the maneuver `steps`, from −coefficient to coefficient.
 
     Attributes:
-        coefficient: where the step ends.
-        time_constant: until 63 % of it is covered, s.
-        otherwise: the same time by what would be different: each key or time of the vehicle that
-            slows the response down, s. For the gain: with twice the gain; else without it.
+        coefficient: coefficient at which the step ends.
+        time_constant: time until 63 % of the step is covered, s.
+        otherwise: time constant (s) if one cause of delay changes, by the name of this cause:
+            with twice the gain, or without the rate limit, the lag or the dead time.
         gain: p, 1/s.
-        quickest_gain: the largest sensible gain, 1/s; None where lag and dead time are not known.
+        quickest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
     """
 
     coefficient: float
@@ -40,16 +41,16 @@ class ExpectedResponse:
 
     @property
     def limited_by(self) -> str:
-        """What keeps the response most from being quicker."""
+        """Name of the cause whose change reduces the time constant most."""
         return min(self.otherwise, key=self.otherwise.__getitem__)
 
     @property
     def too_quick(self) -> bool:
-        """Whether the gain is larger than the vehicle bears."""
+        """Whether the gain is larger than the largest sensible gain."""
         return self.quickest_gain is not None and self.gain > self.quickest_gain
 
     def sentence(self) -> str:
-        """For the user: the time constant, what limits it, and what each change would bring."""
+        """The time constant, its main limit, and the effect of each change, for the user."""
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN else 'without'} {name}"
             for name, time in self.otherwise.items()
@@ -63,7 +64,7 @@ class ExpectedResponse:
         )
 
     def gain_sentence(self) -> str:
-        """For the user: the quickest sensible gain."""
+        """The largest sensible gain, for the user."""
         if self.quickest_gain is None:
             return "the quickest sensible gain is not known before `companion identify`"
         remedy = "; lower it, for the response overshoots and is hardly quicker"
@@ -75,7 +76,7 @@ class ExpectedResponse:
 
 
 def expected_response(config: Config) -> ExpectedResponse:
-    """The expected response, from the linear model of planner and rate loop, and the rate limit."""
+    """Predict the response with the linear model of planner and rate loop, and the rate limit."""
     step, response = 2.0 * config.steps.coefficient, tilt_response(config)
     speed = _largest_speed(config)
     twice = config.planner.model_copy(update={"gain_per_s": 2.0 * config.planner.gain_per_s})
@@ -98,7 +99,7 @@ def expected_response(config: Config) -> ExpectedResponse:
 
 
 def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:
-    """The times without lag and without dead time, as far as they are known."""
+    """Time constants (s) without lag and without dead time; empty if these are not known."""
     if not config.vehicle.known:
         return {}
     step = 2.0 * config.steps.coefficient
@@ -111,13 +112,13 @@ def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) 
 
 
 def _largest_speed(config: Config) -> float:
-    """Speed of the coefficients at the largest tilt rate and the mean tilt of the step, 1/s."""
+    """Speed (1/s) of the coefficients at the largest tilt rate, at half the largest coefficient."""
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)
 
 
 def expectations(config: Config) -> list[str]:
-    """For the user: the expected response, the quickest sensible gain, the gains of the hold."""
+    """Expected response, largest sensible gain and gains of the position hold, for the user."""
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]
     response = expected_response(config)
@@ -125,7 +126,7 @@ def expectations(config: Config) -> list[str]:
 
 
 def hold_sentence(config: Config) -> str:
-    """For the user: the gains of the position hold, and the weights that they follow from."""
+    """The gains of the position hold, and the weights from which they follow, for the user."""
     gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
     return (
         f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "

@@ -18,7 +18,6 @@ from companion.guidance import (
     GRAVITY,
     GuidanceInput,
     HoverThrust,
-    LinearCommand,
     Pose,
     Reference,
     VehicleMotion,
@@ -208,7 +207,11 @@ class GuidanceLoop:
         reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
         linear = self._guidance.command(reference_at, now, inputs)
-        target, later, down = self._predicted(now, linear, inputs)
+        if self.predictive is not None:
+            turn = self._loop.resets.turn
+            vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
+            linear = self.predictive.instead_of(linear, turn, vehicle, following)
+        target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self.learning.limit_tilt(each, down) for each in (target, later))
         self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
@@ -227,25 +230,6 @@ class GuidanceLoop:
 
     def _heading(self) -> float:
         return heading(self.attitude())
-
-    def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
-        """The command of predictive control while it flies a trajectory, else `linear`.
-
-        Predictive control works in the estimator's frame, with heading resets. Its target is
-        constant for a period, which its model takes into account.
-        """
-        if self.predictive is None:
-            return linear
-        turn = self._loop.resets.turn
-        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
-        vehicle = self.estimate.vehicle(now, inputs)
-        target, down = chosen = self.predictive.command(
-            own, vehicle, self.flown.following(now, turn)
-        )
-        if chosen is own:
-            return linear
-        target = target._replace(heading=target.heading - turn)
-        return LinearCommand(target, target, down)
 
     def _guidance_input(self, now: float) -> GuidanceInput:
         return self.estimate.guidance_input(

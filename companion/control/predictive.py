@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from typing import NamedTuple
 
 from companion.attitude import Target
-from companion.guidance import GRAVITY, Pose
+from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
@@ -83,10 +83,31 @@ class Predictive:
         """End the solver's process."""
         self._solver.close()
 
+    def instead_of(
+        self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
+    ) -> LinearCommand:
+        """The command of predictive control while it flies a trajectory, else `linear`.
+
+        Predictive control works in the estimator's frame, with heading resets. Its target is
+        constant for a period, which its model takes into account.
+
+        Args:
+            linear: command of linear guidance.
+            turn: sum of the heading resets, rad.
+            vehicle: present state of the vehicle.
+            following: the trajectory that is followed, or None.
+        """
+        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
+        target, down = chosen = self.command(own, vehicle, following)
+        if chosen is own:
+            return linear
+        target = target._replace(heading=target.heading - turn)
+        return LinearCommand(target, target, down)
+
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """Take the solver's answer for now, else `linear`, and request the next answer.
+        """Take the solver's answer for this step, else `linear`, and request the next answer.
 
         Args:
             linear: target and downward acceleration (m/s²) of linear guidance.

@@ -15,9 +15,9 @@ _NOISE = 0.2
 _WIND = 2.0
 """Initial standard deviation of the acceleration by wind, m/s²."""
 _WIND_CHANGE = 0.2
-"""Standard deviation of the change of that acceleration in 1 s, m/s²."""
+"""Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
 _CLAMP = 3.0
-"""An innovation is clamped to this many standard deviations: a bump is not drag."""
+"""An innovation is clamped to this many standard deviations, since a bump is no sign of drag."""
 _LARGEST_INCREASE = 2.0
 """The linear drag is estimated at most this much above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3

@@ -15,8 +15,8 @@ Path = Callable[[float], Coefficients]
 _STEP = 2e-3
 """Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
 _MOMENT = 1e-3
-"""Step in which a response to a step is followed, s."""
-_LONGEST_STEP = 60_000
+"""Step of the integration in `step_time`, s."""
+_MOST_MOMENTS = 60_000
 _COVERED = 1.0 - exp(-1.0)
 
 
@@ -45,25 +45,25 @@ class InnerResponse:
         return 1.0 / self.gain + self.lag + self.dead_time
 
     def step_time(self, size: float, max_speed: float = inf) -> float:
-        """Time after which a step of the target has covered 63 % of its way, s.
+        """Time that the coefficients need for 63 % of a step of the target, s.
 
         Args:
-            size: of the step, a coefficient.
+            size: size of the step, a coefficient.
             max_speed: largest speed of the coefficients, 1/s.
 
         Returns:
             The time; infinite if it is longer than 60 s.
         """
-        held = 0.0 if self.follows_model else self.dead_time
-        seen = deque([0.0] * (1 + round(held / _MOMENT)))
+        delay = 0.0 if self.follows_model else self.dead_time
+        speeds = deque([0.0] * (1 + round(delay / _MOMENT)))
         c = speed = 0.0
-        for k in range(_LONGEST_STEP):
+        for k in range(_MOST_MOMENTS):
             if c >= _COVERED * size:
                 return k * _MOMENT + (self.dead_time if self.follows_model else 0.0)
-            # Feedback that is late compares the target with what was, and its answer acts later.
-            seen.append(min(self.gain * (size - c), max_speed))
-            aim = seen.popleft()
-            moved, speed = first_order_step(speed, aim, max(self.lag, _MOMENT), _MOMENT)
+            # Without a model, the error of now takes effect one dead time later.
+            speeds.append(min(self.gain * (size - c), max_speed))
+            wanted = speeds.popleft()
+            moved, speed = first_order_step(speed, wanted, max(self.lag, _MOMENT), _MOMENT)
             c += moved
         return inf
 

@@ -39,7 +39,7 @@ class Model(Protocol):
         ...
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """(m, k), what remains of the initial state after `since` (m,) seconds."""
+        """(m, k), components of the free response, `since` (m,) seconds after the start."""
         ...
 
 

@@ -28,7 +28,7 @@ LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Times that the largest change of command takes at the slew limits tried first, s."""
+"""First tried slew limits, each as the time (s) of the largest change of command at the limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
 """Starts of the search with a slew limit, as shares of lag and dead time found without one."""
@@ -42,7 +42,7 @@ _EXCITED = 0.02
 _MEMORY = 4.0
 """Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
 _COARSE = 500
-"""Approximate number of samples used to find the start."""
+"""Approximate number of samples used to find the start of the search."""
 _FINE = 4000
 """Largest number of samples used for the fit: more take longer and change nothing."""
 _FEWEST = 10

@@ -59,7 +59,7 @@ def vehicle_fragment(
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
         known: present configuration of each axis; axes and values may be missing.
-        flight: name of the flight; empty: it is not written.
+        flight: name of the flight, written as `identified`; empty: it is not written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message

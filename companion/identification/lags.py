@@ -148,7 +148,7 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
 
 def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
-    """(m, 2), what remains of the two initial states after `since` (m,) seconds."""
+    """(m, 2), components of the free response, `since` (m,) seconds after the start."""
     first, second = _lags(frequency, damping)
     if first.imag:
         turning = np.exp(-since / first)

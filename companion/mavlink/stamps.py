@@ -173,7 +173,7 @@ class StampJudge:
         return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
     def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
-        """The newest stamp of that stream on disk, near the date or ahead of it; 0: none."""
+        """The newest stamp of a stream on disk, among those too far `ahead` or not; 0: none."""
         stamps = (s for s in self._kept.get(stream, ()) if (s > self._limit) == ahead)
         return max(stamps, default=0)
 

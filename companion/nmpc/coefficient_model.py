@@ -136,7 +136,7 @@ def _cos_tilt(c: ca.SX) -> ca.SX:
 
 
 def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
-    """(6,), component of a vector (2,) across each pair of sides, 1 or −1 on a side."""
+    """Component of a vector (2,) normal to each pair of sides, (6,): 1 or −1 on a side."""
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
     across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
     sides: ca.SX = ca.vertcat(*across) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)

@@ -188,7 +188,7 @@ class Solver:
             reason = answer.status.name.lower().replace("_", " ")
             words = f"request {pending.number} was not solved: {reason}"
             self._report(Trouble.FAILED, words)
-        elif absurd := _absurdity(answer, pending.longest, self._settings):
+        elif absurd := _why_implausible(answer, pending.longest, self._settings):
             self._report(Trouble.ABSURD, f"the answer to request {pending.number} has {absurd}")
         else:
             return answer
@@ -213,7 +213,7 @@ class Solver:
         self._report(Trouble.DIED, f"the solver {how}" + (f": {words[-1]}" if words else ""))
 
 
-def _absurdity(answer: Answer, longest: float, settings: Settings) -> str | None:
+def _why_implausible(answer: Answer, longest: float, settings: Settings) -> str | None:
     """Why an answer is implausible; None if it is plausible."""
     values = (answer.north, answer.east, answer.heading, answer.thrust, answer.time)
     if not all(isfinite(value) for value in values):

@@ -86,9 +86,9 @@ def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: fl
     Args:
         axes: the panel.
         axis: name of the axis.
-        span: of the axis.
+        span: range of values that the axis shows.
         other: name of the axis that it is compared with.
-        other_span: of that axis.
+        other_span: range of values that the other axis shows.
     """
     share = other_span / span
     axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{share:.0f} of {other}")

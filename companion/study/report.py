@@ -56,7 +56,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Find the place of everything once: each file would search it twice."""
+    """Lay out the figure once; otherwise each `savefig` lays it out twice."""
     figure.set_dpi(_DPI)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")

@@ -216,7 +216,7 @@ class VehicleClock:
         return True
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """Take a sample that fits again, `late` by so many s.
+        """Take a sample that fits again and came `late` seconds late.
 
         If all misfits before it repeated one stamp, the clock stood still.
         """

@@ -91,7 +91,7 @@ class DelayUnknown(Enum):
 
 
 class _Exchange(NamedTuple):
-    """A TIMESYNC exchange: event-loop time, half its round trip, and the delay by it; s."""
+    """A TIMESYNC exchange: event-loop time, half the round trip, and the delay it gives; s."""
 
     at: float
     half: float

@@ -164,7 +164,7 @@ def _serial(text: str, rest: str) -> SerialPort:
 
 
 def _remedy(text: str) -> str:
-    """What to write instead of a notation of another program; all of ours if it is unknown."""
+    """How to write the endpoint of another program here; if it is unknown, all notations."""
     text = text.strip()
     if device := _DEVICE.fullmatch(text):
         name, baud = device[1], device[2]
@@ -180,8 +180,8 @@ def _remedy(text: str) -> str:
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")
         if kind is not None and (scheme != "udp" or host in _OURSELVES):
-            ours = "udpin" if scheme == "udp" else scheme
-            return f"write {ours}://{host or '0.0.0.0'}:{port}"
+            usual = "udpin" if scheme == "udp" else scheme
+            return f"write {usual}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
             out = f", or udpout://{host}:{port} to send to {host} first" if host else ""
             return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"

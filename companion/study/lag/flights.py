@@ -152,7 +152,7 @@ class Complete(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
-        by_rate: comparison at each sample rate (Hz); its `wrong` includes no error.
+        by_rate: comparison at each sample rate (Hz); `wrong` there has right times as well.
         shown: responses of every method at `COMPLETE_HZ`.
     """
 

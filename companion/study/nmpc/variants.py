@@ -95,4 +95,4 @@ class Task(NamedTuple):
 CIRCLE = Task("circle", circle(5.0, Laps(5.0, laps=4.0)), 5.0)
 """A standing start: the vehicle is at rest where the trajectory has a speed of 5 m/s."""
 EIGHT = Task("eight", gerono_eight(3.0, Laps(5.0, laps=3.0)), 0.0)
-"""A figure-eight whose trajectory also begins at rest."""
+"""A figure-eight that begins at rest, like the vehicle."""

@@ -139,7 +139,7 @@ def fly(task: Task) -> Tracked:
         course.write_text(bounded_yaml.dump(task.course.file))
         config = _configured(shipped, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
-        session = Session(config, folder, truth, _never)
+        session = Session(config, folder, truth, _decline_landing)
         with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
             summary = lockstep.run(session.fly())
     if summary.result != "ok":
@@ -180,7 +180,7 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
     return changed(shipped, changes, "study track")
 
 
-async def _never() -> bool:
+async def _decline_landing() -> bool:
     return False
 
 

@@ -80,7 +80,7 @@ def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None
 
 
 def _any_value(_: float, __: Values, ___: CompanionSettings) -> None:
-    """No value is a problem: the parameter is read only for `_fence`."""
+    """Accept every value: the parameter is read only because `_fence` uses it."""
 
 
 def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Problem | None:
