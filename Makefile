@@ -3,7 +3,12 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all matrix lint real soak fuzz mutants bench docs clean
+# The tests start two hundred programs; without byte code each would compile all it imports.
+unexport PYTHONDONTWRITEBYTECODE
+# `lint` keeps one core busy, `bytecode` the other.
+MAKEFLAGS += --jobs=2
+
+.PHONY: demo test test-all bytecode matrix lint real soak fuzz mutants bench docs clean
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -20,11 +25,14 @@ demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
 # In the order of the files: sorted by their number of tests, the long flights would come last.
 PYTEST := $(BIN)/python -m pytest -n 3 --dist loadscope --no-loadscope-reorder
 
-test: lint  ## style, types, import rules, then the tests
+test: lint bytecode  ## style, types, import rules, then the tests
 	$(PYTEST) -m 'not slow'
 
-test-all: lint  ## the same with every test, also what only proves more widely what others prove
+test-all: lint bytecode  ## the same with every test, also what only proves more widely what others prove
 	$(PYTEST)
+
+bytecode: $(VENV)/.test  ## pytest's byte code of the tests, once: every worker would make its own
+	@$(BIN)/python -m pytest --collect-only -p no:cacheprovider > /dev/null || true  # the tests tell it
 
 matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about three minutes
 	$(BIN)/python -m pytest -n 2 tests/flight/test_fault_matrix.py

@@ -9,22 +9,22 @@ Number = TypeVar("Number", float, NDArray[np.float64])
 """Type of a vector component: a number, an array, or a CasADi symbol."""
 
 _TINY = 1e-12
-"""(m/s)²: keeps the speed differentiable at rest."""
+"""Added to the squared speed, (m/s)², so that the speed is differentiable at rest."""
 
 
 class Drag(NamedTuple):
     """Deceleration = (linear + quadratic·|v|)·v, where v is the airspeed vector.
 
     Attributes:
-        linear: 1/s.
-        quadratic: 1/m.
+        linear: linear drag per mass, 1/s.
+        quadratic: quadratic drag per mass, 1/m.
     """
 
     linear: float = 0.0
     quadratic: float = 0.0
 
     def per_velocity(self, speed: float) -> float:
-        """Deceleration per velocity at a speed in m/s, 1/s."""
+        """Deceleration divided by speed, 1/s, at a speed in m/s."""
         return self.linear + self.quadratic * speed
 
     def deceleration(

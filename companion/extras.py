@@ -1,4 +1,4 @@
-"""Optional packages, and the one message for a missing one."""
+"""Checks for optional packages, with the error message for a missing one."""
 
 import importlib.util
 
@@ -13,10 +13,10 @@ def require(module: str, extra: str, purpose: str) -> None:
     Args:
         module: the module to import.
         extra: the extra of this project that installs it.
-        purpose: what needs it; the message begins with it.
+        purpose: what needs the package; the message begins with it.
 
     Raises:
-        MissingExtraError: it is not installed.
+        MissingExtraError: the package is not installed.
     """
     if importlib.util.find_spec(module) is None:
         raise MissingExtraError(

@@ -1,6 +1,7 @@
-"""Least squares in which few unknowns are not linear: the linear ones are eliminated at each step.
+"""Least squares with linear and a few nonlinear unknowns; the linear ones are eliminated.
 
-Golub & Pereyra's variable projection, with Levenberg–Marquardt steps over what remains.
+This is the variable projection of Golub & Pereyra, with Levenberg–Marquardt steps over the
+nonlinear unknowns.
 """
 
 from collections.abc import Callable
@@ -11,21 +12,25 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Projection = Callable[[Floats], tuple[Floats, Floats]]
-"""From the (k,) unknowns that are not linear to the best weights (c,) and the residual (m,)."""
+"""Computes the best linear unknowns, the weights (c,), and the residual (m,), from the nonlinear
+unknowns (k,)."""
 
 _STEP = 1e-4
-_ENOUGH = 1e-9
+"""Step of the central differences."""
+_CONVERGED = 1e-9
+"""The search ends when a step reduces the sum of squares by less than this share."""
 _MOST_STEPS = 60
 
 
 class Solution(NamedTuple):
-    """Where the sum of squares is smallest.
+    """The unknowns with the smallest sum of squares.
 
     Attributes:
-        unknown: (k,), the unknowns that are not linear.
-        weights: (c,), the linear ones.
+        unknown: (k,), the nonlinear unknowns.
+        weights: (c,), the linear unknowns.
         residual: (m,), measured − modelled.
-        slopes: (m, k), how the residual changes with each of `unknown`, the weights at their best.
+        slopes: (m, k), derivatives of the residual with respect to `unknown`, with the best weights
+            at each point.
     """
 
     unknown: Floats
@@ -52,13 +57,13 @@ def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
 
 
 def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Floats) -> Solution:
-    """Levenberg–Marquardt from `start`, kept between `lowest` and `highest` (each (k,)).
+    """Minimise the sum of squares by Levenberg–Marquardt steps from `start`, within bounds.
 
     Args:
-        projection: what is left where the linear unknowns are at their best.
-        start: (k,), scaled so that a change of 1e-4 is small and felt.
-        lowest: (k,).
-        highest: (k,).
+        projection: eliminates the linear unknowns.
+        start: (k,), scaled so that a change of 1e-4 is small but has an effect.
+        lowest: (k,), lower bounds.
+        highest: (k,), upper bounds.
     """
     unknown, damping = np.clip(start, lowest, highest), 1e-3
     weights, residual = projection(unknown)
@@ -75,13 +80,13 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
-        if moved < 1e-7 or 0.0 < gained < _ENOUGH * float(residual @ residual):
+        if moved < 1e-7 or 0.0 < gained < _CONVERGED * float(residual @ residual):
             break
     return Solution(unknown, weights, residual, _slopes(projection, unknown))
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:
-    """(m, k), how the projected residual changes with each unknown: central differences."""
+    """(m, k), derivatives of the projected residual by central differences."""
     steps = _STEP * np.eye(unknown.size)
     return np.stack(
         [

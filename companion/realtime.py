@@ -1,4 +1,4 @@
-"""Real-time settings requested from Linux, so that the control loop is not kept waiting.
+"""Real-time settings requested from Linux, so that the control loop is not delayed.
 
 A setting applies to the calling thread, which runs the event loop, or to the process. A refusal
 stops no flight unless `realtime.required` is true.
@@ -25,7 +25,7 @@ _HOW_MEMORY = (
 
 
 def schedule_as_usual(pid: int) -> None:
-    """Give a child process the normal scheduler: it inherited ours."""
+    """Give a child process the normal scheduler, since it inherits this program's."""
     with suppress(ProcessLookupError):  # it has ended already
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
@@ -34,7 +34,7 @@ class RealtimeError(Exception):
     """A required setting was refused; the message says which, why, and how to get it."""
 
 
-class Refused(Exception):  # noqa: N818 - it is no error of ours
+class Refused(Exception):  # noqa: N818 - a refusal is not an error of this program
     """The system refuses a setting; the message says why and what to do."""
 
 
@@ -43,7 +43,7 @@ class Grant(NamedTuple):
 
     Attributes:
         name: its key in the section `realtime`.
-        asked: the setting, in words.
+        asked: the setting in words.
         refusal: why it was refused and how to get it; None: granted.
     """
 
@@ -66,7 +66,7 @@ class Wishes:
         processors: numbers of the processors to run on; empty: any.
         lock_memory: keep all memory in RAM.
         freeze_gc: switch the garbage collector off.
-        required: raise if one is refused.
+        required: whether a refusal is an error.
     """
 
     fifo_priority: int | None = None
@@ -78,7 +78,7 @@ class Wishes:
 
 @contextmanager
 def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
-    """Request all settings, and undo the granted ones when the block ends.
+    """Context manager that requests all settings, and undoes the granted ones at its end.
 
     Raises:
         RealtimeError: a setting is refused although `required`.
@@ -102,7 +102,7 @@ _Take = Callable[[], _Undo]
 
 
 def _steps(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
-    """Each requested setting: its key, its name in words, and the function that applies it."""
+    """For each requested setting: its key, the setting in words, and a function that applies it."""
     priority, processors = wishes.fifo_priority, wishes.processors
     if processors:
         numbers = ", ".join(map(str, processors))
@@ -122,7 +122,7 @@ def _take_fifo(priority: int) -> _Undo:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
-        raise Refused(f"this user may not; {_HOW_FIFO}") from None
+        raise Refused(f"this user lacks the permission; {_HOW_FIFO}") from None
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
     return lambda: os.sched_setscheduler(0, before, parameters)
@@ -133,8 +133,8 @@ def _run_on(processors: tuple[int, ...]) -> _Undo:
     missing = [number for number in processors if number not in before]
     if missing:
         raise Refused(
-            f"no processor {', '.join(map(str, missing))} for this program, which has "
-            f"{', '.join(map(str, sorted(before)))}"
+            f"processor {', '.join(map(str, missing))} is not available to this program; "
+            f"available are {', '.join(map(str, sorted(before)))}"
         )
     try:
         os.sched_setaffinity(0, processors)
@@ -147,8 +147,8 @@ def _lock_memory() -> _Undo:
     libc = ctypes.CDLL(None, use_errno=True)
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
-        # Even if it suffices now, an allocation in flight could fail.
-        raise Refused(f"this user may lock {limit // 1024} KiB only; {_HOW_MEMORY}")
+        # Even if the limit suffices now, an allocation in flight could fail.
+        raise Refused(f"this user may lock only {limit // 1024} KiB; {_HOW_MEMORY}")
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         number = ctypes.get_errno()
         if number in (errno.EPERM, errno.ENOMEM):

@@ -36,5 +36,5 @@ class Hop:
 
 limits = Envelope(max_tilt=radians(25.0), max_tilt_rate=radians(90.0), max_climb=2.5)
 print("in 3 s:", *violations(Hop(3.0), limits), sep="\n  ")
-slower, factor = slow_down(Hop(3.0), limits)
-print(f"{factor:.2f} times as slow it keeps the limits: {slower.duration:.2f} s")
+slowed = slow_down(Hop(3.0), limits)
+print(f"slowed down it lasts {slowed.trajectory.duration:.2f} s, for {slowed.parts[0].limit}")

@@ -19,6 +19,8 @@ from sitl_mock.physics.geodesy import Origin
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.settings import MockSettings
 
+_SYSTEM_TIME = dialect.MAVLink_system_time_message
+
 COMMANDER_PERIOD_US = 50_000
 """Period of the commander (arming, modes, failsafes), vehicle time."""
 
@@ -137,9 +139,8 @@ class Simulation:
 
     def beacon(self) -> bytes:
         """Return the lockstep beacon of the present time, unsigned; faults do not affect it."""
-        return self._beacon_framer.frame(
-            dialect.MAVLink_system_time_message(0, self.state.time_us // 1000)
-        )
+        payload = _SYSTEM_TIME.unpacker.pack(0, self.state.time_us // 1000)
+        return self._beacon_framer.frame_raw(_SYSTEM_TIME.id, _SYSTEM_TIME.crc_extra, payload)
 
     def _update_state(self) -> None:
         state, vehicle, rules = self.state, self.vehicle, self._rules

@@ -1,5 +1,7 @@
 """Property tests try the same cases on every machine, however slow it is just now."""
 
+import gc
+
 import pytest
 from hypothesis import settings
 
@@ -13,3 +15,9 @@ def state_directory(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         yield
+
+
+def pytest_collection_finish():
+    """What was imported by now stays: to walk through it again and again costs flights a tenth."""
+    gc.collect()
+    gc.freeze()

@@ -22,17 +22,18 @@ from companion import demo
 from companion.attitude import BodyRates
 from companion.cli import command_line, flying
 from companion.cli.main import main
-from companion.config import Config
+from companion.config import Config, trajectory_file
 from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files import yaml_file
+from companion.files.yaml_file import ConfigError
 from companion.testing import MockVehicle, fly
 from sitl_mock.settings import load_settings
 from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
 
 RECORDED = "flights/2026-11-22T10-54-16Z"
 FLYING = {"demo", "fly", "identify"}
-FOR_LONG = {"bench", "study", "doctor"}  # minutes, or a vehicle; test_docs.py reads them
+FOR_LONG = {"bench", "study", "doctor", "serve"}  # or a vehicle; test_docs.py reads them
 SOFTWARE = ("make px4_sitl", "sim_vehicle.py")  # of the autopilots, not in this repository
 
 
@@ -41,6 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which a reader has done what comes before: files written, one flight recorded."""
     folder = tmp_path_factory.mktemp("reader")
     (folder / "configs").symlink_to(ROOT / "configs")
+    (folder / "docs").mkdir()
     for name, kind in (("my", "px4"), ("my-px4", "px4"), ("my-ardupilot", "ardupilot")):
         assert main(["init", kind, "--out", str(folder / f"{name}.yaml")]) == 0
     rows = [f"{0.1 * k},{1.0 - cos(0.1 * pi * 0.1 * k)},0,0" for k in range(101)]  # 2 m in 10 s
@@ -63,7 +65,9 @@ def all_command_lines() -> list[tuple[str, list[str]]]:
 
 def placed(arguments: list[str]) -> list[str]:
     """The arguments with the names of files that stand for the reader's own."""
-    return ["my.yaml" if word == "FILE" else word for word in arguments]
+    names = {"FILE": "my.yaml", "FOLDER": RECORDED, "FOLDER/config.yaml": f"{RECORDED}/config.yaml"}
+    flight = re.compile(r"flights/[\dTZ-]+")  # whichever one the page shows
+    return [flight.sub(RECORDED, names.get(word, word)) for word in arguments]
 
 
 @pytest.mark.parametrize(
@@ -79,7 +83,12 @@ def test_the_command_runs(
     if command == "fly" and "--config" not in rest:  # the text names an option
         rest += ["--config", "my.yaml"]
     if command in FLYING:
-        ready_to_fly(command_line.parse([command, *rest]))
+        text = (ROOT / page).read_text("utf-8")
+        if re.search(re.escape(shlex.join(arguments)) + r" +# refused", text):
+            with pytest.raises(ConfigError):
+                ready_to_fly(command_line.parse([command, *rest]))
+        else:
+            ready_to_fly(command_line.parse([command, *rest]))
         return
     for out in (Path(b) for a, b in pairwise(rest) if a == "--out"):
         out.unlink(missing_ok=True)
@@ -152,10 +161,14 @@ def yaml_blocks() -> list[tuple[Path, str]]:
 
 
 @pytest.mark.parametrize(("page", "block"), yaml_blocks(), ids=lambda value: str(value)[-30:])
-def test_configurations_on_pages_are_valid(page: Path, block: str) -> None:
+def test_configurations_on_pages_are_valid(page: Path, block: str, tmp_path: Path) -> None:
     data = yaml.safe_load(block)
     if "make real REAL=" in block:  # describes a build of an autopilot
         assert {"autopilot", "start", "folder"} <= set(data)
+    elif "--trajectory" in block:
+        path = tmp_path / "my-path.yaml"
+        path.write_text(block, "utf-8")
+        assert trajectory_file.load(path)
     elif "mock" in data:
         assert load_settings(None, {**data["mock"]}).autopilot == data["mock"]["autopilot"]
     else:

@@ -78,6 +78,12 @@ def test_the_planner_has_its_name_and_flies(tree: Path) -> None:
     assert said.startswith("ok thrust-axis"), said
 
 
+def test_the_planner_may_fly(tree: Path) -> None:
+    program = "from companion.attitude.thrust_axis import thrust_axis\n"
+    program += "from companion.testing import check_planner\n"
+    assert run(tree, program + "check_planner(thrust_axis)\n") == ""
+
+
 def test_the_monitor_judges_in_flight(tree: Path) -> None:
     """With a limit of 0.2 m/s, a descent breaks it: the vehicle holds, then lands."""
     (tree / "down.yaml").write_text("line: {to_m: [0, 0, 2], speed_m_s: 0.8}\n")

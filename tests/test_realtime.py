@@ -74,7 +74,7 @@ def test_a_user_who_may_not_is_told_how_he_may(monkeypatch):
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     (why,) = refusals(Wishes(fifo_priority=50))
-    assert "this user may not" in why
+    assert "this user lacks the permission" in why
     assert "docs/companion.service" in why
     assert "rtprio" in why
 
@@ -83,7 +83,7 @@ def test_a_limit_that_only_just_suffices_is_refused_for_it_would_end_a_flight(mo
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(resource, "getrlimit", lambda _: (8 << 20, 8 << 20))
     (why,) = refusals(Wishes(lock_memory=True))
-    assert "may lock 8192 KiB only" in why
+    assert "may lock only 8192 KiB" in why
     assert "memlock unlimited" in why
 
 
@@ -101,7 +101,7 @@ def test_a_kernel_that_does_not_lock_is_believed(monkeypatch, number):
 
 def test_a_processor_that_is_not_there_is_named():
     (why,) = refusals(Wishes(processors=(1023,)))
-    assert why.startswith("no processor 1023 for this program, which has ")
+    assert why.startswith("processor 1023 is not available to this program; available are ")
 
 
 def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():

@@ -1,4 +1,4 @@
-"""Lead of one axis, roll or pitch: the rate to send so that the axis turns as planned."""
+"""Lag compensation of one axis, roll or pitch: the rate to send so that it turns as planned."""
 
 from math import cos, sin
 
@@ -10,15 +10,16 @@ ROLL, PITCH = 0, 1
 
 
 class AxisLead:
-    """Leads the planned rate of one axis by that axis's own lag: ω + τ·ω̇ + σ·ω̈.
+    """Compensates the lag of one axis: sends ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
 
-    The axis with the shorter dead time waits, so that the plan acts on both axes at once.
+    The axis with the shorter dead time is sent older plans, so that a plan takes effect on both
+    axes at the same time.
 
     Args:
         index: `ROLL` or `PITCH`.
-        axis: its response.
-        wait: by how much its dead time is shorter than that of the other axis, s.
-        plans: of tilt and heading.
+        axis: response of this axis.
+        wait: dead time of the other axis less that of this axis, s; 0 for the slower axis.
+        plans: plans of tilt and heading.
     """
 
     __slots__ = ("_index", "_lag", "_plan", "_plans", "_square", "_turn", "_wait")
@@ -30,33 +31,33 @@ class AxisLead:
         self._plans = plans
 
     def advance(self) -> None:
-        """Go on to the plan that acts when the newest plan acts on the slower axis."""
+        """Take the newest plan, or on the quicker axis the plan from `wait` seconds before it."""
         plans = self._plans
         planned_for = plans.time - self._wait
         self._plan = plans.tilt.at(planned_for) if self._wait else plans.tilt.newest
-        self._turn = plans.turn_when(planned_for, self._plan)
+        self._turn = plans.predicted_turn(planned_for, self._plan)
 
     def command(self, dt: float, heading: float) -> float:
-        """The rate to send for the sample of `dt` seconds that ends with the newest plan, rad/s.
+        """Advance to the next plan; return the rate that leads from the last plan to it, rad/s.
 
-        The plan is turned into the body at each end of the sample, by the heading predicted for it.
+        Both plans are rotated into the body axes, by the headings predicted for their times.
 
         Args:
-            dt: s.
-            heading: the base of the turns, rad.
+            dt: time between the two plans, s.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
         """
-        rate, slope = self._seen(heading)
+        rate, slope = self._planned_rate(heading)
         self.advance()
-        rate_then, slope_then = self._seen(heading)
+        rate_then, slope_then = self._planned_rate(heading)
         return (
             0.5 * (rate + rate_then)
             + self._lag / dt * (rate_then - rate)
             + self._square / dt * (slope_then - slope)
         )
 
-    def _seen(self, base: float) -> tuple[float, float]:
-        """The planned rate about our axis of the body, rad/s, and its slope, rad/s²."""
-        plan, heading = self._plan, base + self._turn.angle
+    def _planned_rate(self, start_heading: float) -> tuple[float, float]:
+        """The planned rate about this body axis, rad/s, and its derivative, rad/s²."""
+        plan, heading = self._plan, start_heading + self._turn.angle
         cosine, sine = cos(heading), sin(heading)
         roll, pitch = into_body(cosine, sine, plan.x, plan.y)
         roll_slope, pitch_slope = into_body(cosine, sine, plan.x_slope, plan.y_slope)

@@ -1,4 +1,4 @@
-"""`euler`: the paper's section 4.2 on roll, pitch and yaw of the sequence Z-Y-X."""
+"""`euler`: the Euler-angle controller of the paper's section 4.2 (sequence Z-Y-X)."""
 
 from math import cos, sin
 
@@ -10,7 +10,7 @@ from companion.attitude.types import Quaternion, Target
 def euler(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """Body rates p·M(φ, θ)·(wrapped error of the angles); the response depends on the heading."""
+    """Body rates p·M(φ, θ)·(wrapped angle errors), rad/s; the response depends on the heading."""
     gain = constants.gain
     north, east, heading, heading_rate = target
     roll, pitch, yaw = euler_angles(q)

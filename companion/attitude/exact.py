@@ -16,24 +16,26 @@ from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, shor
 from companion.attitude.types import Quaternion, Target
 
 SHORTEST_SAMPLE = 1e-4
-"""s; a shorter sample is answered like this one: the rates differ from their limit by 1e-4·p."""
+"""A shorter sample period counts as this, s; the rates change by a relative 1e-4·p at most."""
 LONGEST_SAMPLE = 1.0
-"""s; a longer one is answered like this one."""
+"""A longer sample period counts as this, s."""
 
 _SETTLED = 1e-14
-_PASSES = 20
-"""Most iterations of the limits' fixed point; one leaves about θ²/12 of the error, 4 are usual."""
+"""The fixed-point iteration ends when its factor changes by less than this."""
+_MAX_ITERATIONS = 20
+"""Largest number of fixed-point iterations; 4 are usual, each leaves about θ²/12 of the error."""
 
 
 def exact(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """The one body rate that, held over the sample, ends where the first-order model ends.
+    """The constant body rate that takes the vehicle in `dt` s to the state of the linear model.
 
-    At the end of the sample the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that
-    line as the limits allow, and the heading has moved as asked (its error shrinks by e^(−k·dt)).
-    The way there is the shortest rotation, so at the samples the response is exact at any rate.
-    Beyond the recovery angle it is faded into a rotation towards level, as `first-order` is.
+    In that state the coefficients are c_d + (c − c_d)·e^(−p·dt), or as far along that line as the
+    limits allow. The heading error has shrunk by e^(−k·dt), and the heading rate of the target is
+    added. The vehicle moves there by the shortest rotation, so at the samples the response is exact
+    at any sample rate. Beyond the recovery angle the law is faded into a rotation towards level, as
+    in `first-order`. Rates are in rad/s.
     """
     gain, yaw_gain, max_rate, max_yaw_rate, max_speed, _, _, _, cos_recovery, slope = constants
     dt = dt if dt > SHORTEST_SAMPLE else SHORTEST_SAMPLE
@@ -77,17 +79,18 @@ def _rotation(
     max_angle: float,
     max_yaw_angle: float,
 ) -> tuple[float, float, float]:
-    """Rotation vector (rad, seen from the heading there is) to `part` of the way to the target.
+    """Rotation vector, rad, at heading 0, that covers `part` of the way to the target.
 
-    It is Log(d ⊗ yaw(turn)), d leading from the tilt there is to the tilt to come. Both limits
-    bound f = θ/sin(θ/2) times a component, where θ depends on the outcome: hence the fixed point.
+    It is Log(d ⊗ yaw(turn)), where d rotates the present tilt into the next one. Each limit bounds
+    a component of Log, which is f = θ/sin(θ/2) times a component of the quaternion. The angle θ of
+    the result is not known before, so f is found by fixed-point iteration.
     """
     f = 2.0
     r_x = r_y = r_z = 0.0
-    for _ in range(_PASSES):
+    for _ in range(_MAX_ITERATIONS):
         reached = part
         if max_angle < inf:
-            reached = _reach(a, x, y, north_left, east_left, part, max_angle / f)
+            reached = _reachable_share(a, x, y, north_left, east_left, part, max_angle / f)
         d_w, d_x, d_y, d_z = _tilt_change(a, x, y, reached * north_left, reached * east_left)
         length = sqrt(d_w * d_w + d_z * d_z)
         own_half = atan2(d_z, d_w)
@@ -110,7 +113,7 @@ def _rotation(
 def _tilt_change(
     a: float, x: float, y: float, north: float, east: float
 ) -> tuple[float, float, float, float]:
-    """tilt⁻¹ ⊗ tilt', the latter with the coefficients moved by (north, east)."""
+    """The quaternion tilt⁻¹ ⊗ tilt', where tilt' has the coefficients moved by (north, east)."""
     north -= 2.0 * a * y
     east += 2.0 * a * x
     next_a = sqrt(0.5 * (1.0 + sqrt(1.0 - north * north - east * east)))
@@ -124,7 +127,7 @@ def _tilt_change(
     )
 
 
-def _reach(
+def _reachable_share(
     a: float,
     x: float,
     y: float,
@@ -133,10 +136,10 @@ def _reach(
     part: float,
     half_sine: float,
 ) -> float:
-    """Share of the line, at most `part`, that a turn of the thrust axis by Θ allows.
+    """Share of the line to the target that the thrust axis covers when it turns by Θ.
 
-    sin(Θ/2) = `half_sine`. With n the thrust axis along the line,
-    n(0)·n(s) = cos Θ is a quadratic in s.
+    `half_sine` is sin(Θ/2); the result is at most `part`. With n(s) the thrust axis at the share
+    s of the line, n(0)·n(s) = cos Θ is a quadratic in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
     along = 2.0 * a * (x * east_left - y * north_left)

@@ -18,12 +18,12 @@ from companion.attitude.types import Quaternion, Target
 def first_order(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """Body rates under which the acceleration coefficients follow ċ = p·(c_d − c).
+    """Body rates, rad/s, under which the acceleration coefficients follow ċ = p·(c_d − c).
 
-    The coefficients run on a straight line to the target, at the same speed at every heading. Both
+    The coefficients move on a straight line to the target, at the same speed at every heading. Both
     limits, on the tilt rate and on the speed of the coefficients (equation 33), scale the whole
     tilt rate, so the line stays straight. Beyond the recovery angle the law is faded into a
-    rotation towards level; heading is left alone there, for it means nothing upside down.
+    rotation towards level. The heading is not controlled there: it is undefined upside down.
     """
     gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_low, slope = constants
     w, x, y, z = q

@@ -1,21 +1,22 @@
-"""The plan over time: what was planned, when it acts, and how long a command is held."""
+"""The plan over time: what was planned, when it takes effect, how long a command is held."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
-_TRIMMED = 64
-"""Rows older than every delay are dropped in blocks of this many."""
+_DROPPED_TOGETHER = 64
+"""Rows older than the longest delay are dropped in blocks of this many."""
 
 
 def between(times: Sequence[float], time: float) -> tuple[int, float]:
-    """Where `time` lies among at least two ascending times, for a linear look-up.
+    """Find `time` in at least two ascending `times`, for linear interpolation.
 
     Returns:
-        The index of the later of the two times around it, and the share of the way from the
-        earlier one to it; below 0 before the first time, above 1 past the last.
+        The index i of the later neighbour, and the share of the way from times[i − 1] to times[i]:
+        below 0 before the first time, above 1 after the last.
     """
-    later = min(max(bisect_right(times, time), 1), len(times) - 1)
+    later, last = bisect_right(times, time), len(times) - 1
+    later = 1 if later < 1 else last if later > last else later
     start = times[later - 1]
     return later, (time - start) / (times[later] - start)
 
@@ -25,10 +26,10 @@ class PlannedTilt(NamedTuple):
 
     Attributes:
         north, east: coefficients.
-        still: integral of R_z, the yaw rate that kept the heading still on the way, rad.
-        x, y: body rates that go with it at heading 0, rad/s.
-        x_slope, y_slope: their change, rad/s².
-        z: R_z, rad/s.
+        still: integral of `z` since the start, rad.
+        x, y: planned roll and pitch rate at heading 0, rad/s.
+        x_slope, y_slope: derivatives of `x` and `y`, rad/s².
+        z: R_z, the yaw rate that keeps the heading still while the tilt changes, rad/s.
     """
 
     north: float
@@ -42,12 +43,12 @@ class PlannedTilt(NamedTuple):
 
 
 class PlannedYaw(NamedTuple):
-    """The plan of the heading at one time, and how the body turns.
+    """The plan of the heading at one time, and the predicted yaw of the body.
 
     Attributes:
-        heading: rad, not wrapped.
-        turned: integral of the yaw rate with which the body answers what it was sent, rad.
-        turning: that yaw rate, rad/s.
+        heading: planned heading, rad, not wrapped.
+        turned: integral of `turning` since the start, rad.
+        turning: predicted yaw rate of the body, its response to the rates sent, rad/s.
     """
 
     heading: float
@@ -59,7 +60,7 @@ Row = TypeVar("Row", PlannedTilt, PlannedYaw)
 
 
 class History(Generic[Row]):
-    """Plan over time, linear between rows.
+    """The plan over time, interpolated linearly between rows.
 
     Args:
         span: the longest delay that is looked up, s.
@@ -73,18 +74,18 @@ class History(Generic[Row]):
         self._rows: list[Row] = []
 
     def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start anew: before `row` the plan moved steadily, by `motion` per second."""
+        """Start again at `row`; before it the plan moved steadily, by `motion` per second."""
         earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
 
     def add(self, time: float, row: Row) -> None:
-        """Add a newer row; drop rows that are older than every delay."""
+        """Add a newer row; drop rows that are older than the longest delay."""
         times = self._times
         times.append(time)
         self._rows.append(row)
-        if len(times) > _TRIMMED and times[_TRIMMED] < time - self._span:
-            del times[:_TRIMMED], self._rows[:_TRIMMED]
+        if len(times) > _DROPPED_TOGETHER and times[_DROPPED_TOGETHER] < time - self._span:
+            del times[:_DROPPED_TOGETHER], self._rows[:_DROPPED_TOGETHER]
 
     @property
     def newest(self) -> Row:
@@ -99,11 +100,11 @@ class History(Generic[Row]):
 
 
 class Turn(NamedTuple):
-    """How the body is expected to have turned when what is planned for a time acts.
+    """Predicted turn of the body's heading when a plan takes effect.
 
     Attributes:
-        angle: of its heading, from a base that each sample measures anew, rad.
-        rate: rad/s.
+        angle: turn since the plans began, rad.
+        rate: rate of the turn, rad/s.
     """
 
     angle: float
@@ -111,17 +112,17 @@ class Turn(NamedTuple):
 
 
 class PlanHistory:
-    """The plan of tilt and heading since the start, and when it acts.
+    """The plan of tilt and heading since the start, and when it takes effect.
 
-    What is planned for a time acts one dead time later. Tilt and heading have their own.
+    A plan for time t takes effect at t plus the dead time, which differs for tilt and heading.
 
     Args:
-        dead_time: of the slower of roll and pitch, s.
-        yaw_dead_time: s.
-        longest_sample: s.
+        dead_time: dead time of the slower of roll and pitch, s.
+        yaw_dead_time: dead time of yaw, s.
+        longest_sample: longest sample period, s.
 
     Attributes:
-        time: up to which there is a plan, s since the start.
+        time: time of the newest plan, s since the start.
         tilt: the plan of the tilt.
         yaw: the plan of the heading.
     """
@@ -136,68 +137,70 @@ class PlanHistory:
         self.yaw: History[PlannedYaw] = History(span)
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
-        """Add the plan for `dt` seconds after the newest row."""
+        """Add a plan for a time `dt` seconds later than that of the newest plan."""
         self.time += dt
         self.tilt.add(self.time, tilt)
         self.yaw.add(self.time, yaw)
 
-    def acting(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
-        """The plan that acts on a sample that came `late` seconds after it was expected."""
+    def in_effect(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
+        """The plans in effect at a sample that came `late` seconds after it was expected."""
         now = self.time + late
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
-    def turn_when(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """How the body will have turned when `plan`, made for `planned_for` (s), acts.
+    def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
+        """How far the heading has turned when `plan`, made for `planned_for` (s), takes effect.
 
-        By its yaw rate, less the part of it that keeps the heading still.
+        It turns by the yaw rate, less the part of the yaw rate that keeps the heading still.
         """
         acts = planned_for + self._dead_time
         body = self.yaw.at(acts - self._yaw_dead_time)
         return Turn(body.turned - plan.still, body.turning - plan.z)
 
     def turn_within(self, lead: float) -> float:
-        """How far the body turns within `lead` seconds after the newest plan of the tilt acts."""
+        """Turn of the body, rad, in the `lead` seconds after the newest tilt plan takes effect."""
         acts = self.time + self._dead_time - self._yaw_dead_time
         return self.yaw.at(acts + lead).turned - self.yaw.at(acts).turned
 
 
-_SHARE = 0.05
-"""Share of the newest sample's period in the period that is expected next."""
+_PERIOD_WEIGHT = 0.05
+"""Weight of the newest sample period in the running mean that is the expected period."""
 
 
 class SampleHold:
-    """Turns a planned motion into rates that are held until the next sample.
+    """Corrects the rates for samples that come earlier or later than expected.
 
-    The plan reaches ahead by the expected sample period. Samples come later or earlier (PX4: after
-    4 or 8 ms, ArduPilot: some in pairs); the vehicle then has turned further or less far than
-    planned, and a step would bend. The next answer corrects this, after a pause for one period at
-    most.
+    Each plan reaches ahead by the expected sample period, and the vehicle holds its rates until the
+    next sample. If that comes late or early (PX4: after 4 or 8 ms, ArduPilot: some in pairs), the
+    vehicle has turned too far or not far enough, and a step would not be straight. The next rates
+    correct this, for a delay of one period at most.
 
     Attributes:
         late: how much later than expected the sample came, s.
+        period: expected sample period, s; 0 before the first sample.
         step: time by which the plan advances, s.
     """
 
-    __slots__ = ("_pitch", "_roll", "_share", "late", "period", "step")
+    __slots__ = ("_late_share", "_pitch", "_roll", "late", "period", "step")
 
     def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the rates that were sent."""
-        self.period = self.late = self.step = self._roll = self._pitch = self._share = 0.0
+        """Forget the rates that were sent and the expected period."""
+        self.period = self.late = self.step = self._roll = self._pitch = self._late_share = 0.0
 
     def take(self, dt: float) -> None:
-        """Take the time since the last sample, s."""
+        """Account for a new sample, `dt` seconds after the last one."""
         before = self.period or dt
         self.late = late = dt - before
         # Bounded, so that the plan always advances.
-        self.period = period = before + _SHARE * max(min(late, before), -0.5 * dt / _SHARE)
+        change = max(min(late, before), -0.5 * dt / _PERIOD_WEIGHT)
+        self.period = period = before + _PERIOD_WEIGHT * change
         self.step = period + late
-        self._share = min(late / period, 1.0)
+        self._late_share = min(late / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:
-        """Rates to send for the mean rates of the plan's newest step, all in rad/s."""
-        self._roll = roll + self._share * (roll - self._roll)
-        self._pitch = pitch + self._share * (pitch - self._pitch)
+        """Rates to send, given the mean rates of the plan's newest step, all in rad/s."""
+        self._roll = roll + self._late_share * (roll - self._roll)
+        self._pitch = pitch + self._late_share * (pitch - self._pitch)
         return self._roll, self._pitch

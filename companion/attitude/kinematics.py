@@ -1,8 +1,8 @@
 """The tilt-yaw split of an attitude, and the body rates that move it (paper, equations 9 to 28).
 
-Every formula stands here once, as arithmetic on plain floats: no branches on containers, no arrays,
-so that it costs a flight well under a microsecond and is compiled for batches unchanged. Most of
-them need a², a·x and a·y only, and so neither a root nor a division.
+Every formula is arithmetic on plain floats, without arrays. In flight it takes well under a
+microsecond, and a batch compiles it unchanged. Most formulas need only a², a·x and a·y, so neither
+a square root nor a division.
 """
 
 from math import acos, atan, sqrt
@@ -11,14 +11,14 @@ from companion.attitude.rotation import first_is_negative
 
 
 def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """(a², a·x, a·y) of the split; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (10)."""
+    """(a², a·x, a·y) of `split`; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (equation 10)."""
     return w * w + z * z, w * x - z * y, z * x + w * y
 
 
 def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
-    """Split a unit quaternion into (a, b, x, y, z), tilt ⊗ yaw (equation 9).
+    """Split a unit quaternion into (a, b, x, y, z) of tilt ⊗ yaw (equation 9).
 
-    Exactly inverted (w = z = 0) the heading is undefined; it is then taken as zero.
+    The heading of an exactly inverted attitude (w = z = 0) is undefined; it is taken as zero.
     """
     a = sqrt(w * w + z * z)
     if a < 1e-12:
@@ -28,12 +28,12 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
 
 
 def cos_tilt(x: float, y: float) -> float:
-    """Cosine of the tilt; `x`, `y` of the split or of the whole quaternion alike (equation 10)."""
+    """Cosine of the tilt from `x`, `y` of `split` or of the whole quaternion (equation 10)."""
     return 1.0 - 2.0 * (x * x + y * y)
 
 
 def tilt_angle(x: float, y: float) -> float:
-    """The tilt in rad; of a norm a little above 1 too, where the cosine would be below −1."""
+    """The tilt in rad; a quaternion with a norm slightly above 1 is accepted."""
     return acos(max(-1.0, min(1.0, cos_tilt(x, y))))
 
 
@@ -49,8 +49,9 @@ def speed_to_rates(
 ) -> tuple[float, float, float]:
     """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
 
-    Equations 21 to 24, their common term (y·e_x − x·e_y) taken out, then 28. `inverse` is 1/a²;
-    `inverse_cos_tilt` is 1/cos(tilt), or its bound where the caller has to keep the rates bounded.
+    Equations 21 to 24 with their common term (y·e_x − x·e_y) factored out, then equation 28.
+    `inverse` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); near 90° the caller may bound it, so that
+    the rates stay bounded.
     """
     across = 2.0 * inverse * (ay * e_x - ax * e_y)
     r_x = inverse_cos_tilt * (e_x - ay * across)
@@ -61,14 +62,14 @@ def speed_to_rates(
 
 
 def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float, float]:
-    """Horizontal rates seen from the heading with this cosine and sine (equation 28)."""
+    """Rotate rates about x, y from heading 0 to the heading with this cosine and sine (28)."""
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x
 
 
 def rates_to_speed(
     w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
 ) -> tuple[float, float, float]:
-    """The inverse: speed (north, east) of the coefficients, 1/s, and of the heading, rad/s.
+    """Inverse of `speed_to_rates`: speed of the coefficients (1/s) and of the heading (rad/s).
 
     Under body rates ω in rad/s the thrust axis −R·e_z moves with −R·(ω × e_z). The heading moves
     with the yaw rate less the R_z that would keep it still.
@@ -84,17 +85,20 @@ def rates_to_speed(
 def heading_of(a: float, w: float, z: float) -> float:
     """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π], equal for q and −q; a² = w² + z².
 
-    By the half angle, so that the arctangent is that of a number between −1 and 1.
+    Computed by the half angle, so that the argument of the arctangent lies between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
 
 SMALLEST_A = 1e-12
-"""a = cos(tilt/2) below this counts as this: exactly inverted."""
+"""Smallest value used for a = cos(tilt/2); below it the vehicle counts as exactly inverted."""
 
 
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
-    """1 at the recovery angle, 0 from 10° beyond it on, smooth between: no jump in rates."""
+    """Weight of the law against the rotation to level, a smooth function of the tilt's `cosine`.
+
+    It is 1 at the recovery angle and 0 from `limits.RECOVERY_BLEND` (10°) beyond it.
+    """
     ratio = 1.0 + slope * (cosine - cos_recovery)
     if ratio <= 0.0:
         return 0.0
@@ -104,10 +108,11 @@ def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
 def levelling_rates(
     gain: float, a: float, inverse: float, w: float, x: float, y: float, z: float
 ) -> tuple[float, float]:
-    """Body rates (roll, pitch) of 2·gain·sin(tilt/2), rad/s, about the axis of the tilt itself.
+    """Body rates (roll, pitch) that rotate the vehicle to level, 2·gain·sin(tilt/2), rad/s.
 
-    `inverse` is 1/a². They need no division by cos(tilt), so they hold up to the inverted
-    attitude, where every axis is as short as any other; the same is taken for q and −q.
+    `inverse` is 1/a². They turn about the tilt axis and do not divide by cos(tilt), so they are
+    valid up to the inverted attitude. Inverted, every axis leads to level equally fast; q and −q
+    are given the same axis.
     """
     if a <= SMALLEST_A:
         scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain

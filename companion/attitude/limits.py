@@ -1,11 +1,11 @@
-"""Limits of a planner, and the constants that its law is computed with."""
+"""Limits of a planner, and the constants of its law."""
 
 from dataclasses import dataclass
 from math import cos, inf, isfinite, pi, radians, sin
 from typing import Literal, NamedTuple
 
-_LEAST = 1e-6
-"""Smallest limit that is accepted: rad, rad/s."""
+_SMALLEST_LIMIT = 1e-6
+"""Smallest limit that is accepted, rad or rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +20,8 @@ class Limits:
             "paper" bounds the coefficient rate by W_M·cos(max_tilt) (equation 33), which is slower.
 
     Raises:
-        ValueError: a limit that is not positive and finite, a tilt of 90° or more, or the paper's
-            shape without the tilt limit that it is computed from.
+        ValueError: a limit is not positive and finite, `max_tilt` is 90° or more, or the shape
+            "paper" limits the tilt rate without `max_tilt`.
     """
 
     max_tilt: float | None = None
@@ -32,7 +32,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("max_tilt", "max_tilt_rate", "max_yaw_rate"):
             value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value >= _LEAST):
+            if value is not None and not (isfinite(value) and value >= _SMALLEST_LIMIT):
                 raise ValueError(f"{name} must be positive and finite, not {value}")
         if self.max_tilt is not None and self.max_tilt >= pi / 2.0:
             raise ValueError(f"max_tilt must be below 90°, not {self.max_tilt:.4g} rad")
@@ -62,13 +62,15 @@ class Limits:
 
 
 RECOVERY_ANGLE = radians(75.0)
+"""Tilt from which a planner begins to rotate the vehicle towards level, rad; the default."""
 RECOVERY_BLEND = radians(10.0)
+"""Range of tilt beyond the recovery angle over which the law fades out, rad."""
 
 
 class Constants(NamedTuple):
-    """Gains, limits and the recovery of one planner; a limit that is not set is infinite.
+    """Gains, limits and recovery angle of one planner; a limit that is not set is infinite.
 
-    The weights are 1/limit², 0 where there is none: a rate is over its limit when weight·rate² > 1.
+    A weight is 1/limit², and 0 without a limit: a rate exceeds its limit when weight·rate² > 1.
     """
 
     gain: float  # p, 1/s
@@ -80,7 +82,7 @@ class Constants(NamedTuple):
     speed_weight: float  # s²
     longest_target: float  # coefficients, sin of the largest tilt
     cos_recovery: float  # below this cosine of the tilt, recovery begins
-    recovery_slope: float  # 1/(cos(recovery angle) − cos(where the law has faded out))
+    recovery_slope: float  # 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND))
 
 
 def make_constants(

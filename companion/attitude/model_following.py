@@ -37,24 +37,25 @@ SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
 class ModelFollowingPlanner:
     """Two degrees of freedom: a planned motion is fed forward, the deviation from it is fed back.
 
-    Feedforward: the `ReferenceModel` plans a smooth, straight motion within the limits. The body
-    rates that follow it are led by the lag of their own axis (`AxisLead`). They act one dead time
-    later; the quicker axis waits, so that roll and pitch act at once.
+    Feedforward: the `ReferenceModel` plans a smooth, straight motion within the limits. `AxisLead`
+    compensates the lag of each axis. The rates take effect one dead time later; the quicker axis
+    is delayed, so that roll and pitch take effect at the same time.
 
-    Feedback: the measured coefficients are compared with the plan as it stood one dead time ago,
-    so that the loop does not fight its own delay. The gain is p, but at most a quarter of the
-    largest stable gain of the slower axis (`rate_response.feedback_gain`). Heading likewise.
+    Feedback: the measured coefficients are compared with the plan of one dead time ago, which is
+    the plan in effect now. The gain is p, but at most a quarter of the largest stable gain of the
+    slower axis (`rate_response.feedback_gain`). The heading is fed back in the same way.
 
-    Yaw: it answers slowly, so the heading moves while the vehicle tilts. `YawModel` predicts this
-    from the yaw rates that were sent, and the tilt rates are turned into the body as it will
-    stand when they act. Where the autopilot takes the rates along the axes of its attitude
-    target, they are turned into these last (`TargetFrame`).
+    Yaw responds slowly, so the heading moves while the vehicle tilts. `YawModel` predicts this from
+    the yaw rates that were sent. Roll and pitch rates are rotated into the body axes predicted for
+    the time when they take effect. ArduPilot takes the rates along the axes of its attitude target
+    instead; `TargetFrame` gives the rotation into these.
 
-    Beyond the recovery angle it answers as `first-order` does, and plans anew below it.
+    Beyond the recovery angle the planner sends the rates of `first-order`. When the tilt is below
+    it again, a new plan begins.
 
     Args:
         constants: gains and limits.
-        response: of the vehicle's rate loop.
+        response: response of the vehicle's rate loop.
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
@@ -83,11 +84,11 @@ class ModelFollowingPlanner:
         self._started = False
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Plan anew from here: after a gap, a change of mode, or a jump of the estimate.
+        """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
 
         Args:
             q: attitude; beyond the recovery angle the plan begins when the tilt is below it.
-            body_rates: with which the plan begins, rad/s; None or implausible: at rest.
+            body_rates: rates at the beginning of the plan, rad/s; None or implausible: at rest.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -109,13 +110,13 @@ class ModelFollowingPlanner:
         if body_rates is not None:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
-        # The answer to this sample acts one dead time later: the plan begins there.
+        # The rates sent for this sample take effect one dead time later: the plan begins there.
         ahead, yaw_ahead = self._dead_time, self._yaw.dead_time
         c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
         heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
         model = self._model
-        model.place(c, Coefficients(north, east))
-        self._heading.place(heading, turn_rate)
+        model.start_at(c, Coefficients(north, east))
+        self._heading.start_at(heading, turn_rate)
         self._body.start(yaw_rate)
         self._frame.forget()
         x, y, self._still = model.rates()
@@ -133,11 +134,11 @@ class ModelFollowingPlanner:
         self._pitch.advance()
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take the attitude target of an autopilot that takes the rates along its axes.
+        """Take the attitude target of ArduPilot, which takes body rates along the target's axes.
 
         Args:
-            q: attitude target; one that is no unit quaternion is ignored.
-            age: s before the newest sample.
+            q: attitude target; ignored if it is not a unit quaternion.
+            age: time from the attitude target to the newest sample, s.
         """
         if not (self._started and is_unit(q)):
             return
@@ -149,7 +150,7 @@ class ModelFollowingPlanner:
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates in rad/s that answer attitude `q`; `dt` is the time since the last sample.
+        """Body rates to send at attitude `q`, rad/s; `dt` is the time since the last sample, s.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
@@ -172,12 +173,12 @@ class ModelFollowingPlanner:
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
         self._hold.take(dt)
         dt = self._hold.step
-        by_tilt, by_yaw = self._plans.acting(self._hold.late)
+        by_tilt, by_yaw = self._plans.in_effect(self._hold.late)
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
         )
-        if plausible is not None:  # a yaw rate that was not predicted lasts until this acts
+        if plausible is not None:  # an unpredicted yaw rate lasts until these rates take effect
             unpredicted = plausible.yaw - by_yaw.turning
             heading += (self._dead_time + self._lag) * unpredicted
         heading += by_tilt.still - by_yaw.turned
@@ -193,9 +194,9 @@ class ModelFollowingPlanner:
     def _feedback(
         self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
     ) -> tuple[float, float, float]:
-        """Speed of the coefficients (1/s) and of the heading (rad/s), back towards the plan.
+        """Feedback towards the plan: speed of north and east (1/s) and of the heading (rad/s).
 
-        0 during the first dead time after a start, when nothing planned has acted yet.
+        It is 0 during the first dead time after a start, when no plan has taken effect yet.
         """
         speed_north = speed_east = turn = 0.0
         if self._plans.time >= self._dead_time:
@@ -208,12 +209,14 @@ class ModelFollowingPlanner:
     def _feed_forward(
         self, target: Target, heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
-        """Move the plan on by a sample; the rates that follow it, led by the lags.
+        """Advance the plan by `dt` seconds; return the rates that follow it, rad/s.
+
+        The lag of each axis is compensated.
 
         Args:
-            target: admissible.
-            heading: when the answer acts, without the turn that is planned until then, rad.
-            yaw_feedback: added to the yaw rate, rad/s.
+            target: an admissible target.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
+            yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: s.
         """
         still_before, turn_before = self._still, self._heading.turn_rate
@@ -231,17 +234,24 @@ class ModelFollowingPlanner:
         self._still = still_after
         still = 0.5 * (still_before + still_after)
         self._frame.advance(yaw, still, dt)
-        self._remember(x, y, still * dt, dt)
+        self._append_plan(x, y, still * dt, dt)
         return (
             self._roll.command(dt, heading),
             self._pitch.command(dt, heading),
             yaw,
         )
 
-    def _remember(self, x: float, y: float, stilled: float, dt: float) -> None:
-        """Add the plan `dt` seconds later; `stilled` rad of yaw keep the heading still."""
+    def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
+        """Append the plan of `dt` seconds later.
+
+        Args:
+            x: planned roll rate at heading 0, rad/s.
+            y: planned pitch rate at heading 0, rad/s.
+            still_turn: yaw in these `dt` seconds that keeps the heading still, rad.
+            dt: s.
+        """
         model, body = self._model, self._body
-        still = self._plans.tilt.newest.still + stilled
+        still = self._plans.tilt.newest.still + still_turn
         slopes = model.rate_slopes()
         self._plans.add(
             dt,

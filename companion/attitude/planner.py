@@ -1,4 +1,4 @@
-"""The registry of planners: `make_planner` makes one by its name."""
+"""The registry of planners: `make_planner` makes a planner by its name."""
 
 from collections.abc import Callable
 from math import inf
@@ -15,8 +15,8 @@ from companion.attitude.representation import admissible, normalised
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
-"""A control law as arithmetic on scalars: a unit quaternion, an admissible target, the sample
-period in s, constants → body rates (roll, pitch, yaw) in rad/s.
+"""A control law on scalars: a unit quaternion, an admissible target, the sample period in s and
+the constants → body rates (roll, pitch, yaw) in rad/s.
 
 A batch passes quaternion and target as plain sequences, so a law unpacks them."""
 
@@ -27,19 +27,19 @@ class Planner(Protocol):
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """One step: rates in rad/s for attitude `q`; `dt` is the sample period in s."""
+        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s."""
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take the attitude target (ATTITUDE_TARGET) that the autopilot had `age` seconds ago.
+        """Take the attitude target (ATTITUDE_TARGET) of `age` seconds before the newest sample.
 
-        Called only for autopilots that take the rates along its axes (ArduPilot); the others take
-        them along the axes of the body.
+        Called only for an autopilot that takes body rates along the axes of this target
+        (ArduPilot). Others take them along the axes of the body.
         """
         ...
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Plan anew: after a gap, a change of mode, a jump of the estimate."""
+        """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate."""
         ...
 
 
@@ -47,41 +47,42 @@ class LawPlanner:
     """A planner without memory: checks its input, and applies one law.
 
     Attributes:
-        law: the scalar formula, which a batch compiles (`companion.batch`).
-        constants: what it is computed with.
+        law: the law on scalars, which a batch compiles (`companion.batch`).
+        constants: gains and limits of the law.
     """
 
-    __slots__ = ("_admitted", "_asked", "constants", "law")
+    __slots__ = ("_admissible", "_last_target", "constants", "law")
 
     def __init__(self, law: Law, constants: Constants) -> None:
         self.law = law
         self.constants = constants
-        self._asked: Target | None = None
-        self._admitted = Target(0.0, 0.0, 0.0)
+        self._last_target: Target | None = None
+        self._admissible = Target(0.0, 0.0, 0.0)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates to command at attitude `q`, rad/s.
+        """Body rates to send at attitude `q`, rad/s; `dt` is the sample period in s.
 
         Raises:
             InvalidQuaternionError: `q` is not a unit quaternion.
             InvalidTargetError: a value of `target` is not finite.
         """
-        if target is not self._asked:  # one target serves many samples; a tuple cannot change
-            self._admitted = admissible(target, self.constants.longest_target)
-            self._asked = target if isinstance(target, tuple) else None
-        return _rates_of(BodyRates, self.law(normalised(q), self._admitted, dt, self.constants))
+        if target is not self._last_target:  # one target serves many samples; a tuple cannot change
+            self._admissible = admissible(target, self.constants.longest_target)
+            self._last_target = target if isinstance(target, tuple) else None
+        rates = self.law(normalised(q), self._admissible, dt, self.constants)
+        return _make_body_rates(BodyRates, rates)
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Ignored: the law commands rates along the axes of the body."""
+        """Do nothing: the law sends rates along the axes of the body."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Nothing is remembered, so there is nothing to forget."""
+        """Do nothing: a law has no memory."""
 
 
-_rates_of = tuple.__new__
-"""BodyRates of a plain tuple, without the NamedTuple's own constructor: half its cost."""
+_make_body_rates = tuple.__new__
+"""Makes BodyRates from a plain tuple at half the cost of the constructor."""
 
 
 FIRST_ORDER = "first-order"
@@ -96,7 +97,7 @@ _LAWS: dict[str, Law] = {
 }
 
 LAW_NAMES = tuple(_LAWS)
-"""The planners without memory, which a batch can map."""
+"""The planners without memory, which a batch can compile."""
 PLANNER_NAMES = (*LAW_NAMES, MODEL_FOLLOWING)
 
 
@@ -115,19 +116,20 @@ def make_planner(
 
     Args:
         name: one of `PLANNER_NAMES`, a function of the type `Law`, or a class of planners that is
-            made of `Constants`.
-        gain: p in 1/s, the inverse of the time constant asked for.
+            made from `Constants`.
+        gain: p in 1/s, the inverse of the wanted time constant.
         yaw_gain: gain of the heading error, 1/s; `quaternion`, `so3` and `euler` use `gain` for
             heading too, as the paper does.
         limits: bounds on tilt and rates.
-        options: further options of that planner: `recovery_angle`, rad. Without
-            `limits.max_tilt` it is also the largest tilt of a target, with every planner.
-            `model-following` takes those of `RateResponse`: `lag` and `dead_time` of the rate
-            loop, s (0 by default: it follows at once), `acceleration`, rad/s² (None: no limit), the
-            same with `pitch_` or `yaw_` before them (None: those of roll), `frame_lead`, s.
+        options: further options of that planner. Every planner takes `recovery_angle`, rad; without
+            `limits.max_tilt` it is also the largest tilt of a target. `model-following` also takes
+            the response of the rate loop (`RateResponse`): `lag` and `dead_time`, s (default 0),
+            `damping` (default None: first order), `acceleration`, rad/s² (default None: no limit),
+            each also with the prefix `pitch_` or `yaw_` (default None: as roll), and `frame_lead`,
+            s. There is no `yaw_damping`.
 
     Raises:
-        TypeError: an option that the planner does not take.
+        TypeError: the planner does not take an option.
         ValueError: unknown name, or a value out of range.
     """
     if isinstance(name, type):
@@ -172,21 +174,21 @@ def _model_following(
         pitch_damping = roll.damping if pitch_lag is None else first_order
     response = RateResponse(
         roll,
-        _or_as(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
-        _or_as(roll, yaw_lag, yaw_dead_time, yaw_acceleration, first_order),
+        _like_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
+        _like_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, first_order),
         frame_lead,
     )
     return ModelFollowingPlanner(make_constants(gain, yaw_gain, limits, **options), response)
 
 
-def _or_as(
+def _like_roll(
     roll: AxisResponse,
     lag: float | None,
     dead_time: float | None,
     acceleration: float | None,
     damping: float,
 ) -> AxisResponse:
-    """An axis with these values; roll's where a value is None."""
+    """An axis with these values; where one is None, with that of roll."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,

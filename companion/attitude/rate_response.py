@@ -1,10 +1,12 @@
-"""How a vehicle's own rate loop answers body rates: what `model-following` plans with."""
+"""Response of the vehicle's rate loop to body rates, with which `model-following` plans."""
 
 from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
 
-_LONGEST = 1.0  # s, of a lag, a dead time or a lead
-_LEAST_LAG = 1e-3  # s
+_LONGEST = 1.0
+"""Longest lag, dead time or lead that is accepted, s."""
+_SMALLEST_LAG = 1e-3
+"""Smallest lag that `model-following` computes with, s."""
 
 SHARE_OF_LARGEST_GAIN = 0.25
 """The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
@@ -12,13 +14,13 @@ SHARE_OF_LARGEST_GAIN = 0.25
 
 @dataclass(frozen=True, slots=True)
 class AxisResponse:
-    """Dead time, then a limit of acceleration, then a lag with a gain of 1.
+    """Response of one axis: dead time, then a slew limit, then a lag of gain 1.
 
     Attributes:
-        lag: τ, s; in second order 2ζ/ω. In both it is the mean delay.
-        dead_time: from the time of a sample to the first effect of its answer, s.
-        acceleration: slew limit of the rate that the autopilot aims at, rad/s².
-        damping: ζ of a lag of second order; infinite in first order.
+        lag: τ, s; 2ζ/ω of a lag of second order. In both cases it is the mean delay.
+        dead_time: time from a sample to the first effect of the rates sent for it, s.
+        acceleration: slew limit of the autopilot's rate setpoint, rad/s².
+        damping: ζ of a lag of second order; infinite for first order.
     """
 
     lag: float = 0.0
@@ -28,11 +30,11 @@ class AxisResponse:
 
     def with_least_lag(self) -> "AxisResponse":
         """The same with a lag of at least 1 ms: a shorter one makes no difference."""
-        return replace(self, lag=max(self.lag, _LEAST_LAG))
+        return replace(self, lag=max(self.lag, _SMALLEST_LAG))
 
     @property
     def square(self) -> float:
-        """1/ω², s²: the lag is square·ω̈ + lag·ω̇ + ω = what was commanded."""
+        """σ of the lag σ·r̈ + lag·ṙ + r = command, s²; 0 for first order."""
         half = 0.5 * self.lag / self.damping
         return half * half
 
@@ -42,10 +44,9 @@ class RateResponse:
     """The response of all axes.
 
     Attributes:
-        roll, pitch, yaw: of each axis.
-        frame_lead: time by which the axes along which the autopilot takes the rates lead the body
-            in yaw, s: ArduPilot's attitude target turns before the body does. None: `lead` derives
-            it from the other times.
+        roll, pitch, yaw: response of each axis.
+        frame_lead: time by which ArduPilot's attitude target leads the body in yaw, s; ArduPilot
+            takes the rates along the axes of that target. None: `lead` derives it.
 
     Raises:
         ValueError: a time is negative, longer than 1 s or not finite, or a limit not positive.
@@ -73,10 +74,11 @@ class RateResponse:
 
     @property
     def lead(self) -> float:
-        """`frame_lead`, or that of an autopilot that limits acceleration as ArduPilot does, s.
+        """`frame_lead`, or where it is None an estimate of it, s.
 
-        It turns the target as soon as roll and pitch begin to answer, and the body's yaw follows
-        one dead time and lag later. Without limits the axes are the body's own (PX4).
+        An autopilot with a slew limit in yaw is taken to behave like ArduPilot: its attitude target
+        turns as soon as roll and pitch begin to respond, and the body follows after the dead time
+        and lag of yaw. Without a slew limit the lead is 0: the axes are the body's own (PX4).
         """
         if self.frame_lead is not None:
             return self.frame_lead
@@ -86,7 +88,7 @@ class RateResponse:
 
     @property
     def tilt(self) -> AxisResponse:
-        """The mean of roll and pitch, limited as the one with the lower limit."""
+        """Mean lag and dead time of roll and pitch, with the lower of their slew limits."""
         roll, pitch = self.roll, self.pitch
         return AxisResponse(
             0.5 * (roll.lag + pitch.lag),
@@ -103,9 +105,9 @@ def _check_time(name: str, value: float) -> None:
 def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
     """Largest stable feedback gain (1/s) of an integrator in series with e^(−θs)/(σs² + τs + 1).
 
-    At the frequency ω where ωθ + ∠(1 − σω² + jωτ) = π/2 the loop has turned by half a circle; it is
-    stable while its magnitude is below 1 there, so k = ω·|1 − σω² + jωτ|. Without a dead time every
-    gain is stable with a lag of first order.
+    At the frequency ω where ωθ + ∠(1 − σω² + jωτ) = π/2 the phase of the loop is −180°. The loop is
+    stable while its magnitude is below 1 there, so k = ω·|1 − σω² + jωτ|. With a lag of first order
+    and no dead time every gain is stable, and the result is infinite.
 
     Args:
         lag: τ, s.
@@ -127,6 +129,6 @@ def largest_gain(lag: float, dead_time: float, square: float = 0.0) -> float:
 
 
 def feedback_gain(gain: float, axis: AxisResponse) -> float:
-    """The gain (1/s) that `axis` bears of the wanted `gain` (1/s), with a gain margin of 4."""
+    """The wanted `gain` (1/s), reduced if `axis` needs it for a gain margin of 4."""
     stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.square)
     return min(gain, stable)

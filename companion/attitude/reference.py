@@ -1,7 +1,7 @@
 """The linear models that the coefficients should follow, exact at any sample rate.
 
-Each is the closed solution over one sample with the target held, so that it has no discretisation
-error: a deviation from it is a deviation of the response.
+Each is the closed-form solution over one sample with a constant target. It has no discretisation
+error, so a deviation from it is a deviation of the vehicle's response.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from companion.attitude.types import Coefficients
 
 
 def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> float:
-    """Distance to the target after `dt` seconds, first order with a top speed.
+    """Distance to the target after `dt` seconds: first order with a largest speed.
 
-    d' = −min(gain·d, max_speed): at the top speed (equation 33) until gain·d falls below it, from
-    there on exponentially.
+    d' = −min(gain·d, max_speed): at the largest speed (equation 33) until gain·d falls below it,
+    then exponential.
     """
     beyond = gain * distance - max_speed
     if beyond > 0.0:
@@ -27,11 +27,11 @@ def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> 
 
 @dataclass(frozen=True, slots=True)
 class FirstOrderReference:
-    """ċ = p·(c_d − c), its length at most `max_speed`.
+    """First order: ċ = p·(c_d − c), with |ċ| at most `max_speed`.
 
     Attributes:
         gain: p, 1/s.
-        max_speed: 1/s; W_M·cos(max_tilt) is the paper's (equation 33).
+        max_speed: largest |ċ|, 1/s; W_M·cos(max_tilt) in the paper (equation 33).
     """
 
     gain: float
@@ -49,7 +49,7 @@ class FirstOrderReference:
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderReference:
-    """c̈ = ω²·(c_d − c) − 2ζω·ċ.
+    """Second order: c̈ = ω²·(c_d − c) − 2ζω·ċ.
 
     Attributes:
         frequency: ω, rad/s.
@@ -82,7 +82,7 @@ class SecondOrderReference:
         )
 
     def transition(self, dt: float) -> tuple[float, float, float, float]:
-        """The matrix exponential over `dt`: (c, ċ) from (c − c_d, ċ), row by row."""
+        """Transition matrix of the state (c − c_d, ċ) over `dt` seconds, row by row."""
         decay = self.damping * self.frequency
         square = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
         if square > 0.0:
@@ -105,16 +105,16 @@ class SecondOrderReference:
 
 
 def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
-    """One step of lag·ṙ = aim − r: the integral of the rate over `dt`, and the rate at its end.
+    """One step of lag·ṙ = aim − r: the integral of r over `dt`, and r at the end.
 
-    `lag` and `dt` in s; the integral in the unit of the rate times s.
+    `lag` and `dt` are in s; the integral is in the unit of `rate` times s.
     """
     kept = exp(-dt / lag)
     return aim * dt + (rate - aim) * lag * (1.0 - kept), aim + (rate - aim) * kept
 
 
 class Lag:
-    """square·r̈ + lag·ṙ = aim − r.
+    """A lag of first or second order: square·r̈ + lag·ṙ = aim − r.
 
     Args:
         lag: s.
@@ -130,12 +130,12 @@ class Lag:
             self._model = SecondOrderReference(1.0 / sqrt(square), 0.5 * lag / sqrt(square))
 
     def after(self, rate: float, slope: float, aim: float, dt: float) -> tuple[float, float, float]:
-        """The integral of the rate over `dt`; the rate and its slope at the end.
+        """The integral of r over `dt`, and r and ṙ at the end.
 
         Args:
-            rate: in any unit.
-            slope: its change a second; without effect in first order.
-            aim: held, in the rate's unit.
+            rate: r at the start, in any unit.
+            slope: ṙ at the start, per second; has no effect in first order.
+            aim: constant input during `dt`, in the unit of `rate`.
             dt: s.
         """
         if self._model is None:

@@ -7,20 +7,20 @@ from companion.attitude.limits import Constants
 from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
-_FURTHEST = sin(1.4)
-"""Longest reference: an attitude must exist for it, and its rates must be finite."""
-_DAMPED = 2.7
-"""Smallest 4·ζ² of the model."""
+_LONGEST_REFERENCE = sin(1.4)
+"""Greatest length of the reference's coefficients: an attitude with finite rates must exist."""
+_SMALLEST_DAMPING = 2.7
+"""Smallest 4·ζ² of the model, ζ its damping."""
 _LONGEST_STEP = 0.1
-"""Longest step of the model, as p·dt; a longer sample is divided into several steps."""
-_MOMENT = 1e-4
-"""Over which rates are differenced, s."""
+"""Largest p·dt of one step of the model; a longer sample is divided into several steps."""
+_DIFFERENCE_STEP = 1e-4
+"""Time step of the finite differences of rates, s."""
 
 
 def rates_along(
     north: float, east: float, speed_north: float, speed_east: float
 ) -> tuple[float, float, float]:
-    """Body rates (rad/s) that change the coefficients at this rate (1/s), heading held at 0.
+    """Body rates (rad/s) that move the coefficients at this speed (1/s), with the heading at 0.
 
     `kinematics.into_body` turns the first two to another heading; the third does not depend on it.
     """
@@ -39,37 +39,37 @@ def rates_along(
 
 
 def model_lag(gain: float, lag: float) -> float:
-    """τ of the model for a gain p (1/s), s: no overshoot, and no quicker than the rate loop."""
+    """τ of the model, s: the lag of the rate loop, but at least 0.25/p (critical damping)."""
     return max(0.25 / gain, lag)
 
 
-def braking(gain: float, lag: float) -> float:
-    """κ of the model, s: the time by which it brakes ahead, so that it overshoots by 1 % at most.
+def braking_lead(gain: float, lag: float) -> float:
+    """κ of the model, s: how far ahead it brakes, so that it overshoots by 1 % at most.
 
-    The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more where κ is 0.
+    The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more if κ is 0.
     """
-    return max(0.0, sqrt(_DAMPED * lag / gain) - 1.0 / gain)
+    return max(0.0, sqrt(_SMALLEST_DAMPING * lag / gain) - 1.0 / gain)
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
-    """The model as c̈ = (p'·(c_d − c) − ċ)/τ': p' in 1/s, and τ' in s, of this p and τ."""
-    slowed = 1.0 + gain * braking(gain, lag)
+    """P' (1/s) and τ' (s) with which the model of p and τ is c̈ = (p'·(c_d − c) − ċ)/τ'."""
+    slowed = 1.0 + gain * braking_lead(gain, lag)
     return gain / slowed, lag / slowed
 
 
 class ReferenceModel:
-    """σ·c⃛ + τ·c̈ + ċ = v with v = p·(c_d − c − κ·ċ), limited.
+    """The reference of the tilt: σ·c⃛ + τ·c̈ + ċ = v with v = p·(c_d − c − κ·ċ), limited.
 
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
-    of the motion within the limits. The commanded rates, led by the lag of the vehicle (τ and σ),
-    then stay within them too. Where the autopilot has a slew limit, v changes no faster, and is
-    small enough to be slowed down in time: the slew limit is never reached.
+    of the motion within the limits. The rates that are sent compensate the lag of the vehicle
+    (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no
+    faster, and is small enough to be slowed down in time: the slew limit is never reached.
 
     Args:
         constants: gains and limits.
         lag: τ, s.
         acceleration: slew limit of the autopilot, rad/s².
-        square: σ, s²; 0 for a vehicle whose lag is of first order.
+        square: σ, s²; 0 if the lag of the vehicle is of first order.
 
     Attributes:
         north, east: coefficients of the reference.
@@ -100,18 +100,18 @@ class ReferenceModel:
         square: float = 0.0,
     ) -> None:
         self._constants = constants
-        self._braking = braking(constants.gain, lag)
+        self._braking = braking_lead(constants.gain, lag)
         self._lag = Lag(lag, square)
         self._acceleration = acceleration
         # Near the target v falls by p·v a second.
         slowed_in_time = acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
-        self.place(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
+        self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
-    def place(self, c: Coefficients, speed: Coefficients) -> None:
-        """Start with these coefficients and their speed (1/s)."""
+    def start_at(self, c: Coefficients, speed: Coefficients) -> None:
+        """Start at these coefficients, moving at this speed (1/s)."""
         length = hypot(c.north, c.east)
-        scale = _FURTHEST / length if length > _FURTHEST else 1.0
+        scale = _LONGEST_REFERENCE / length if length > _LONGEST_REFERENCE else 1.0
         self.north, self.east = scale * c.north, scale * c.east
         self.speed_north, self.speed_east = self._v_north, self._v_east = speed
         self._slope_north = self._slope_east = 0.0
@@ -124,22 +124,22 @@ class ReferenceModel:
         """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences."""
         roll, pitch, _ = self.rates()
         later_roll, later_pitch, _ = rates_along(
-            self.north + _MOMENT * self.speed_north,
-            self.east + _MOMENT * self.speed_east,
-            self.speed_north + _MOMENT * self._slope_north,
-            self.speed_east + _MOMENT * self._slope_east,
+            self.north + _DIFFERENCE_STEP * self.speed_north,
+            self.east + _DIFFERENCE_STEP * self.speed_east,
+            self.speed_north + _DIFFERENCE_STEP * self._slope_north,
+            self.speed_east + _DIFFERENCE_STEP * self._slope_east,
         )
-        return (later_roll - roll) / _MOMENT, (later_pitch - pitch) / _MOMENT
+        return (later_roll - roll) / _DIFFERENCE_STEP, (later_pitch - pitch) / _DIFFERENCE_STEP
 
     def advance(self, target: Target, dt: float) -> None:
-        """Move on by `dt` seconds towards an admissible target."""
+        """Advance by `dt` seconds towards an admissible target."""
         parts = ceil(dt * self._constants.gain / _LONGEST_STEP)
         for _ in range(parts):
             self._step(target, dt / parts)
 
     def _step(self, target: Target, dt: float) -> None:
         north, east = self.north, self.east
-        self._aim(target, dt)
+        self._choose_v(target, dt)
         lag = self._lag
         moved, self.speed_north, self._slope_north = lag.after(
             self.speed_north, self._slope_north, self._v_north, dt
@@ -151,8 +151,8 @@ class ReferenceModel:
         self.east += moved
         self._stay_inside(north, east, dt)
 
-    def _aim(self, target: Target, dt: float) -> None:
-        """Choose v for the next step, by the reference predicted for its middle."""
+    def _choose_v(self, target: Target, dt: float) -> None:
+        """Choose v for the next step from the reference predicted for the middle of the step."""
         constants = self._constants
         ahead, half = 0.5 * dt + self._braking, 0.5 * dt * self._braking
         north = self.north + ahead * self.speed_north + half * self._slope_north
@@ -176,7 +176,10 @@ class ReferenceModel:
         self._v_north, self._v_east = v_north, v_east
 
     def _stay_inside(self, north: float, east: float, dt: float) -> None:
-        """Keep it within the largest tilt, or no further beyond it than (north, east) was."""
+        """Keep the reference within the largest tilt.
+
+        If the step began beyond it, at (north, east), the reference moves no further out.
+        """
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:
             return

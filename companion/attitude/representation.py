@@ -1,4 +1,4 @@
-"""Attitude as coefficients and heading, and the checks of what a planner is given."""
+"""Attitude as coefficients and heading, and the checks of a planner's input."""
 
 from math import atan2, inf, pi, sqrt
 
@@ -16,8 +16,9 @@ from companion.attitude.types import (
 )
 
 NORM_TOLERANCE = 1e-3
+"""Largest deviation of a quaternion's norm from 1."""
 _LARGEST_BODY_RATE = 100.0
-"""No vehicle turns faster about an axis, rad/s."""
+"""Rates above this about one axis are implausible, rad/s."""
 
 
 def _norm(q: Quaternion) -> float:
@@ -26,7 +27,7 @@ def _norm(q: Quaternion) -> float:
 
 
 def is_unit(q: Quaternion) -> bool:
-    """Whether a planner would take `q`: finite, its norm within 1e-3 of one."""
+    """Whether a planner accepts `q`: finite, and with a norm within 1e-3 of 1."""
     return abs(_norm(q) - 1.0) <= NORM_TOLERANCE  # false for NaN, too
 
 
@@ -34,7 +35,7 @@ def normalised(q: Quaternion) -> Quaternion:
     """Return `q` with unit norm.
 
     Raises:
-        InvalidQuaternionError: these are not four numbers, the norm is off by more than 1e-3, or a
+        InvalidQuaternionError: `q` is not four numbers, its norm is off by more than 1e-3, or a
             component is not finite.
     """
     try:
@@ -99,14 +100,15 @@ def attitude(coefficients: Coefficients, heading: float) -> Quaternion:
 
 
 LARGEST_HEADING_RATE = 1e9
-"""rad/s; nothing turns so fast, and what is led by a lag must stay finite."""
+"""Largest heading rate of a target, rad/s; with more, the rates to send might not be finite."""
 
 
 def admissible(target: Target, longest: float) -> Target:
-    """`target` itself, or with its coefficients shortened to `longest` and its heading wrapped.
+    """`target` with its coefficients shortened to `longest` and its heading wrapped to (−π, π].
 
     Raises:
-        InvalidTargetError: these are not four numbers, or a value is not finite or far too large.
+        InvalidTargetError: `target` is not three or four numbers, or a value is not finite or far
+            too large.
     """
     try:
         if not isinstance(target, Target):  # a plain tuple will do
@@ -125,10 +127,10 @@ def admissible(target: Target, longest: float) -> Target:
 
 
 def plausible_rates(body_rates: BodyRates | None) -> BodyRates | None:
-    """The rates; None for rates that no vehicle has or that are NaN: a plan must not use them.
+    """`body_rates`, or None if one is NaN or implausibly large, so that no plan uses them.
 
     Raises:
-        InvalidBodyRatesError: these are not three numbers.
+        InvalidBodyRatesError: `body_rates` are not three numbers.
     """
     if body_rates is None:
         return None

@@ -1,7 +1,7 @@
-"""Rotations on plain floats: products, logarithm, Euler angles, and a body rate held for a while.
+"""Rotations on plain floats: products, logarithm, Euler angles, rotation at a constant body rate.
 
-Like `kinematics`, every formula is arithmetic on scalars, so that a flight calls it as it stands
-and a batch compiles it unchanged.
+As in `kinematics`, every formula is arithmetic on scalars: a flight calls it, and a batch compiles
+the same function.
 """
 
 from math import asin, atan2, cos, pi, sin, sqrt
@@ -15,7 +15,7 @@ _SMALL = 1e-12
 
 
 def attitude_of(north: float, east: float, heading: float) -> Quaternion:
-    """The upright attitude with these acceleration coefficients (at most 1 long) and heading."""
+    """The upright attitude with these coefficients (of length 1 at most) and this heading (rad)."""
     a = sqrt((1.0 + sqrt(1.0 - north * north - east * east)) / 2.0)
     x = east / (2.0 * a)
     y = -north / (2.0 * a)
@@ -25,9 +25,9 @@ def attitude_of(north: float, east: float, heading: float) -> Quaternion:
 
 
 def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
-    """q⁻¹ ⊗ q_d, the remaining rotation in the body frame, the short way (w ≥ 0).
+    """The shorter rotation from `q` to `goal` in the body frame, q⁻¹ ⊗ q_d with w ≥ 0.
 
-    Both ways of an exact half turn are as short; the same is taken for q and −q.
+    An exact half turn is equally short both ways; q and −q are given the same way.
     """
     w, x, y, z = q
     w_d, x_d, y_d, z_d = goal
@@ -41,7 +41,7 @@ def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
 
 
 def first_is_negative(x: float, y: float, z: float) -> bool:
-    """Whether the first component that is not zero is below it: true of v or of −v, not both."""
+    """Whether the first nonzero component is negative: true of either v or −v, never of both."""
     return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 
 
@@ -62,7 +62,7 @@ def cos_and_sinc(square: float) -> tuple[float, float]:
 
 
 def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quaternion:
-    """The attitude after the body rates (rad/s) were held for `dt` seconds: q ⊗ exp(ω·dt/2)."""
+    """The attitude after `dt` seconds at constant body rates (rad/s): q ⊗ exp(ω·dt/2)."""
     w, x, y, z = q
     roll, pitch, yaw = rates
     i = 0.5 * dt * roll
@@ -78,7 +78,7 @@ def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quate
         y * c + w * j + z * i - x * k,
         z * c + w * k + x * j - y * i,
     )
-    # One Newton step of 1/√: rounding moves the norm always the same way, by 1e-12 in 2000 steps.
+    # One Newton step of 1/√ corrects the norm, which rounding would change by 1e-12 in 2000 steps.
     scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
     return w * scale, x * scale, y * scale, z * scale
 
@@ -96,7 +96,7 @@ def euler_angles(q: Quaternion) -> tuple[float, float, float]:
 
 
 def clamp(value: float, bound: float) -> float:
-    """`value`, or the nearer of ±`bound` (not negative) where it lies beyond."""
+    """`value` limited to ±`bound`; `bound` is not negative."""
     if value > bound:
         return bound
     if value < -bound:
@@ -107,7 +107,7 @@ def clamp(value: float, bound: float) -> float:
 def limit_rates(
     roll: float, pitch: float, yaw: float, max_tilt_rate: float, max_yaw_rate: float
 ) -> tuple[float, float, float]:
-    """Body rates with roll and pitch scaled together to their limit, and yaw clamped to its own."""
+    """Body rates, rad/s, with roll and pitch scaled together to their limit and yaw clamped."""
     rate = sqrt(roll * roll + pitch * pitch)
     if rate > max_tilt_rate:
         scale = max_tilt_rate / rate
@@ -117,7 +117,7 @@ def limit_rates(
 
 
 def short_way(angle: float) -> float:
-    """An angle between −2π and 2π, such as a difference of two headings, brought to (−π, π]."""
+    """Wrap an angle between −2π and 2π, such as a difference of two headings, to (−π, π]."""
     if angle > pi:
         return angle - TWO_PI
     if angle <= -pi:

@@ -7,7 +7,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class TiltYaw(NamedTuple):
-    """Equation 9: an attitude split into tilt ⊗ yaw, [a, x, y, 0] ⊗ [b, 0, 0, z] with a > 0."""
+    """Equation 9: an attitude as tilt ⊗ yaw = [a, x, y, 0] ⊗ [b, 0, 0, z] with a > 0."""
 
     a: float
     b: float
@@ -35,7 +35,7 @@ class Target(NamedTuple):
     """The setpoint that guidance gives a planner.
 
     `north`, `east` are the wanted acceleration coefficients; `heading` is the wanted tilt-yaw
-    heading in rad and `heading_rate` its feed-forward in rad/s.
+    heading in rad, and `heading_rate` the feedforward of the heading in rad/s.
     """
 
     north: float
@@ -45,16 +45,16 @@ class Target(NamedTuple):
 
 
 class AttitudeError(ValueError):
-    """The input of a planner cannot be used; the sample must not be answered."""
+    """A planner cannot use its input; no setpoint must be sent for this sample."""
 
 
 class InvalidQuaternionError(AttitudeError):
-    """A quaternion that is not finite, or whose norm is off by more than 1e-3."""
+    """A quaternion is not four finite numbers, or its norm is off by more than 1e-3."""
 
 
 class InvalidTargetError(AttitudeError):
-    """A target that is not numbers, or with a value that is not finite or far too large."""
+    """A target is not three or four numbers, or a value is not finite or far too large."""
 
 
 class InvalidBodyRatesError(AttitudeError):
-    """Body rates that are not three numbers."""
+    """Body rates are not three numbers."""

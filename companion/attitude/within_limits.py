@@ -1,4 +1,4 @@
-"""A planner of another package, whose body rates are checked and limited."""
+"""Checks and limits the body rates of a planner from another package."""
 
 from math import isfinite
 
@@ -9,15 +9,15 @@ from companion.attitude.types import AttitudeError, BodyRates, Quaternion, Targe
 
 
 class InvalidRatesError(AttitudeError):
-    """A planner of another package returned rates that are not finite."""
+    """A planner of another package returned body rates that are not finite."""
 
 
 class WithinLimits:
     """Limits another planner's rates to the largest tilt rate and yaw rate.
 
     Args:
-        planner: whose rates are limited.
-        limits: of the rates.
+        planner: the planner whose rates are limited.
+        limits: limits of the rates.
     """
 
     def __init__(self, planner: Planner, limits: Limits) -> None:
@@ -30,8 +30,8 @@ class WithinLimits:
         """The planner's body rates within the limits, rad/s.
 
         Raises:
-            InvalidRatesError: they are not finite.
-            AttitudeError: the planner has no answer to this attitude or target.
+            InvalidRatesError: the planner's rates are not finite.
+            AttitudeError: the planner cannot use this attitude or target.
         """
         roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
         if not (isfinite(roll) and isfinite(pitch) and isfinite(yaw)):
@@ -39,9 +39,9 @@ class WithinLimits:
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Pass it on."""
+        """Pass the attitude target to the planner."""
         self._planner.note_attitude_target(q, age)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Pass it on."""
+        """Reset the planner."""
         self._planner.reset(q, body_rates)

@@ -1,4 +1,4 @@
-"""Yaw in `model-following`: the planned heading, the predicted turn of the body, the axes."""
+"""Yaw in `model-following`: planned heading, predicted yaw of the body, ArduPilot's target axes."""
 
 from math import inf, radians
 
@@ -16,11 +16,11 @@ class HeadingModel:
 
     Args:
         constants: gains and limits.
-        yaw: the vehicle's response; τ is its lag.
+        yaw: the vehicle's response in yaw; τ is its lag.
 
     Attributes:
-        heading: rad, not wrapped.
-        turn_rate: its speed, rad/s.
+        heading: planned heading ψ, rad, not wrapped.
+        turn_rate: ψ̇, rad/s.
     """
 
     __slots__ = ("_acceleration", "_fastest", "_gain", "_lag", "_v", "heading", "turn_rate")
@@ -33,15 +33,15 @@ class HeadingModel:
         self._fastest = constants.max_yaw_rate
         if self._gain > 0.0:
             self._fastest = min(self._fastest, yaw.acceleration / self._gain)
-        self.place(0.0, 0.0)
+        self.start_at(0.0, 0.0)
 
-    def place(self, heading: float, turn_rate: float) -> None:
+    def start_at(self, heading: float, turn_rate: float) -> None:
         """Start at this heading (rad), turning at this rate (rad/s)."""
         self.heading = heading
         self.turn_rate = self._v = turn_rate
 
     def advance(self, target: Target, dt: float) -> None:
-        """Move on by `dt` seconds towards an admissible target."""
+        """Advance by `dt` seconds towards an admissible target."""
         wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
         change = clamp(wanted, self._fastest) - self._v
         v = self._v = self._v + clamp(change, self._acceleration * dt)
@@ -50,14 +50,14 @@ class HeadingModel:
 
 
 class YawModel:
-    """Response of the yaw axis without its dead time: slew limit, then lag.
-
-    Attributes:
-        rate: rad/s.
-        turned: its integral, rad.
+    """Predicts the yaw of the body, without dead time: slew limit, then lag.
 
     Args:
-        response: of yaw.
+        response: response of the yaw axis.
+
+    Attributes:
+        rate: predicted yaw rate, rad/s.
+        turned: integral of `rate` since the start, rad.
     """
 
     __slots__ = ("_acceleration", "_aimed", "_lag", "rate", "turned")
@@ -68,12 +68,12 @@ class YawModel:
         self.start(0.0)
 
     def start(self, rate: float) -> None:
-        """Turn steadily at `rate` rad/s, and count from here."""
+        """Start at a steady `rate`, rad/s, and set `turned` to 0."""
         self.rate = self._aimed = rate
         self.turned = 0.0
 
     def advance(self, command: float, dt: float) -> None:
-        """Hold the yaw rate `command` (rad/s) for `dt` seconds."""
+        """Advance by `dt` seconds in which the yaw rate `command` (rad/s) is sent."""
         before, most = self._aimed, self._acceleration * dt
         aimed = self._aimed = before + clamp(command - before, most) if most < inf else command
         # Uses the aim at the end of the sample: at most half a sample early.
@@ -82,26 +82,26 @@ class YawModel:
 
 
 LARGEST_LEAD = radians(45.0)
-"""ArduPilot does not let its attitude target lead the body in yaw by more."""
+"""Largest lead in yaw of ArduPilot's attitude target over the body, rad; ArduPilot clamps it."""
 
 OLDEST = 0.25
 """An attitude target older than this is not used, s."""
 
-_BEHIND_TARGET = 0.008
-"""Part of the dead time of roll and pitch between attitude target and body, s (measured)."""
+_BODY_BEHIND_TARGET = 0.008
+"""Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
-_TRIMMED = 128
+_DROPPED_TOGETHER = 128
 """Rows that are too old are dropped in blocks of this many."""
 
 
 class TargetFrame:
-    """Heading of the axes along which ArduPilot takes body rates: those of its attitude target.
+    """Heading of ArduPilot's attitude target, along whose axes ArduPilot takes body rates.
 
-    Rates turn the target at once, but for its slew limit; the body follows, in yaw a fifth of a
-    second later. ATTITUDE_TARGET tells the heading; it turns on by the rates sent since.
+    A yaw rate turns the target at once, within its slew limit; the body follows 0.2 s later.
+    ATTITUDE_TARGET reports the target's heading; the rates sent since then are added to it.
 
     Args:
-        response: of the vehicle's rate loop.
+        response: response of the vehicle's rate loop.
     """
 
     __slots__ = (
@@ -110,71 +110,80 @@ class TargetFrame:
         "_delay",
         "_lead",
         "_offset",
+        "_reported_at",
         "_time",
         "_times",
-        "_told_at",
-        "_ways",
+        "_turns",
     )
 
     def __init__(self, response: RateResponse) -> None:
         self._acceleration = response.yaw.acceleration
         self._lead = response.lead
-        self._delay = max(0.0, response.tilt.dead_time - _BEHIND_TARGET)
+        self._delay = max(0.0, response.tilt.dead_time - _BODY_BEHIND_TARGET)
         self._times: list[float] = []
-        self._ways: list[float] = []
+        self._turns: list[float] = []
         self.forget()
 
     def forget(self) -> None:
-        """Forget the heading of these axes."""
-        self._time, self._told_at = 0.0, -inf
+        """Forget the heading of the attitude target."""
+        self._time, self._reported_at = 0.0, -inf
         self._offset = self._aim = 0.0
-        self._times[:], self._ways[:] = [0.0], [0.0]
+        self._times[:], self._turns[:] = [0.0], [0.0]
 
     def note(self, heading: float, age: float) -> None:
-        """Take their heading (rad) `age` seconds before the newest sample."""
+        """Take the target's heading (rad) of `age` seconds before the newest sample.
+
+        One older than `OLDEST` is ignored.
+        """
         if not 0.0 <= age <= OLDEST:
             return
-        self._told_at = self._time - age
-        self._offset = heading - self._way(self._told_at - self._delay)
+        self._reported_at = self._time - age
+        self._offset = heading - self._turn_until(self._reported_at - self._delay)
 
     def advance(self, yaw: float, still: float, dt: float) -> None:
-        """The yaw rate is sent for `dt` seconds; `still` of it keeps the heading (rad/s)."""
-        if self._told_at == -inf:
+        """Advance by `dt` seconds in which the rate `yaw` is sent, rad/s.
+
+        `still` is the part of `yaw` that keeps the heading still.
+        """
+        if self._reported_at == -inf:
             return  # no attitude target was received: the rates are along the body's axes
         self._aim += clamp(yaw - self._aim, self._acceleration * dt)
         self._time += dt
         times = self._times
         times.append(self._time)
-        self._ways.append(self._ways[-1] + (self._aim - still) * dt)
-        if len(times) > _TRIMMED and times[_TRIMMED] < self._time - OLDEST - self._delay:
-            del times[:_TRIMMED], self._ways[:_TRIMMED]
+        self._turns.append(self._turns[-1] + (self._aim - still) * dt)
+        if (
+            len(times) > _DROPPED_TOGETHER
+            and times[_DROPPED_TOGETHER] < self._time - OLDEST - self._delay
+        ):
+            del times[:_DROPPED_TOGETHER], self._turns[:_DROPPED_TOGETHER]
 
     def lead(self, heading: float, plans: PlanHistory) -> float:
-        """How far these axes lead the body in yaw when the answer to this sample acts, rad.
+        """How far the target leads the body in yaw when the rates sent now take effect, rad.
 
-        From the newest attitude target; without one, from their lead in time (`RateResponse.lead`).
+        It is computed from the newest attitude target, or without one from `RateResponse.lead`.
 
         Args:
-            heading: of the body then, without the turn that is planned until then, rad.
-            plans: of tilt and heading.
+            heading: heading of the body minus the turn predicted since the plans began, rad.
+            plans: plans of tilt and heading.
         """
-        told = self.heading()
-        if told is not None:
-            turn = plans.turn_when(plans.time, plans.tilt.newest)
-            lead = wrap_angle(told - heading - turn.angle)
+        reported = self.heading()
+        if reported is not None:
+            turn = plans.predicted_turn(plans.time, plans.tilt.newest)
+            lead = wrap_angle(reported - heading - turn.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
         return 0.0 if self._lead == 0.0 else plans.turn_within(self._lead)
 
     def heading(self) -> float | None:
-        """Their heading when the answer to this sample acts, rad; None: it is not known."""
-        if self._time - self._told_at > OLDEST:
+        """The target's heading when the rates sent now take effect, rad; None: not known."""
+        if self._time - self._reported_at > OLDEST:
             return None
-        return self._offset + self._ways[-1]
+        return self._offset + self._turns[-1]
 
-    def _way(self, time: float) -> float:
-        """How far the rates sent until `time` turn them, rad: linear between samples."""
-        times, ways = self._times, self._ways
+    def _turn_until(self, time: float) -> float:
+        """How far the rates sent until `time` turn the target, rad; linear between samples."""
+        times, ways = self._times, self._turns
         if time < times[0]:
             return ways[0]
         if time >= times[-1]:

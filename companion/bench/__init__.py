@@ -1,1 +1,1 @@
-"""What this program costs, measured against others that do the same job."""
+"""Benchmarks: latency and processor time of this program, compared with others."""

@@ -1,4 +1,4 @@
-"""Our own way of a sample with `link.backend: mavsdk`: MAVSDK carries it, and the setpoint."""
+"""A program that answers samples with `link.backend: mavsdk`: MAVSDK forwards all frames."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Our own way of a sample, as it flies: link, control loop, planner, thrust, encoder."""
+"""A program that answers samples as `companion fly` does: link, control loop, planner, thrust."""
 
 import asyncio
 import sys
@@ -24,7 +24,7 @@ async def fly(port: int) -> None:
 
 
 async def answer(link: Link) -> NoReturn:
-    """Have the control loop answer; guidance leaves a fresh target 50 times a second."""
+    """Answer samples by a `ControlLoop`, which gets a new guidance command 50 times a second."""
     config = Config()
     now = asyncio.get_running_loop().time
     loop = ControlLoop(

@@ -1,6 +1,6 @@
-"""The floor: a blocking socket that answers each datagram with one of a setpoint's size.
+"""The lower bound: a blocking socket that answers each datagram with one of a setpoint's size.
 
-It decides nothing and decodes nothing; Python cannot answer any faster than this.
+It decodes and computes nothing; Python cannot answer faster than this.
 """
 
 import socket
@@ -8,7 +8,7 @@ import sys
 
 _BEFORE = bytes([0xFD, 39, 0, 0, 0, 1, 191, 82, 0, 0])  # the header of SET_ATTITUDE_TARGET
 _AFTER = bytes(35 + 2)  # the rest of its payload, and its checksum
-_STAMP = slice(10, 14)  # time_boot_ms stands there in a sample and in a setpoint
+_STAMP = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a setpoint
 
 
 def main(port: int) -> None:

@@ -1,8 +1,8 @@
 """`companion bench flight`: how much faster than real time one core flies whole flights.
 
-The program and the mock vehicle are joined in one process (`companion.testing`). Processor time is
-measured, of both together: other programs on the computer count little. A first, short flight is
-not measured: it imports modules.
+The program and the mock vehicle run in one process (`companion.testing`). The processor time of
+both together is measured, so that other programs on the computer count little. A first, short
+flight, which imports modules, is not measured.
 """
 
 from time import process_time
@@ -18,7 +18,7 @@ from companion.testing import MockVehicle, fly
 FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
 """The shipped configuration of each autopilot."""
 CLOCKS = {"lockstep": True, "free": False}
-"""Whether the vehicle waits for the answer to each step, or samples come as over UDP."""
+"""Kinds of clock by name. True: lockstep. False: samples come without waiting, as over UDP."""
 
 _FLIGHTS = 3
 _WARM_UP_S = 0.2
@@ -29,34 +29,36 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """Fly a hover with each autopilot, in lockstep and free.
 
     Args:
-        seconds: length of the hover, s; take-off and landing come on top.
-        as_json: print nothing; the caller prints what is returned.
+        seconds: duration of the hover, without take-off and landing, s.
+        as_json: print nothing; the caller prints the result.
 
     Returns:
-        by autopilot and clock: `vehicle_s`, `cpu_s` of the quickest of three flights,
-        `times_real_time`, their ratio, and `setpoints`.
+        By autopilot and clock, of the quickest of three flights: `vehicle_s`, `cpu_s`, their ratio
+        `times_real_time`, and `setpoints`.
 
     Raises:
-        ConfigError: a configuration that ships cannot be found.
+        ConfigError: a shipped configuration cannot be found.
         RuntimeError: a flight failed; the message says why.
     """
     figures: dict[str, Any] = {}
     for autopilot in FILES:
-        figures[autopilot] = {name: _measured(autopilot, CLOCKS[name], seconds) for name in CLOCKS}
+        figures[autopilot] = {
+            name: _best_flight(autopilot, CLOCKS[name], seconds) for name in CLOCKS
+        }
     if not as_json:
         _print(figures)
     return figures
 
 
-def _measured(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
-    _flown(autopilot, lockstep, _WARM_UP_S)
+def _best_flight(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+    _fly_once(autopilot, lockstep, _WARM_UP_S)
     return min(
-        (_flown(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
+        (_fly_once(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
         key=lambda flight: flight["cpu_s"],
     )
 
 
-def _flown(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
     """Figures of one flight."""
     path = shipped(FILES[autopilot])
     config = _hovering(load(path), seconds)

@@ -1,8 +1,9 @@
-"""`companion bench link`: how long a sample takes to become a setpoint, ours and others'.
+"""`companion bench link`: the time from a sample to its setpoint, of this and other programs.
 
-One sender plays the vehicle to five programs in turn, in short rounds, so that all of them meet
-the same state of the machine: a bare echo in Python (the floor), this program, what one writes
-oneself on pymavlink, this program by way of MAVSDK, and MAVSDK as its users write it.
+A sender simulates the vehicle for five programs in turn, in short rounds, so that the load of the
+computer affects all of them equally. The programs are a bare echo in Python (the lower bound), this
+program, a simple loop on pymavlink, this program with MAVSDK as its link, and a program written
+with MAVSDK alone.
 """
 
 import gc
@@ -26,6 +27,11 @@ _BACKEND = "companion.bench.backend_program"
 
 
 class _Entry(NamedTuple):
+    """A program: its key in the result, its title, its module, and how its setpoints are matched.
+
+    `stamp` and `modulus` are those of `Sender`.
+    """
+
     key: str
     title: str
     module: str
@@ -43,17 +49,17 @@ _ENTRIES = (
 
 
 def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
-    """Measure all of them, in interleaved rounds of about a second.
+    """Measure all programs, in interleaved rounds of about 1 s.
 
     Args:
-        seconds: How long each of them is measured.
-        rate_hz: Samples a second.
-        as_json: Print nothing; the caller prints what is returned.
+        seconds: Time for which each program is measured, s.
+        rate_hz: Rate of samples, Hz.
+        as_json: Print nothing; the caller prints the result.
 
     Returns:
-        For `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`, `p99_us`,
-        `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`; and `ratio` of the p50s,
-        `companion_to_…` those that are not ours.
+        For each of `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`,
+        `p99_us`, `max_us`, `cpu_percent` (of one core), `samples` and `unanswered`. Also `ratio`:
+        the p50 of `companion` divided by that of another program, as `companion_to_…`.
 
     Raises:
         MissingExtraError: MAVSDK is not installed.
@@ -90,7 +96,7 @@ def _start(stack: ExitStack, entry: _Entry) -> Sender:
 
 @contextmanager
 def _no_garbage_collection() -> Iterator[None]:
-    """Keep the sender's own pauses out of what it measures."""
+    """Switch the garbage collector off, so that the sender does not pause while it measures."""
     enabled = gc.isenabled()
     gc.disable()
     try:

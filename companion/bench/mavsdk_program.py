@@ -1,7 +1,7 @@
-"""The same job by the official MAVSDK and its asyncio interface, written as its users would.
+"""A program that answers samples with MAVSDK's asyncio interface, as a user of MAVSDK writes it.
 
-MAVSDK stamps setpoints with its own clock, so the sample's stamp goes back in the yaw rate: one
-degree per second for each millisecond.
+MAVSDK stamps setpoints with its own clock. So this program returns the sample's time stamp in the
+yaw rate: 1 °/s for each ms.
 """
 
 import asyncio
@@ -17,13 +17,13 @@ from companion.attitude import Target
 from companion.config import Config
 from companion.control.inner_loop import planner as make_planner
 
-STAMP_MODULUS = 8192  # float32 holds the degrees and their radians exactly enough up to here
+STAMP_MODULUS = 8192  # up to here a float32 in rad/s gives back the whole number of °/s
 _HOVER = 0.5
 _DT = 0.004
 
 
 def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> AttitudeRate:
-    """An AttitudeRate; its C structure has no constructor with values."""
+    """An AttitudeRate with these values; its C structure has no constructor for them."""
     rate = AttitudeRate()
     rate.roll_deg_s, rate.pitch_deg_s, rate.yaw_deg_s = roll_deg_s, pitch_deg_s, yaw_deg_s
     rate.thrust_value = _HOVER

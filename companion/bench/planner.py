@@ -1,8 +1,8 @@
-"""`companion bench planner`: what one step of a planner costs, in a flight and in a batch.
+"""`companion bench planner`: the time of one step of a planner, in a flight and in a batch.
 
-Times are the best of many short repeats, garbage collection off: what the machine can do while
-nothing disturbs it. The baselines, a bare Python call and a copy of the same arrays, are measured
-in between, so that they meet the same state of the machine.
+Times are the best of many short repeats without garbage collection, so that other load on the
+computer hardly counts. The baselines, a bare Python call and a copy of the same arrays, are
+measured in between, under the same conditions.
 """
 
 from collections.abc import Callable
@@ -24,12 +24,19 @@ VEHICLES = 1_000
 RATE_HZ = 1_000.0
 
 _LIMITS = Limits(max_tilt=0.6, max_tilt_rate=1.5, max_yaw_rate=1.0)
-_REPEAT_S = 2e-3  # short enough to fall between two disturbances
-_STEPS, _STEPS_IN_PYTHON = 4_000, 10  # of `advance` in a repeat
+_REPEAT_S = 2e-3  # short, so that some repeats are undisturbed
+_STEPS, _STEPS_IN_PYTHON = 4_000, 10  # number of steps of `advance` in a repeat
 
 
 class _Case(NamedTuple):
-    """Something to be timed: where its figure goes, and how many steps one run of it makes."""
+    """A case to time.
+
+    Attributes:
+        group: key of the group in the result.
+        key: key of the case in its group.
+        timer: runs the case.
+        steps: number of planner steps in one run.
+    """
 
     group: str
     key: str
@@ -38,6 +45,8 @@ class _Case(NamedTuple):
 
 
 class _Fleet(NamedTuple):
+    """Attitudes (4, n) and targets (4, n) of n vehicles."""
+
     q: NDArray[np.float64]
     targets: NDArray[np.float64]
 
@@ -46,17 +55,19 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """Measure every planner, interleaved with the baselines.
 
     Args:
-        seconds: How long is measured, at least one round; compiling comes on top.
-        as_json: Print nothing; the caller prints what is returned.
+        seconds: Time of measuring without compiling, s; at least one round is measured.
+        as_json: Print nothing; the caller prints the result.
 
     Returns:
-        `compiled`: whether numba compiled the batches. `flight_ns`: a step of `planner.rates` on
-        plain floats, by planner, and `baseline`, a Python function that returns its argument;
-        `new_target_ns`: the same with another target at each step, which has to be checked.
-        `batch_ns`: a step in `batch.rates`, its checks included, by planner and number of
-        vehicles, and `baseline`, a copy of the same attitudes and targets. `flight_ratio`,
-        `new_target_ratio`, `batch_ratio`: the same in baselines. `simulated`:
-        `seconds_per_second` of `vehicles` at `rate_hz` under `first-order`, by `batch.advance`.
+        - `compiled`: whether numba compiled the batches.
+        - `flight_ns`: time of a step of `planner.rates` on plain floats, by planner; its `baseline`
+          is a Python function that returns its argument.
+        - `new_target_ns`: the same with another target at each step, which must be checked.
+        - `batch_ns`: time of a step in `batch.rates` with its checks, by planner and number of
+          vehicles; its `baseline` is a copy of the same attitudes and targets.
+        - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the same divided by the baseline.
+        - `simulated`: `seconds_per_second`, simulated time per computing time of `vehicles` at
+          `rate_hz` with `first-order`, by `batch.advance`.
     """
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
@@ -84,15 +95,15 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 
 
 def _flight_cases() -> list[_Case]:
-    """The target held from sample to sample, as most often in a flight; and new at each."""
+    """Cases of two steps: with the same target, as in most steps of a flight, and with another."""
     vehicle = _fleet(2)
     held, other = (Target(*column) for column in vehicle.targets.T.tolist())
-    known: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "held": held, "other": other}
-    asked: dict[str, Callable[..., Any]] = {"baseline": _answered}
-    asked |= {name: _planner(name).rates for name in LAW_NAMES}
+    values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "held": held, "other": other}
+    functions: dict[str, Callable[..., Any]] = {"baseline": _first_argument}
+    functions |= {name: _planner(name).rates for name in LAW_NAMES}
     return [
-        _Case(group, key, Timer(statement, globals={**known, "f": function}), 2)
-        for key, function in asked.items()
+        _Case(group, key, Timer(statement, globals={**values, "f": function}), 2)
+        for key, function in functions.items()
         for group, statement in (
             ("flight", "f(q, held, 0.004); f(q, held, 0.004)"),
             ("new target", "f(q, held, 0.004); f(q, other, 0.004)"),
@@ -100,7 +111,7 @@ def _flight_cases() -> list[_Case]:
     ]
 
 
-def _answered(q: Any, target: Any, dt: float) -> Any:
+def _first_argument(q: Any, target: Any, dt: float) -> Any:
     return q
 
 
@@ -108,12 +119,12 @@ def _batch_cases(compiled: bool) -> list[_Case]:
     cases = []
     for count in BATCHES:
         fleet = _fleet(count)
-        known: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
-        copy = Timer("q.copy(), targets.copy()", globals=known)
+        values: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
+        copy = Timer("q.copy(), targets.copy()", globals=values)
         cases.append(_Case(str(count), "baseline", copy, count))
         for name in LAW_NAMES:
-            known = {**known, "rates": batch.rates, "planner": _planner(name)}
-            timer = Timer("rates(planner, q, targets, 0.004, compiled)", globals=known)
+            values = {**values, "rates": batch.rates, "planner": _planner(name)}
+            timer = Timer("rates(planner, q, targets, 0.004, compiled)", globals=values)
             cases.append(_Case(str(count), name, timer, count))
     return cases
 
@@ -133,7 +144,7 @@ def _planner(name: str) -> LawPlanner:
 
 
 def _fleet(count: int) -> _Fleet:
-    """Vehicles at every heading, some of them far tilted, and targets within the limits."""
+    """Vehicles at all headings, some with a large tilt, and targets within the limits."""
     random = np.random.default_rng(1)
     q = random.normal(size=(4, count))
     q[0] = 1.5 + np.abs(q[0])
@@ -142,7 +153,7 @@ def _fleet(count: int) -> _Fleet:
 
 
 def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
-    """The least time in ns of a step, by group and key of the cases."""
+    """The shortest time of a step, ns, by group and key of the cases."""
     runs = []
     for case in cases:
         case.timer.timeit(1)  # compiles
@@ -188,7 +199,7 @@ def _show(figures: dict[str, Any]) -> None:
     console.print(
         f"{simulated['seconds_per_second']:.3g} simulated seconds a second on one core: "
         f"{VEHICLES:,} vehicles at {RATE_HZ:g} Hz, first-order, {simulated['step_ns']:.3g} ns a"
-        " step with its turn (batch.advance checks its arrays once, batch.rates at each call)",
+        " step with its rotation (batch.advance checks its arrays once, batch.rates at each call)",
         highlight=False,
     )
     if not figures["compiled"]:
@@ -200,9 +211,9 @@ def _show(figures: dict[str, Any]) -> None:
 
 
 def _cell(ns: float, ratio: float | None) -> str:
-    shown = _short(ns)
+    shown = _short_number(ns)
     return shown if ratio is None else f"{shown} {ratio:.0f}×"
 
 
-def _short(number: float) -> str:
+def _short_number(number: float) -> str:
     return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"

@@ -1,4 +1,4 @@
-"""A program under measurement, as a process of its own."""
+"""A process that runs one of the programs to measure."""
 
 import ctypes
 import signal
@@ -15,58 +15,59 @@ _libc = ctypes.CDLL(None)
 
 
 class ContestantError(LinkError):
-    """A program of the benchmark cannot take part."""
+    """A program of the benchmark failed."""
 
 
 def free_port() -> int:
-    """A UDP port that nobody uses at the moment."""
+    """A UDP port that is not in use."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", 0))
         return int(opened.getsockname()[1])
 
 
 def _end_with_parent() -> None:
-    """Have the kernel kill this process when its parent dies (Linux, like the rest of the bench).
+    """Have the kernel kill this process when its parent ends (Linux only).
 
-    The programs answer until they are killed, and a benchmark that is killed cannot do it.
+    The programs run until they are killed, and a benchmark that was killed cannot do that.
     """
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 class Contestant:
-    """Starts `python -m MODULE PORT` and reads how much processor time it takes.
+    """One program to measure: starts `python -m MODULE PORT`, and reads its processor time.
 
     Args:
-        name: For people.
-        module: A module that listens on the UDP port it is given.
+        name: Name to show to users.
+        module: A module that listens on the UDP port given to it.
     """
 
     def __init__(self, name: str, module: str) -> None:
         self.name = name
         self.port = free_port()
-        # A file, not a pipe: nobody reads it meanwhile, and a full pipe would stop the program.
-        self._words = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
+        # A file instead of a pipe: nobody reads it meanwhile, and a full pipe would block.
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, str(self.port)],
             stdout=subprocess.DEVNULL,
-            stderr=self._words,
+            stderr=self._output,
             preexec_fn=_end_with_parent,  # noqa: PLW1509  the benchmark has one thread
         )
 
     def check_running(self) -> None:
-        """Raise `ContestantError` with its last words if the program has ended."""
+        """Raise `ContestantError` with the last line of its output if the program has ended."""
         if self._process.poll() is not None:
-            self._words.seek(0)
-            words = self._words.read().decode(errors="replace").strip().splitlines()
-            raise ContestantError(f"{self.name} ended early: {words[-1] if words else 'no word'}")
+            self._output.seek(0)
+            words = self._output.read().decode(errors="replace").strip().splitlines()
+            reason = words[-1] if words else "it printed no error"
+            raise ContestantError(f"{self.name} ended early: {reason}")
 
     def cpu_ns(self) -> int:
-        """Processor time of all its threads so far, ns (Linux: the scheduler's own count)."""
+        """Processor time of all its threads so far, ns (Linux only)."""
         tasks = Path(f"/proc/{self._process.pid}/task").iterdir()
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
 
     def stop(self) -> None:
-        """Kill it."""
+        """Kill the program."""
         self._process.kill()
         self._process.wait()
-        self._words.close()
+        self._output.close()

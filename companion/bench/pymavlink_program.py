@@ -1,6 +1,6 @@
-"""What one writes oneself: a blocking socket, pymavlink, and the same law in a loop.
+"""A simple program on pymavlink: a blocking socket and the same law in a loop.
 
-No link, no deadman, no thrust, no recording: just decode, plan, encode.
+It decodes, computes and encodes. It has no offboard-loss checks, thrust control or recording.
 """
 
 import socket

@@ -1,4 +1,4 @@
-"""The vehicle's side of the benchmark: sends samples at a rate, times what comes back."""
+"""Simulates the vehicle of the benchmark: sends samples at a rate, and times the setpoints."""
 
 import contextlib
 import select
@@ -14,13 +14,13 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.bench.process import Contestant, ContestantError
 
 Stamp = Callable[[bytes], int]
-"""The sample's time stamp in ms that a setpoint answers; modulo the contestant's own."""
+"""From the bytes of a setpoint: time stamp (ms) of its sample, modulo `Sender`'s `modulus`."""
 
 _SETPOINT_BYTES = 51
 _SETPOINT_ID = 82
 _TIME_AT, _YAW_RATE_AT = 10, 38
 _READY_TIMEOUT_S = 30.0
-_SETTLE_SAMPLES = 25  # at the start of each round, until the contestant is awake again
+_SETTLE_SAMPLES = 25  # not counted, at the start of each round
 _PX4, _QUADROTOR, _OFFBOARD_ARMED, _OFFBOARD, _ACTIVE = 12, 2, 129, 0x00060000, 4
 _TILT = (0.99, 0.05, 0.05, 0.1197)
 
@@ -32,17 +32,23 @@ def stamp_by_time(setpoint: bytes) -> int:
 
 
 def stamp_by_yaw_rate(setpoint: bytes) -> int:
-    """The stamp that was put in the yaw rate, as whole degrees per second."""
+    """The stamp that `mavsdk_program` puts in the yaw rate, in whole degrees per second."""
     return round(degrees(struct.unpack_from("<f", setpoint, _YAW_RATE_AT)[0]))
 
 
 class Sender:
-    """One vehicle that plays to one contestant.
+    """Simulates one vehicle for one program.
 
     Args:
-        contestant: Who answers.
-        stamp: Finds the sample that a setpoint answers.
-        modulus: At which those stamps wrap.
+        contestant: The program that answers.
+        stamp: Finds the time stamp in a setpoint.
+        modulus: Value at which these stamps wrap, ms.
+
+    Attributes:
+        round_trips_ns: Times from sample to setpoint, ns.
+        sent: Number of samples sent in measured rounds.
+        cpu_ns: Processor time of the program in these rounds, ns.
+        wall_ns: Duration of these rounds, ns.
     """
 
     def __init__(self, contestant: Contestant, stamp: Stamp, modulus: int) -> None:
@@ -58,7 +64,7 @@ class Sender:
         self._boot = time.perf_counter_ns()
         self._time_ms = 0
         self._under_way: dict[int, int] = {}
-        self._keeping = False
+        self._recording = False
         self.round_trips_ns: list[int] = []
         self.sent = 0
         self.cpu_ns = 0
@@ -66,7 +72,7 @@ class Sender:
 
     @property
     def name(self) -> str:
-        """Who answers, for people."""
+        """Name of the program, to show to users."""
         return self._contestant.name
 
     def close(self) -> None:
@@ -74,18 +80,18 @@ class Sender:
         self._socket.close()
 
     def heartbeat(self) -> None:
-        """Say that the vehicle is there, in offboard and armed."""
-        self._say(
+        """Send the heartbeat of an armed vehicle in offboard."""
+        self._send_message(
             dialect.MAVLink_heartbeat_message(
                 _QUADROTOR, _PX4, _OFFBOARD_ARMED, _OFFBOARD, _ACTIVE, 3
             )
         )
 
     def wait_ready(self) -> None:
-        """Play until the contestant answers.
+        """Send samples until the program answers one.
 
         Raises:
-            ContestantError: It ended, or did not answer within 30 s.
+            ContestantError: The program ended, or did not answer within 30 s.
         """
         end = time.monotonic() + _READY_TIMEOUT_S
         beat = 0.0
@@ -99,38 +105,38 @@ class Sender:
             if time.monotonic() > beat:
                 beat = time.monotonic() + 0.5
                 self.heartbeat()
-            self._sample()
+            self._send_sample()
             answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
 
     def play(self, rate_hz: float, seconds: float) -> None:
-        """Send samples at `rate_hz` for `seconds`, and keep the round trips.
+        """Send samples at `rate_hz` for `seconds`, and record the round trips.
 
         Raises:
-            ContestantError: The contestant ended.
+            ContestantError: The program ended.
         """
         self._contestant.check_running()
         self.heartbeat()
-        due = self._samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
+        due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._under_way.clear()
-        self._keeping = True
+        self._recording = True
         cpu, began = self._contestant.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
-        self._samples(count, rate_hz, due)
+        self._send_samples(count, rate_hz, due)
         self.sent += count
         self.cpu_ns += self._contestant.cpu_ns() - cpu
         self.wall_ns += time.perf_counter_ns() - began
-        self._keeping = False
+        self._recording = False
 
-    def _samples(self, count: int, rate_hz: float, due: int) -> int:
+    def _send_samples(self, count: int, rate_hz: float, due: int) -> int:
         period_ns = round(1e9 / rate_hz)
         for _ in range(count):
-            self._sample()
+            self._send_sample()
             due += period_ns
             self._listen_until(due)
         return due
 
-    def _sample(self) -> None:
-        # Real time, as a vehicle's is, but no stamp twice: it is what answers are known by.
+    def _send_sample(self) -> None:
+        # The stamp follows real time, and is unique because it identifies the answer.
         self._time_ms = max(self._time_ms + 1, (time.perf_counter_ns() - self._boot) // 1_000_000)
         frame = self._pack(
             dialect.MAVLink_attitude_quaternion_message(self._time_ms, *_TILT, 0.01, 0.02, 0.03)
@@ -139,33 +145,33 @@ class Sender:
         self._send(frame)
 
     def _listen_until(self, due: int) -> bool:
-        """Take answers until the time `due`; true if one belonged to a sample."""
+        """Take answers until the time `due`, ns; return whether one belonged to a sample."""
         matched = False
         while (left := due - time.perf_counter_ns()) > 0:
-            # poll() counts whole milliseconds, so the last one is slept away beside it.
+            # poll() counts whole milliseconds; the rest is slept.
             if not self._poll.poll(left // 1_000_000):
                 time.sleep(max(0, due - time.perf_counter_ns()) * 1e-9)
             try:
                 data = self._socket.recv(2048)
             except OSError:
-                continue  # nothing yet, or a refusal: the contestant is not up yet
+                continue  # no answer yet, or the program has not started yet
             now = time.perf_counter_ns()
             if len(data) == _SETPOINT_BYTES and data[7] == _SETPOINT_ID:
                 began = self._under_way.pop(self._stamp(data) % self._modulus, None)
                 matched = matched or began is not None
-                if began is not None and self._keeping:
+                if began is not None and self._recording:
                     self.round_trips_ns.append(now - began)
             else:
-                self._converse(data)
+                self._accept_commands(data)
         return matched
 
-    def _converse(self, data: bytes) -> None:
-        """Accept every command, as MAVSDK needs to begin."""
+    def _accept_commands(self, data: bytes) -> None:
+        """Accept every command, which MAVSDK needs to start."""
         for message in self._parser.parse_buffer(data) or ():
             if message.get_type() == "COMMAND_LONG":
-                self._say(dialect.MAVLink_command_ack_message(message.command, 0))
+                self._send_message(dialect.MAVLink_command_ack_message(message.command, 0))
 
-    def _say(self, message: Any) -> None:
+    def _send_message(self, message: Any) -> None:
         self._send(self._pack(message))
 
     def _pack(self, message: Any) -> bytes:
@@ -174,5 +180,5 @@ class Sender:
         return frame
 
     def _send(self, frame: bytes) -> None:
-        with contextlib.suppress(OSError):  # refused: the contestant is not up yet
+        with contextlib.suppress(OSError):  # refused: the program has not started yet
             self._socket.sendto(frame, ("127.0.0.1", self._contestant.port))

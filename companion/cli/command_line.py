@@ -1,6 +1,7 @@
 """The options of the command line. It imports no command, so that `--help` answers at once."""
 
 import argparse
+import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -16,8 +17,13 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
     Args:
         arguments: of the command line; None: those that the program was started with.
+
+    Returns:
+        The options; `typed` holds the arguments themselves.
     """
-    return _parser().parse_args(arguments)
+    options = _parser().parse_args(arguments)
+    options.typed = sys.argv[1:] if arguments is None else list(arguments)
+    return options
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -7,8 +7,10 @@ from pathlib import Path
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.tool_options import STARTS
 from companion.config import Config
+from companion.config.doubts import doubts
 from companion.config.files import json_schema, load, shipped
 from companion.config.reference import Key, as_markdown, as_yaml, differences, keys
+from companion.control.expected_response import expectations
 from companion.demo import check_mock
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import link_settings
@@ -85,5 +87,9 @@ def check(options: argparse.Namespace) -> int:
     for part in maneuvers.parts:
         if isinstance(part, Follow):
             print("\n".join(part.notes))
+    for text in expectations(config):
+        print(text)
+    for doubt in doubts(config):
+        print(f"look again: {doubt.sentence()}")
     print(f"{options.file}: ok")
     return EXIT_OK

@@ -10,10 +10,12 @@ from typing import Any
 
 from rich.console import Console
 
+from companion.attitude import PLANNER_NAMES
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import assigned, changed, load
+from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
 from companion.flight.assembly import open_link
@@ -87,6 +89,18 @@ def _flown(config: Config) -> tuple[ManeuverSequence | None, list[Finding]]:
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 
+def _response(config: Config) -> list[Finding]:
+    """The response to expect, and whether the gain is larger than the vehicle bears."""
+    if config.planner_name not in PLANNER_NAMES:
+        return []
+    response = expected_response(config)
+    result = CheckResult.INEFFECTIVE if response.too_quick else CheckResult.SAFE
+    source = f"planner, rate loop and limits; {hold_sentence(config)}"
+    return [
+        Finding(Key.RESPONSE, result, response.gain_sentence(), response.sentence(), source=source)
+    ]
+
+
 class _Visit:
     """What one call of the command does; `result` is what `--json` prints."""
 
@@ -109,7 +123,7 @@ class _Visit:
                 return self._told(vehicle.unanswered(error))
             flown, refusals = _flown(config)
             evidence = replace(evidence, maneuvers=flown)
-            findings = [*refusals, *run_checks(config, evidence)]
+            findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._told(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, unasked=unasked)
@@ -156,7 +170,7 @@ class _Visit:
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _flown(config)
-        code = self._told([*refusals, *run_checks(config, evidence)])
+        code = self._told([*refusals, *run_checks(config, evidence), *_response(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

@@ -14,12 +14,15 @@ def fly(options: argparse.Namespace) -> int:
     """Fly the vehicle that the configuration names."""
     config = flying.as_told(load(options.config), options)
     folder = flight_folder(config.recording.directory)
-    return _ended(flying.fly(config, folder, _console(options)), options)
+    called = flying.invocation(options)
+    return _ended(flying.fly(config, folder, _console(options), called), options)
 
 
 def demo(options: argparse.Namespace) -> int:
     """Start the bundled vehicle and fly it."""
-    return _ended(flying.fly_bundled(options.config, options, _console(options)), options)
+    called = flying.invocation(options)._replace(config=None)
+    path, console = options.config, _console(options)
+    return _ended(flying.fly_bundled(path, options, console, called=called), options)
 
 
 def _console(options: argparse.Namespace) -> FlightConsole:

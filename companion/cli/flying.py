@@ -2,6 +2,7 @@
 
 import argparse
 import shutil
+import sys
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -20,8 +21,9 @@ from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
+from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
-from companion.recording.report import flight_table
+from companion.recording.report import flight_table, words_text
 from companion.recording.summary import Summary
 
 
@@ -59,8 +61,26 @@ def as_told(config: Config, options: argparse.Namespace, planner: str | None = N
     return told
 
 
-def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
-    """Fly as configured, record it in `folder`, tell it on `console`, table included.
+def invocation(options: argparse.Namespace) -> Invocation:
+    """How this command was called."""
+    program = Path(sys.argv[0])
+    if program.name != "companion":  # `python -m companion`
+        name = f"{sys.executable} -m companion"
+    else:
+        name = "companion" if shutil.which("companion") == str(program) else str(program)
+    return Invocation(name, options.typed, None if options.config is None else str(options.config))
+
+
+def fly(
+    config: Config, folder: Path, console: FlightConsole, called: Invocation | None = None
+) -> Summary:
+    """Fly as configured, record it in `folder`, tell it on `console`, tables and words included.
+
+    Args:
+        config: of the flight.
+        folder: for its files.
+        console: to which it is told.
+        called: for the command that comes next; None: that is said elsewhere.
 
     Raises:
         LinkError: the link could not be opened; nothing was sent.
@@ -81,6 +101,8 @@ def fly(config: Config, folder: Path, console: FlightConsole) -> Summary:
     with suppress(OSError):
         console.print(flight_table(summary))
         console.print(f"Recorded in {folder}", soft_wrap=True)
+        words = closing_words(summary.as_dict(), called)
+        console.print(words_text(words), soft_wrap=True)
     return summary
 
 
@@ -89,6 +111,7 @@ def fly_bundled(
     options: argparse.Namespace,
     console: FlightConsole,
     planner: str | None = None,
+    called: Invocation | None = None,
 ) -> Summary:
     """Start the bundled vehicle that a configuration describes (None: the one that ships), fly it.
 
@@ -106,4 +129,4 @@ def fly_bundled(
         demo.check_mock(path)
         folder = flight_folder(config.recording.directory)
         with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
-            return fly(config, folder, console)
+            return fly(config, folder, console, called)

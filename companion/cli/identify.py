@@ -34,6 +34,7 @@ SHIPPED = Path()
 _MANEUVER = "identify"
 _PLANNER = "first-order"
 """It needs no knowledge of the vehicle: that is what is looked for."""
+_LONGEST_NAME = 200
 _LOG, _FRAGMENT, _CONFIG = "flight.tlog", "vehicle.yaml", "config.yaml"
 
 
@@ -100,7 +101,7 @@ def _fitted(log: Path, out: Path, options: argparse.Namespace, console: FlightCo
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
     known = _known(log)
     try:
-        text = vehicle_fragment(vehicle, GRAVITY, known)
+        text = vehicle_fragment(vehicle, GRAVITY, known, _flight_name(log))
     except BadFitError as error:
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))
@@ -130,6 +131,12 @@ def _known(log: Path) -> dict[str, AxisKeys]:
         return load(log.with_name(_CONFIG)).vehicle.axes
     except ConfigError:  # another program's log, or another version's configuration
         return {}
+
+
+def _flight_name(log: Path) -> str:
+    """The name of a flight's folder, or of a log of another program."""
+    path = log.resolve()
+    return (path.parent.name if path.name == _LOG else path.name)[:_LONGEST_NAME]
 
 
 def _replace(out: Path, text: str) -> None:

@@ -1,16 +1,23 @@
-"""Shows a flight on the terminal: phases, events, and the question at the end."""
+"""Shows a flight on the terminal: phases, events, its state, and the question at the end."""
 
 import asyncio
 import queue
 import sys
 import threading
+import time
 from collections.abc import Callable
+from math import inf
 
 from rich.console import Console
-from rich.status import Status
+
+from companion.cli.live_lines import LiveLines, allowed_time, can_redraw, status_lines
+from companion.flight.status import FlightStatus
 
 _REPEAT = 5.0
-"""Period of the status line where the output is no terminal, s."""
+"""Period of the plain lines where nothing can be redrawn, s."""
+
+_REDRAW = 0.2
+"""Shortest period of redrawing the state, s of wall time: in lockstep a flight is quicker."""
 
 _WAITING = 1000
 """Lines queued for a stalled terminal; further lines are dropped."""
@@ -27,11 +34,13 @@ class _PrintThread:
         self._thread = threading.Thread(target=self._speak, name="terminal", daemon=True)
         self._thread.start()
 
-    def say(self, line: Callable[[], None]) -> None:
+    def say(self, line: Callable[[], None]) -> bool:
+        """Queue a line; false if too many wait."""
         try:
             self._lines.put_nowait(line)
         except queue.Full:
-            return
+            return False
+        return True
 
     def close(self) -> None:
         if self._thread.is_alive():
@@ -72,35 +81,45 @@ class FlightConsole(Console):
 
 
 class TerminalObserver:
-    """Shows a flight: a live status line on a terminal, plain lines elsewhere."""
+    """Shows a flight: on a terminal its state in live lines below the events, elsewhere events."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
         self._printer = _PrintThread()
-        self._status: Status | None = None
+        self._live = LiveLines(console.file) if can_redraw(console.file) else None
+        self._newest: FlightStatus | None = None
+        self._queued = self._asking = False
+        self._drawn = -inf
         self._said = 0.0
 
     def phase(self, name: str, waits_for: str) -> None:
         """Show that a phase began."""
         self._said = 0.0
-        self._printer.say(lambda: self._show_phase(name, waits_for))
+        self._printer.say(lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Show what the phase waits for, and since when."""
-        text = f"{name}: {detail or 'working'} ({elapsed:.0f} of at most {timeout:.0f} s)"
-        if self._console.is_terminal:
-            self._printer.say(lambda: self._show_status(text))
-        elif elapsed - self._said >= _REPEAT:
+        """Say now and then what the phase waits for, and since when; live lines show it anyway."""
+        if self._live is None and elapsed - self._said >= _REPEAT:
             self._said = elapsed
+            text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.say(lambda: self._print(f"           {text}"))
+
+    def status(self, status: FlightStatus) -> None:
+        """Redraw the live lines, if they are old; a stalled terminal gets the newest state only."""
+        self._newest = status
+        now = time.monotonic()
+        if self._live is None or self._asking or self._queued or now - self._drawn < _REDRAW:
+            return
+        self._drawn = now
+        self._queued = self._printer.say(self._draw)
 
     def event(self, time: float, text: str) -> None:
         """Show an event."""
         self._printer.say(lambda: self._print(f"  {time:6.1f} s  {text}"))
 
     def close(self) -> None:
-        """Remove the status line after the last event."""
-        self._printer.say(self._stop_status)
+        """Remove the live lines after the last event."""
+        self._printer.say(self._clear)
         self._printer.close()
 
     async def ask_landing(self) -> bool:
@@ -110,28 +129,34 @@ class TerminalObserver:
                 lambda: self._print("The vehicle holds. Take it over, or command a landing.")
             )
             return False
-        self._printer.say(self._stop_status)
+        self._asking = True
+        self._printer.say(self._clear)
         self._printer.say(
             lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C again leaves) ")
         )
-        return (await read_line()).strip().lower() in ("y", "yes")
+        try:
+            return (await read_line()).strip().lower() in ("y", "yes")
+        finally:
+            self._asking = False
 
-    def _show_phase(self, name: str, waits_for: str) -> None:
-        self._stop_status()
-        self._console.print(f"[bold]{name:<10}[/] waiting for {waits_for}", highlight=False)
-        if self._console.is_terminal:
-            spinner = "line" if self._console.options.ascii_only else "dots"
-            self._status = self._console.status(name, spinner=spinner)
-            self._status.start()
+    def _draw(self) -> None:
+        self._queued = False
+        status = self._newest
+        if self._live is not None and status is not None and not self._asking:
+            self._live.show(status_lines(status), alarm=bool(status.alarms))
 
-    def _show_status(self, text: str) -> None:
-        if self._status is not None:
-            self._status.update(text)
+    def _clear(self) -> None:
+        if self._live is not None:
+            self._live.clear()
 
-    def _stop_status(self) -> None:
-        if self._status is not None:
-            self._status.stop()
-            self._status = None
+    def _print(self, text: str, markup: bool = False) -> None:
+        """Print a line, above the live lines if there are any."""
+        if self._live is None:
+            self._write(text, markup)
+            return
+        with self._console.capture() as captured:
+            self._write(text, markup)
+        self._live.above(captured.get())
 
-    def _print(self, text: str) -> None:
-        self._console.print(text, highlight=False, markup=False, soft_wrap=True)
+    def _write(self, text: str, markup: bool) -> None:
+        self._console.print(text, highlight=False, markup=markup, soft_wrap=True)

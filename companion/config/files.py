@@ -11,7 +11,7 @@ from companion.config import Config
 from companion.config.root import MOST_INCLUDED
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
-from companion.files.yaml_faults import shortened
+from companion.files.yaml_faults import owners, shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
@@ -38,6 +38,7 @@ def load(path: Path) -> Config:
     merged = Contents({}, {})
     _Reading(merged).add_included((path,), own.keys)
     _merge(merged, own)
+    _unmark_times(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
 
@@ -52,6 +53,18 @@ def _read(path: Path) -> Contents:
         if isinstance(name, str) and yaml_file.is_path(name):
             values[key] = str(path.parent / name)
     return contents
+
+
+def _unmark_times(merged: Contents) -> None:
+    """Drop `vehicle.identified` where a key of another file replaces one that was identified."""
+    mark = merged.places.get(("vehicle", "identified"))
+    times = {
+        place.file
+        for where, place in merged.places.items()
+        if where[:1] == ("vehicle",) and len(where) > 1
+    }
+    if mark is not None and times != {mark.file}:
+        merged.keys["vehicle"]["identified"] = None
 
 
 class _Reading:
@@ -165,6 +178,8 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     for text in texts:
         key, equals, value = text.partition("=")
         section, dot, name = key.strip().partition(".")
+        if equals and not dot and (found := owners(section, Config)):
+            raise ConfigError(f"--set {text}: name the section, as in {found}")
         if not (equals and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
         if section not in Config.model_fields:

@@ -46,6 +46,9 @@ class AxisKeys(NamedTuple):
 class VehicleConfig(Section):
     """Response of the vehicle's rate loop, which `model-following` plans with."""
 
+    identified: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """Flight in which `companion identify` measured the times below; it writes this key. null: they
+    are those of another vehicle, or estimated, and the doctor says so."""
     lag_ms: Milliseconds | None = None
     """Time constant of the roll rate after its dead time. For a second-order response it is
     2·damping/frequency."""

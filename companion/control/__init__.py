@@ -1,1 +1,1 @@
-"""The control loop that answers each sample, and the guidance loop that leaves it its targets."""
+"""The control loop answers each attitude sample; the guidance loop sets its targets."""

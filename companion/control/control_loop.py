@@ -1,6 +1,6 @@
 """The path of one sample: attitude in, body rates out, or a named reason why it is unanswered.
 
-Read `ControlLoop` from `on_sample` downwards: the functions stand in the order in which they run.
+Read `ControlLoop` from `on_sample` downwards: its functions are in the order in which they run.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,13 @@ _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHE
 
 @dataclass(frozen=True, slots=True)
 class Deadlines:
-    """When data are too old, and when an answer is too late; all in s."""
+    """When data are too old, and when a setpoint is too late; s.
+
+    Attributes:
+        telemetry_stale: greatest age of a sample that is answered.
+        target_stale: greatest age of a command from guidance.
+        deadline: longest time from a sample's arrival to its setpoint; a longer one is counted.
+    """
 
     telemetry_stale: float
     target_stale: float
@@ -45,21 +51,22 @@ class Deadlines:
 class ControlLoop:
     """Answers each fresh attitude sample with one setpoint; nothing else sends setpoints.
 
-    After a gap in the answers the autopilot may have left offboard, and PX4 would enter it again
-    on our next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop asks for
-    the mode and waits for `resume`.
+    After a gap in the setpoints the autopilot may have left offboard, and PX4 would enter it again
+    on the next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop requests
+    the mode and sends nothing until `resume`.
 
     Attributes:
         command: the newest command, written by guidance; None before the first.
         on: whether samples are answered at all.
-        taking_over: whether offboard was requested, so that the autopilot may obey us any moment.
-        offboard_active: whether the autopilot obeys our setpoints.
-        awaiting_mode: after a gap, until `resume`.
-        resets: estimator resets, hidden from the planner.
+        taking_over: whether offboard was requested and may become active at any moment.
+        offboard_active: whether the autopilot obeys the setpoints.
+        awaiting_mode: whether the loop waits for `resume` after a gap.
+        resets: estimator resets, which the planner does not see.
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
-        ask_mode: called once a gap, when telemetry is back.
-        is_same_vehicle: called at each sample; whether it comes from the checked vehicle.
+        ask_mode: called once after each gap, to request the mode.
+        is_same_vehicle: called at each sample; returns whether it is of the vehicle that was
+            checked before the flight.
     """
 
     def __init__(
@@ -92,7 +99,7 @@ class ControlLoop:
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Answer `sample`, or count why not. The link calls this as the datagram arrives."""
+        """Answer `sample`, or count why not. The link calls this when the datagram arrives."""
         if sample.misfit is None and self.resets.on_attitude(sample):
             self.planner.restart()
         record = self.record
@@ -121,7 +128,7 @@ class ControlLoop:
             record.unanswered[reason] += 1
 
     def _after_gap(self, now: float) -> bool:
-        """Whether a gap needs the mode confirmed before we answer; asks for the mode once."""
+        """Whether the mode must be confirmed because of a gap; request the mode once a gap."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_from
@@ -134,7 +141,7 @@ class ControlLoop:
     def _send_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, period: float
     ) -> Unanswered | None:
-        """Send the answer to a sample; returns why it could not be sent, or None."""
+        """Send the setpoint for a sample; return why it could not be sent, or None."""
         try:
             rates, thrust = self._answer(sample, command, period)
             # This process may have been stopped since the sample came.
@@ -155,11 +162,11 @@ class ControlLoop:
         """Body rates and thrust for a sample.
 
         Raises:
-            AttitudeError: the attitude or the target has no answer.
+            AttitudeError: the attitude or the target cannot be used.
         """
         if command.idle:
             return BodyRates(0.0, 0.0, 0.0), 0.0
-        # Checked here, because rates from guidance bypass the planner and thrust does not check.
+        # Checked here, because body rates from guidance bypass the planner's own check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
         thrust = (
@@ -170,7 +177,7 @@ class ControlLoop:
         return self._rates(sample, command, period), thrust
 
     def _rates(self, sample: AttitudeSample, command: GuidanceCommand, period: float) -> BodyRates:
-        """The planner's answer, or the body rates from guidance within the same limits."""
+        """The body rates of the planner, or those of guidance within the same limits."""
         if command.body_rates is None:
             target = command.target_at(sample.received - sample.age)
             return self.planner.rates(sample, self.resets.target(target, command.turn), period)
@@ -184,10 +191,10 @@ class ControlLoop:
         rates: BodyRates,
         thrust: float,
     ) -> None:
-        """Count and record a setpoint that has left."""
+        """Count and record a setpoint that was sent."""
         record, deadlines = self.record, self._deadlines
         record.note_answer(sample.received, thrust, deadlines.telemetry_stale)
-        latency = self._clock_ns() - sample.received_ns
+        latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
         if self.offboard_active:
@@ -204,6 +211,6 @@ class ControlLoop:
             self._trace.add_response(sample.vehicle_time, sample.q, command.target)
 
     def resume(self) -> None:
-        """Answer again after a gap: the autopilot confirmed offboard."""
+        """Answer again after a gap, because the autopilot has confirmed offboard."""
         self.awaiting_mode = False
         self.record.gap_from = inf

@@ -1,21 +1,22 @@
 """Resets of the autopilot's estimator: the estimate jumps while the vehicle does not move.
 
-A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets
-position and heading when it rejects them, and counts resets in ODOMETRY's `reset_counter`, which
-comes later and has no size. Guidance and control work in a frame without these jumps:
+A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets its
+position or heading when it has rejected their measurements for a while. It counts resets in
+ODOMETRY's `reset_counter`, which comes later and does not tell their size. Guidance and control
+work in a frame without these jumps:
 
 - All position jumps are subtracted from a position.
 - Poses, references and targets have headings without jumps. An attitude is turned back by all
-  heading jumps before its heading is compared with them.
+  heading jumps before its heading is compared with these headings.
 
-Horizontal accelerations stay in the estimator's frame, in which position is measured: they profit
-from a corrected heading at once.
+Horizontal accelerations stay in the estimator's frame, in which position is measured, so a
+corrected heading improves them at once.
 """
 
 from collections import deque
 from math import asin, atan2, cos, hypot, radians, sin, sqrt
 
-from companion.attitude import BodyRates, Quaternion, Target, is_unit
+from companion.attitude import Quaternion, Target, is_unit
 from companion.attitude.rotation import short_way, turned
 from companion.guidance.reference import Vector, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -23,15 +24,15 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 _LONGEST = 0.1
 """Attitudes further apart than this are not compared, s: the rates between them are unknown."""
 _ANGLE = radians(4.0)
-"""Smaller attitude jumps are not separated from noise; the controller follows them, rad."""
+"""Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _DISTANCE = 0.2
-"""Smaller position jumps are not separated from noise, m."""
+"""Smallest position jump that is recognised, m; smaller ones count as noise."""
 _LONGEST_POSITIONS = 0.5
 """Positions further apart than this are not compared, s."""
 _ACCELERATION_CHANGE = 10.0
 """Largest change of the acceleration between two positions, m/s²."""
 _ONE_RESET = 0.5
-"""Jumps within this time belong to one reset, s; the counter comes at 10 Hz."""
+"""Jumps within this time count as one reset, s; ODOMETRY comes at 10 Hz."""
 
 
 class EstimatorResets:
@@ -42,7 +43,7 @@ class EstimatorResets:
         shift: sum of the position jumps, m NED.
         largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
-        times: times of the latest resets, s on our clock.
+        times: when the latest resets were found, s of event-loop time.
     """
 
     def __init__(self) -> None:
@@ -55,7 +56,7 @@ class EstimatorResets:
         self._counter: int | None = None
 
     def on_attitude(self, sample: AttitudeSample) -> bool:
-        """Compare a newer sample with the last one; returns whether the thrust axis jumped."""
+        """Compare a newer sample with the last one; return whether the thrust axis jumped."""
         if not is_unit(sample.q):
             return False
         before, self.newest = self.newest, sample
@@ -70,7 +71,7 @@ class EstimatorResets:
             self.turn = short_way(self.turn + yaw)
         elif not jumped:
             return False
-        self._count(sample.received)
+        self._count_reset(sample.received)
         self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
         return jumped
 
@@ -79,16 +80,16 @@ class EstimatorResets:
         before, self._raw = self._raw, position
         if before is not None:
             self._find_position_jump(before, position)
-        return position._replace(position_ned=_less(position.position_ned, self.shift))
+        return position._replace(position_ned=_difference(position.position_ned, self.shift))
 
     def forget(self) -> None:
-        """Start the frame without jumps at the present estimate, as on the ground."""
+        """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
         self.turn, self.shift, self._raw = 0.0, (0.0, 0.0, 0.0), None
 
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
         if counter is not None and self._counter not in (None, counter):
-            self._count(now)
+            self._count_reset(now)
         self._counter = counter
 
     def attitude(self, q: Quaternion) -> Quaternion:
@@ -123,9 +124,9 @@ class EstimatorResets:
         if hypot(*jump) > _DISTANCE + _ACCELERATION_CHANGE * dt * dt / 8.0:
             north, east, down = self.shift
             self.shift = (north + jump[0], east + jump[1], down + jump[2])
-            self._count(position.received)
+            self._count_reset(position.received)
 
-    def _count(self, now: float) -> None:
+    def _count_reset(self, now: float) -> None:
         if not self.times or now - self.times[-1] > _ONE_RESET:
             self.times.append(now)
 
@@ -134,8 +135,9 @@ def _attitude_jump(
     before: AttitudeSample, now: AttitudeSample, dt: float
 ) -> tuple[float, float, float]:
     """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
-    old, new = before.body_rates, now.body_rates
-    mean = BodyRates(*(0.5 * (a + b) for a, b in zip(old, new, strict=True)))
+    p, q, r = before.body_rates
+    new_p, new_q, new_r = now.body_rates
+    mean = 0.5 * (p + new_p), 0.5 * (q + new_q), 0.5 * (r + new_r)
     w, x, y, z = turned(before.q, mean, dt)
     a, b, c, d = now.q
     # now ⊗ predicted⁻¹: the unexplained rotation, about world axes.
@@ -145,9 +147,9 @@ def _attitude_jump(
     r_z = -a * z - b * y + c * x + d * w
     yaw = short_way(2.0 * atan2(r_z, r_w))
     tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
-    change = sqrt(sum((p - q) ** 2 for p, q in zip(new, old, strict=True)))
+    change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
     return yaw, tilt, _ANGLE + 0.5 * change * dt
 
 
-def _less(left: Vector, right: Vector) -> Vector:
+def _difference(left: Vector, right: Vector) -> Vector:
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]

@@ -1,4 +1,4 @@
-"""What guidance flies now: no reference, a held pose, or a source of references."""
+"""What guidance flies now: nothing, a held pose, or a source of references."""
 
 from math import dist
 
@@ -9,7 +9,7 @@ from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 
 _REJOINED = 1.0
-"""Closer than this to its reference, a vehicle is back from open-loop commands, m."""
+"""After open-loop commands, the vehicle has returned when it is this close to its reference, m."""
 
 
 class FlownSource:
@@ -17,8 +17,8 @@ class FlownSource:
 
     Attributes:
         pose: the held pose, or the one from which the source began; None: no reference.
-        source: of the references, or None.
-        begun_at: when the source began, s on our clock, or None.
+        source: the source of references, or None.
+        begun_at: when the source began, s of event-loop time, or None.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class FlownSource:
         self.pose, self.source, self.begun_at = None, None, None
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
-        """Fly `source` from `pose`; `now` in s on our clock."""
+        """Fly `source` from `pose`; `now` in s of event-loop time."""
         source.begin(now, pose)
         self.pose, self.source, self.begun_at = pose, source, now
 
@@ -41,12 +41,14 @@ class FlownSource:
         return self.source is not None and self.source.finished(now)
 
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
-        """The reference as a function of our clock; without a pose, where the vehicle is.
+        """The reference as a function of event-loop time (s).
+
+        Without a source and a pose it is the present place of the vehicle.
 
         Args:
-            now: s on our clock.
-            motion: of the vehicle now.
-            heading: of the vehicle now, rad.
+            now: s of event-loop time.
+            motion: present motion of the vehicle.
+            heading: present heading of the vehicle, rad.
         """
         pose, source = self.pose, self.source
         if source is not None:
@@ -62,7 +64,7 @@ class FlownSource:
         """The trajectory that is followed now, or None.
 
         Args:
-            now: s on our clock.
+            now: s of event-loop time.
             turn: sum of the heading resets, rad.
         """
         source = self.source
@@ -74,7 +76,7 @@ class FlownSource:
         return Following(part, elapsed, self.pose, turn)
 
     def steers_by_rates(self, now: float, motion: VehicleMotion) -> str | None:
-        """The source's name while it commands body rates in open loop, or None."""
+        """Name of the source if it commands body rates in open loop at `now`; else None."""
         if self.source is None:
             return None
         reference = self.source.reference(now, motion)(now)
@@ -83,9 +85,9 @@ class FlownSource:
     def tracking_error(self, reference: Reference, motion: VehicleMotion) -> float | None:
         """Distance from the reference, m.
 
-        None without a pose, in open loop, and on the way back from open loop.
+        It is None without a pose, in open loop, and while the vehicle returns from open loop.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         returning = self._off_reference and distance > _REJOINED
-        self._off_reference = not reference.position_is_meant or returning
+        self._off_reference = not reference.holds_position or returning
         return None if self.pose is None or self._off_reference else distance

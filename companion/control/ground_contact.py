@@ -1,11 +1,11 @@
-"""Whether the vehicle stands on the ground, judged by more than the autopilot's flag."""
+"""Whether the vehicle stands on the ground, by more signs than the autopilot's landed flag."""
 
 from collections.abc import Callable
 
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
 _STILL = 0.5
-"""Largest vertical speed estimated while the vehicle stands, m/s."""
+"""Largest estimated vertical speed of a vehicle on the ground, m/s."""
 _LIFTED = 1.0
 """A vehicle that climbed higher since the take-off command has left the ground, m."""
 _SPEED_LASTS = 0.5
@@ -15,18 +15,18 @@ _SETTLED = 0.5
 
 
 class GroundContact:
-    """Compares EXTENDED_SYS_STATE with height, vertical speed and our own commands.
+    """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and commands sent.
 
     One wrong "on ground" in flight must not stop the motors. A vehicle whose flag and height
     disagree counts neither as standing nor as flying.
 
+    Args:
+        state: the vehicle's telemetry.
+        clock: returns event-loop time, s.
+
     Attributes:
         takeoff_commanded: whether a take-off was commanded in this flight; after that no setpoint
             may be idle.
-
-    Args:
-        state: the vehicle's telemetry.
-        clock: ours, s.
     """
 
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:
@@ -42,7 +42,7 @@ class GroundContact:
         self._start_height = self._state.height
 
     def note_flying(self) -> None:
-        """Note that the vehicle flies already, by another's take-off."""
+        """Note that the vehicle already flies: this program did not command the take-off."""
         self.takeoff_commanded = self._left = True
 
     def update(self) -> None:
@@ -57,7 +57,7 @@ class GroundContact:
 
     @property
     def may_idle(self) -> bool:
-        """Whether zero thrust is safe: it stands by all signs and no take-off was commanded."""
+        """Whether zero thrust is safe: on the ground by all signs, and no take-off commanded."""
         return self.standing and not self.takeoff_commanded and self._plausible()
 
     @property
@@ -68,7 +68,7 @@ class GroundContact:
 
     @property
     def touched_down(self) -> bool:
-        """Whether it has landed: the flag is set for a while and the vertical speed is small."""
+        """Whether it has landed: the flag is set for 0.5 s and the vertical speed is small."""
         since = self._landed_since
         if not self._state.landed or since is None or self._clock() - since < _SETTLED:
             return False
@@ -84,7 +84,7 @@ class GroundContact:
         return height is not None and start is not None and height - start > _LIFTED
 
     def _vertical_speed(self) -> float:
-        """Vertical speed downwards, m/s; 0 where it is not received any more."""
+        """Vertical speed, positive down, m/s; 0 if it is not received any more."""
         position = self._state.position
         if position is None or self._clock() - position.received > _SPEED_LASTS:
             return 0.0

@@ -1,4 +1,4 @@
-"""The command that guidance leaves for the control loop."""
+"""The command that guidance gives to the control loop."""
 
 from typing import NamedTuple
 
@@ -10,17 +10,19 @@ class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one.
 
     Attributes:
-        target: for the planner; its heading is in the frame without resets (`EstimatorResets`).
+        target: target of the planner; its heading is in the frame without estimator resets.
         acceleration_down: wanted vertical acceleration, m/s².
-        made_at: when guidance made the command, s on our clock.
+        made_at: when guidance made the command, s of event-loop time.
         idle: zero rates and zero thrust, on the ground.
         is_step: whether this is an open-loop step whose response is measured.
-        body_rates: sent within the limits instead of the planner's answer, rad/s; None: plan.
-        thrust: sent within the limits instead of the thrust for `acceleration_down`, 0..1, or None.
+        body_rates: body rates to send, within the limits, instead of the planner's, rad/s; None:
+            the planner's are sent.
+        thrust: thrust to send, within the limits, instead of that for `acceleration_down`, 0..1;
+            None: that for `acceleration_down` is sent.
         turn: sum of the heading resets when the command was made, rad.
-        later: the target `period` after `made_at`. The target moves there on a straight line and
-            then stays. None: `target` stays.
-        period: of the guidance loop, s.
+        later: the target `period` after `made_at`; the target moves there on a straight line and
+            then stays. None: the target is constant.
+        period: period of the guidance loop, s.
     """
 
     target: Target
@@ -35,7 +37,7 @@ class GuidanceCommand(NamedTuple):
     period: float = 0.0
 
     def target_at(self, time: float) -> Target:
-        """The target at `time`, s on our clock: `target`, `later`, or interpolated between them."""
+        """The target at `time`, s of event-loop time, interpolated from `target` to `later`."""
         before, after, elapsed = self.target, self.later, time - self.made_at
         if after is None or not elapsed > 0.0:
             return before

@@ -1,7 +1,7 @@
-"""The guidance loop: a timer that makes a fresh command from the newest position."""
+"""The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees, nan
+from math import degrees
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -13,11 +13,11 @@ from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.control.ticker import Ticker
+from companion.control.tracking_record import TrackingRecord
 from companion.guidance import (
     GRAVITY,
     GuidanceInput,
     HoverThrust,
-    LinearCommand,
     Pose,
     Reference,
     VehicleMotion,
@@ -41,15 +41,17 @@ class GuidanceLoop:
     references are in the frame without estimator resets, so no reset moves the vehicle.
 
     Attributes:
-        flown: the held pose and the source flown from it.
+        flown: the held pose and the source that is flown from it.
         given_up: why the source was given up, or None.
         bound_to_hold: whether no source may be flown any more; set by `give_up`.
-        motion: of the vehicle at the last step, without resets, or None.
+        motion: motion of the vehicle at the last step, without resets, or None.
         off_course: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
-        predictive: flies trajectories instead of linear guidance, or None.
-        estimate: of the motion.
-        learning: of the hover thrust.
+        predictive: predictive control, which flies trajectories instead of linear guidance, or
+            None.
+        estimate: estimates the motion.
+        learning: learns the hover thrust.
+        record: records how the reference is tracked.
     """
 
     def __init__(
@@ -80,7 +82,7 @@ class GuidanceLoop:
         self._guidance = guidance
         self._state = state
         self._ground = ground
-        self._trace = trace
+        self.record = TrackingRecord(trace, self.flown)
         self._max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
@@ -96,10 +98,7 @@ class GuidanceLoop:
             self.estimate.note_attitude(sample)
 
     def fresh_position(self) -> LocalPosition | None:
-        """The newest position, or None if it is stale by our clock or by the vehicle's.
-
-        By our clock, nothing came since; by the vehicle's clock, the position was delayed.
-        """
+        """The newest position, or None if it arrived, or was measured, too long ago."""
         position, now = self._state.position, self._clock()
         if position is None or now - position.received > self._position_stale:
             return None
@@ -114,14 +113,14 @@ class GuidanceLoop:
         """Hold the present position and heading.
 
         Raises:
-            RuntimeError: no position came yet.
+            RuntimeError: no position has come yet.
         """
         self.stand_by()
         position_ned = self._guidance_input(self._clock()).now.position_ned
         self.flown.pose = Pose(position_ned, self._heading())
 
     def hold_reference(self) -> None:
-        """Hold the pose of the present reference, in which a maneuver has ended."""
+        """Hold the pose of the present reference, at which a maneuver has ended."""
         now = self._clock()
         reference = self.flown.reference(now, self.motion_now(), self._heading())(now)
         self.stand_by()
@@ -147,25 +146,25 @@ class GuidanceLoop:
         return self.flown.finished(self._clock())
 
     async def run(self) -> None:
-        """Make commands until cancelled; missed steps are not made up for."""
+        """Make commands until cancelled; missed steps are not repeated."""
         while True:
             self.step()
             await self._ticker.tick()
 
     def step_soon(self) -> None:
-        """Make the next command at once: the source has a new reference."""
+        """Make the next command at once, because the source has a new reference."""
         self._ticker.soon()
 
     def motion_now(self) -> VehicleMotion:
-        """The estimated motion now, in the frame without resets.
+        """The estimated motion now, in the frame without estimator resets.
 
         Raises:
-            RuntimeError: no position came yet.
+            RuntimeError: no position has come yet.
         """
         return self._guidance_input(self._clock()).now
 
     def attitude(self) -> Quaternion:
-        """The newest attitude, in the frame without resets."""
+        """The newest attitude, in the frame without estimator resets."""
         return self._loop.resets.attitude(self._q)
 
     def step(self) -> None:
@@ -175,7 +174,8 @@ class GuidanceLoop:
         if position is None:
             self.learning.pause()
             return
-        # Under our control the safety monitors judge a landed flag: zero thrust would make it true.
+        # While offboard is active, a landed flag must not lead to zero thrust, which would make it
+        # true; the safety monitors judge it.
         standing = self._ground.standing and not self._loop.offboard_active
         if standing:
             self.learning.on_ground()
@@ -200,15 +200,19 @@ class GuidanceLoop:
             )
         if self._loop.offboard_active:
             measured_at = self.estimate.vehicle_time(now, position)
-            self._record_tracking(measured_at, reference, inputs.now)
+            self.record.add(now, measured_at, reference, inputs.now)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
-        """Write the command for `now`; returns the reference from which it was made."""
+        """Write the command for `now`; return the reference from which it was made."""
         reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
         linear = self._guidance.command(reference_at, now, inputs)
-        target, later, down = self._predicted(now, linear, inputs)
-        # Open-loop steps, predictive control and the lead do not know the learned thrust limit.
+        if self.predictive is not None:
+            turn = self._loop.resets.turn
+            vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
+            linear = self.predictive.instead_of(linear, turn, vehicle, following)
+        target, later, down = linear
+        # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self.learning.limit_tilt(each, down) for each in (target, later))
         self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
         self._loop.command = GuidanceCommand(
@@ -227,25 +231,6 @@ class GuidanceLoop:
     def _heading(self) -> float:
         return heading(self.attitude())
 
-    def _predicted(self, now: float, linear: LinearCommand, inputs: GuidanceInput) -> LinearCommand:
-        """The command of predictive control while it flies, else `linear`.
-
-        Its headings are in the autopilot's frame, resets included. Its target stays constant for a
-        period, which its model accounts for.
-        """
-        if self.predictive is None:
-            return linear
-        turn = self._loop.resets.turn
-        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
-        vehicle = self.estimate.vehicle(now, inputs)
-        target, down = chosen = self.predictive.command(
-            own, vehicle, self.flown.following(now, turn)
-        )
-        if chosen is own:
-            return linear
-        target = target._replace(heading=target.heading - turn)
-        return LinearCommand(target, target, down)
-
     def _guidance_input(self, now: float) -> GuidanceInput:
         return self.estimate.guidance_input(
             now, self._guidance.acts_after, self.learning.thrust_limits
@@ -263,13 +248,3 @@ class GuidanceLoop:
         limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.hold_here()
-
-    def _record_tracking(
-        self, vehicle_time: float, reference: Reference, motion: VehicleMotion
-    ) -> None:
-        north, east, down = reference.position_ned
-        if not reference.position_is_meant:
-            north = east = nan  # only the height is a reference in open loop
-        if not reference.holds_height:
-            down = nan
-        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

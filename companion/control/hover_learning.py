@@ -9,20 +9,20 @@ from companion.guidance.thrust import largest_tilt
 from companion.vehicle.state import VehicleState
 
 _CLEAR = 1.0
-"""Above this height over home there is neither ground contact nor ground effect, m."""
+"""Height above home from which there is neither ground contact nor ground effect, m."""
 
 _THRUST_STALE = 0.3
-"""An older ATTITUDE_TARGET does not tell the present thrust, s; it is sent at 10 Hz."""
+"""An older ATTITUDE_TARGET does not give the present thrust, s; it comes at 10 Hz."""
 
 _MISMATCH = 0.15
 """A larger relative error of the configured hover thrust is reported."""
 
 
 class HoverLearning:
-    """Feeds the hover-thrust estimate with telemetry, before and during our control.
+    """Passes telemetry to the hover-thrust estimate, before and during offboard control.
 
-    While the autopilot climbs and holds by itself, ATTITUDE_TARGET reports its thrust. So a wrong
-    configured hover thrust is corrected before the takeover. After our control nothing is learned.
+    Before offboard control ATTITUDE_TARGET reports the autopilot's thrust, so a wrong configured
+    hover thrust is corrected before the takeover. After offboard control nothing is learned.
     """
 
     def __init__(self, hover_thrust: HoverThrust, state: VehicleState) -> None:
@@ -62,10 +62,10 @@ class HoverLearning:
         """Learn from the newest telemetry.
 
         Args:
-            now: s on our clock.
+            now: s of event-loop time.
             q: newest attitude.
-            offboard_active: whether the autopilot obeys our setpoints.
-            steady: whether our thrust is steady; the rotors lag behind a changing one.
+            offboard_active: whether the autopilot obeys the setpoints.
+            steady: whether the commanded thrust is steady; the rotors lag behind a changing one.
         """
         battery, position = self._state.battery, self._state.position
         if battery is not None:
@@ -82,7 +82,7 @@ class HoverLearning:
             self._hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
-        """The advice to set thrust.hover_thrust, where the learned one differs; else None."""
+        """Advice to change thrust.hover_thrust if the learned one differs from it; else None."""
         configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
         if not self._had_control or abs(learned - configured) <= _MISMATCH * configured:
             return None
@@ -93,10 +93,10 @@ class HoverLearning:
 
     def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
         """Note the autopilot's own thrust; False if it is unknown or the vehicle does not fly."""
-        told, height = self._state.attitude_target_thrust, self._state.height
-        if told is None or now - told.received > _THRUST_STALE:
+        target, height = self._state.attitude_target_thrust, self._state.height
+        if target is None or now - target.received > _THRUST_STALE:
             return False
         if not self._state.armed or height is None or height < _CLEAR:
             return False
-        self._hover_thrust.sent(told.thrust, q)
+        self._hover_thrust.sent(target.thrust, q)
         return True

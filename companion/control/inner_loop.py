@@ -1,4 +1,4 @@
-"""The inner loop from the configuration: planner, limits, thrust map, vehicle response."""
+"""Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettin
 
 
 def planner(config: Config) -> Planner:
-    """The planner with its limits, and with the vehicle's response if it plans with that.
+    """The configured planner with its limits; `model-following` gets the vehicle's response too.
 
     Raises:
         ConfigError: the planner of another package cannot be loaded.
@@ -56,7 +56,7 @@ def rate_limits(config: Config) -> Limits:
 
 
 def hover_thrust(config: Config) -> HoverThrust:
-    """The map from specific thrust to normalised thrust, 0..1."""
+    """The conversion of specific thrust to normalised thrust, 0..1."""
     thrust = config.thrust
     return HoverThrust(
         ThrustSettings(
@@ -90,9 +90,9 @@ def tilt_response(config: Config) -> InnerResponse:
 
 
 def slower_tilt(config: Config) -> tuple[float, float]:
-    """Lag and dead time of the slower of roll and pitch, s; 0 where unknown.
+    """Lag and dead time of the slower of roll and pitch, s; 0 if unknown.
 
-    The quicker axis waits for the slower one, so the coefficients respond like this.
+    The quicker axis is delayed to match the slower one, so the coefficients respond like this.
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]

@@ -1,4 +1,4 @@
-"""The control loop's record: its counters, its latest times, and why samples are unanswered."""
+"""The record of the control loop: counters, latest times, and why samples are unanswered."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from companion.vehicle.held_rates import HeldRates
 from companion.vehicle.records import AttitudeSample
 
 _KEPT_GAPS = 32
-"""Number of latest gaps that are kept; far fewer end a flight."""
+"""Number of latest gaps that are kept; far fewer gaps already end a flight."""
 
 
 class Unanswered(Enum):
@@ -28,12 +28,15 @@ class Unanswered(Enum):
 
     @property
     def words(self) -> str:
-        """The fault in words, for messages while it lasts."""
+        """The reason in words, for messages."""
         return _WORDS[self]
 
     @property
     def is_refusal(self) -> bool:
-        """Whether the sample was fresh but had no valid answer; otherwise the data were stale."""
+        """Whether the data were fresh, but no valid setpoint could be computed or sent.
+
+        Otherwise the data were stale or out of order.
+        """
         return self in _REFUSALS
 
 
@@ -61,7 +64,7 @@ _REFUSALS = {
 
 @dataclass(slots=True)
 class LoopRecord:
-    """Counters since the loop was made, and latest times in s on our clock.
+    """Counters since the loop was made, and latest times in s of event-loop time.
 
     Attributes:
         samples: samples received while the loop was on.
@@ -69,14 +72,15 @@ class LoopRecord:
         missed_deadlines: setpoints sent later than `Deadlines.deadline` after their sample.
         unanswered: unanswered samples, by reason.
         reason: why the newest sample is unanswered, or None.
-        thrust: as last sent, 0..1.
+        latency_ns: time from the arrival of the last answered sample to its setpoint, ns.
+        thrust: thrust last sent, 0..1.
         last_sample: when the newest sample arrived.
         last_vehicle_time: vehicle time of the newest usable sample, s.
         last_answer: arrival time of the newest sample that was answered.
         gap_from: `last_answer`, or inf before the first answer and after a confirmed gap.
-        gaps: when the latest gaps ended. A gap is longer than `Deadlines.telemetry_stale` without
-            an answer while the autopilot may obey us.
-        held: how long each setpoint was in force until the next one; gaps are left out.
+        gaps: when the latest gaps ended. A gap is a time longer than `Deadlines.telemetry_stale`
+            without a setpoint, while offboard is active or requested.
+        held: how long each setpoint was held until the next one; gaps are left out.
     """
 
     samples: int = 0
@@ -84,6 +88,7 @@ class LoopRecord:
     missed_deadlines: int = 0
     unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
     reason: Unanswered | None = None
+    latency_ns: int = 0
     thrust: float = 0.0
     last_sample: float = -inf
     last_vehicle_time: float = -inf
@@ -93,7 +98,7 @@ class LoopRecord:
     held: HeldRates = field(default_factory=HeldRates)
 
     def note_arrival(self, sample: AttitudeSample) -> float:
-        """Note an arrived sample; returns the vehicle time since the last usable one, s."""
+        """Note an arrived sample; return the vehicle time since the last usable one, s."""
         self.last_sample = sample.received
         period = sample.vehicle_time - self.last_vehicle_time
         if sample.misfit is None:
@@ -101,12 +106,12 @@ class LoopRecord:
         return period
 
     def note_answer(self, received: float, thrust: float, telemetry_stale: float) -> None:
-        """Note that a setpoint left.
+        """Note that a setpoint was sent.
 
         Args:
-            received: when its sample arrived, s on our clock.
-            thrust: as sent, 0..1.
-            telemetry_stale: a longer interval is a gap, s.
+            received: when its sample arrived, s of event-loop time.
+            thrust: thrust of the setpoint, 0..1.
+            telemetry_stale: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
         self.thrust = thrust
@@ -117,10 +122,10 @@ class LoopRecord:
 
     @property
     def stale(self) -> int:
-        """Unanswered samples that were, or whose target was, too old or out of order."""
+        """Number of unanswered samples because sample or command was too old or out of order."""
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property
     def refused(self) -> int:
-        """Unanswered samples that had no valid answer, or whose answer could not be sent."""
+        """Number of unanswered samples because no valid setpoint could be computed or sent."""
         return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)

@@ -12,9 +12,9 @@ from companion.nmpc import Vehicle
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COSINE = 0.2
-"""Lower limit for the cosine of the tilt: beyond 78° the thrust does not hold the height."""
+"""Lower limit of the cosine of the tilt (78°), so that the slope of the thrust stays bounded."""
 _LONGEST = 0.2
-"""Positions further apart than this do not give the acceleration between them, s."""
+"""From positions further apart than this, no acceleration is computed, s."""
 _MISMATCH = 0.15
 """A larger error of the assumed drag is reported, 1/s."""
 
@@ -22,16 +22,16 @@ _MISMATCH = 0.15
 class MotionEstimate:
     """Feeds the motion observer on the vehicle's clock, and predicts the motion.
 
+    Args:
+        observer: estimates position, velocity and disturbance.
+        correction: corrects the measured positions.
+        drag: estimates the drag.
+        offset: returns vehicle time minus event-loop time, s, or None before the first attitude;
+            gives the age of a position.
+
     Attributes:
         vertical: upward part of the commanded specific thrust, m/s².
         drag: the drag estimate.
-
-    Args:
-        observer: of position, velocity and disturbance.
-        correction: of the measured positions.
-        drag: of the vehicle.
-        offset: returns the vehicle's clock minus ours, s, or None before the first attitude. It
-            tells how old a position was when it arrived.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class MotionEstimate:
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
     def turn_to(self, turn: float) -> None:
-        """Take the sum of the heading resets, rad; a new one discards the attitudes before it."""
+        """Take the sum of the heading resets, rad; a new reset discards the earlier attitudes."""
         if turn != self._turn:
             self._observer.turn(turn - self._turn)
             self._slopes.forget()
@@ -68,9 +68,9 @@ class MotionEstimate:
             self._turn = turn
 
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
-        """Take a measured position and velocity; the same one twice counts once.
+        """Take a measured position and velocity; a repeated one is ignored.
 
-        Drag is learned only while the autopilot obeys us, because only then we know the thrust.
+        Drag is learned only while offboard is active, because only then the thrust is known.
         """
         before, self._position = self._position, position
         if before is not None and position.vehicle_time == before.vehicle_time:
@@ -91,12 +91,12 @@ class MotionEstimate:
         """The motion at `now` and `ahead` seconds later, with thrust, disturbance and drag.
 
         Args:
-            now: s on our clock.
+            now: s of event-loop time.
             ahead: prediction time, s.
             thrust_limits: smallest and largest available specific thrust, m/s².
 
         Raises:
-            RuntimeError: no position came yet.
+            RuntimeError: no position has come yet.
         """
         if self._position is None:
             raise RuntimeError("guidance was asked to hold before any position came")
@@ -112,7 +112,7 @@ class MotionEstimate:
         return GuidanceInput(motion, later, thrust, disturbance, drag, thrust_limits)
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """`inputs` with attitude and rates, for predictive control; `now` is s on our clock."""
+        """`inputs` with attitude and rates at `now`, s of event-loop time."""
         return Vehicle(
             now,
             inputs.now.position_ned,
@@ -124,19 +124,19 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """`now` (s on our clock) on the vehicle's clock, s."""
+        """`now` (s of event-loop time) on the vehicle's clock, s."""
         offset = self._offset()
         return now + (position.vehicle_time - position.received if offset is None else offset)
 
     def mismatch_warning(self) -> str | None:
-        """The advice to set the drag keys, where the learned drag differs; else None."""
-        told, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
-        off = learned.per_velocity(speed) - told.per_velocity(speed)
-        if not self.drag.certain or abs(off) <= _MISMATCH:
+        """Advice to change the drag keys if the learned drag differs from them; else None."""
+        assumed, learned, speed = self.drag.first, self.drag.drag, self.drag.top_speed
+        error = learned.per_velocity(speed) - assumed.per_velocity(speed)
+        if not self.drag.certain or abs(error) <= _MISMATCH:
             return None
         return (
             f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, but "
-            f"{told.per_velocity(speed):.2f} was assumed; set guidance.drag_per_s to "
+            f"{assumed.per_velocity(speed):.2f} was assumed; set guidance.drag_per_s to "
             f"{learned.linear:.2f} and guidance.quadratic_drag_per_m to {learned.quadratic:.3f}"
         )
 
@@ -146,7 +146,7 @@ class MotionEstimate:
             return
         old, new = before.velocity_ned, now.velocity_ned
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
-        # By the measured acceleration: the thrust that was there, not the commanded one.
+        # The measured acceleration gives the actual thrust, which differs from the commanded one.
         vertical = GRAVITY - down
         self.drag.observe(
             dt,

@@ -1,4 +1,4 @@
-"""The outer loop from the configuration: guidance, motion estimate and predictive control."""
+"""Builds the outer loop from the configuration: guidance, motion estimate, predictive control."""
 
 from collections.abc import Callable
 from math import tan
@@ -30,50 +30,53 @@ from companion.guidance import (
     Weights,
     chain_gains,
 )
+from companion.guidance.feedback import ChainGains
 from companion.guidance.follow import Follow
 from companion.guidance.linear import Guidance
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.nmpc import Settings, Solver
 
 _CALM = Weights(position=1.0, velocity=1.5)
-"""Weights of the hold between doublets: its own commands must not disturb the identification."""
+"""Low weights of the hold between doublets, so that its commands do not disturb `identify`."""
 _CALM_BANDWIDTH = 1.0
-"""Disturbance bandwidth of the same hold, rad/s."""
+"""Bandwidth of the disturbance estimate of that hold, rad/s."""
 _LOCKSTEP_DEADLINE = 1.0
 """Deadline of the solver in lockstep, where the vehicle waits, s of wall time."""
 _USUAL_RATE_LOOP = 0.12
-"""Lag and dead time of a heavy vehicle's rate loop, used where no response is identified, s."""
+"""Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _QUICK, _SLOW = 0.065, 0.08
-"""Dead time plus half the lag: up to _QUICK the hold is stiffer, from _SLOW on it is not, s."""
+"""Range of dead time plus half the lag over which the hold changes from stiff to normal, s."""
 _POSITION_TIME = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
-"""Gain from the position error to the velocity behind a slow and a quick rate loop, 1/s. Velocities
-of real estimators are off by 0.05 m/s for seconds (measured on PX4 and ArduPilot against truth)."""
+"""Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
+is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
 _CORRECTS_WITHIN = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_WINDOW = 0.1
-"""These corrections are averaged twice over this time, s."""
+"""Time constant of the two low-pass filters on the position correction, s."""
 _LARGEST_CORRECTION = 0.2
-"""Largest outstanding correction used, m: the noise of a bad GPS must not move the vehicle."""
+"""Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
 
 
 def hold_weights(config: Config) -> Weights:
-    """The weights of the hold; those not configured follow from the delay T of the attitude.
+    """The weights of the position hold; those not configured follow from the delay T.
+
+    T is the delay of the attitude behind its target (`attitude_delay`).
 
     The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
-    position weight. `tests/control/test_margins.py` shows the margins against errors of T and of
-    the thrust.
+    position weight. `tests/control/test_margins.py` checks the stability margins against errors of
+    T and of the thrust.
     """
-    guidance, delay = config.guidance, hold_delay(config)
+    guidance, delay = config.guidance, attitude_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
     return Weights(
-        (1.0 + _quickness(config)) / delay**4 if position is None else position,
+        (1.0 + _rate_loop_quickness(config)) / delay**4 if position is None else position,
         1.0 / delay**2 if velocity is None else velocity,
     )
 
 
-def _quickness(config: Config) -> float:
+def _rate_loop_quickness(config: Config) -> float:
     """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop."""
     if not config.vehicle.known:
         return 0.0
@@ -83,23 +86,23 @@ def _quickness(config: Config) -> float:
 
 def _position_pull(config: Config) -> float:
     slow, quick = _POSITION_PULL
-    return slow + _quickness(config) * (quick - slow)
+    return slow + _rate_loop_quickness(config) * (quick - slow)
 
 
 def disturbance_bandwidth(config: Config) -> float:
     """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
-    told = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / hold_delay(config) if told is None else told
+    configured = config.guidance.disturbance_bandwidth_rad_s
+    return 1.5 / attitude_delay(config) if configured is None else configured
 
 
-def hold_delay(config: Config) -> float:
-    """The delay T of `hold_weights`, s; assumes a usual rate loop where none is identified."""
+def attitude_delay(config: Config) -> float:
+    """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified."""
     delay = _feedback_delay(config)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 
 def _feedback_delay(config: Config) -> float:
-    """Delay of the attitude plus half a guidance period, the mean hold of the feedback, s."""
+    """Delay of the attitude plus half a guidance period, the mean delay of the feedback, s."""
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
@@ -116,16 +119,20 @@ def make_guidance(config: Config) -> Guidance:
     return made
 
 
+def hold_gains(config: Config) -> ChainGains:
+    """The gains of the position hold that follow from its weights."""
+    weights = _CALM if _flies_identify(config) else hold_weights(config)
+    return chain_gains(weights, _feedback_delay(config), drag_prior(config).drag.linear)
+
+
 def linear_settings(config: Config) -> LinearSettings:
-    """Settings of guidance; its horizontal acceleration is limited to that of the tilt limit."""
+    """Settings of guidance; `limits.max_tilt` gives its largest horizontal acceleration."""
     guidance, limits = config.guidance, config.limits
     tilt, heading, period = tilt_response(config), heading_response(config), 1.0 / guidance.rate_hz
-    drag = drag_prior(config).drag.linear
-    weights = _CALM if _identifies(config) else hold_weights(config)
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearSettings(
-        gains=chain_gains(weights, _feedback_delay(config), drag),
+        gains=hold_gains(config),
         height=HeightGains(
             height=guidance.height_gain_per_s,
             climb=guidance.climb_gain_per_s,
@@ -146,11 +153,11 @@ def motion_estimate(
     """The motion observer with the drag for the feedforward.
 
     Args:
-        config: of the flight.
-        offset: returns the vehicle's clock minus ours, s, or None.
+        config: configuration of the flight.
+        offset: returns vehicle time minus event-loop time, s, or None.
     """
     guidance = config.guidance
-    bandwidth = _CALM_BANDWIDTH if _identifies(config) else disturbance_bandwidth(config)
+    bandwidth = _CALM_BANDWIDTH if _flies_identify(config) else disturbance_bandwidth(config)
     settings = ObserverSettings(
         bandwidth, _POSITION_TIME, _position_pull(config), guidance.max_disturbance_m_s2
     )
@@ -209,9 +216,10 @@ def predictive_settings(config: Config) -> Settings:
         )
     except ValueError as error:
         raise ConfigError(
-            f"guidance.kind: nmpc cannot be had with this vehicle: {error}"
+            f"guidance.kind: nmpc does not work with this vehicle: {error}; use guidance.kind: "
+            "linear"
         ) from error
 
 
-def _identifies(config: Config) -> bool:
+def _flies_identify(config: Config) -> bool:
     return "identify" in config.flight.maneuvers

@@ -1,4 +1,4 @@
-"""Runs the planner on each sample: its period, its restarts, and its view without resets."""
+"""Runs the planner on each sample: periods, restarts, and the frame without estimator resets."""
 
 from collections.abc import Callable
 from math import inf
@@ -8,19 +8,19 @@ from companion.control.estimator_resets import EstimatorResets
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_STEP = 0.1
-"""A planner never integrates over a longer time, s."""
+"""Longest period that a planner integrates over, s; after a longer one it is reset."""
 
 
 class PlannerRunner:
     """Asks the planner for body rates, in the frame without estimator resets.
 
-    Attributes:
-        attitude_target: returns the newest ATTITUDE_TARGET, or None. It tells the axes along which
-            the autopilot takes our rates, where they differ from the body axes.
-
     Args:
-        planner: the attitude law.
-        resets: of the estimator, which the planner must not see.
+        planner: the planner.
+        resets: the estimator resets, which the planner must not see.
+
+    Attributes:
+        attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
+            along its axes, or None.
     """
 
     def __init__(self, planner: Planner, resets: EstimatorResets) -> None:
@@ -33,25 +33,25 @@ class PlannerRunner:
         self._turn, self._turned_ms = 0.0, -1
 
     def restart(self) -> None:
-        """Reset the planner at the next sample: its state does not hold any more."""
+        """Reset the planner at the next sample, because its state is not valid any more."""
         self._planned_at = -inf
 
     def rates(self, sample: AttitudeSample, target: Target, arrival_period: float) -> BodyRates:
         """Body rates for a sample, rad/s; resets the planner first after a gap or a restart.
 
         Args:
-            sample: to answer.
-            target: in the frame without resets.
+            sample: the sample to answer.
+            target: target in the frame without resets.
             arrival_period: vehicle time since the sample before, s.
 
         Raises:
-            AttitudeError: the planner has no answer to this attitude or target.
+            AttitudeError: the planner cannot use this attitude or target.
         """
         q = self._resets.attitude(sample.q)
         period = sample.vehicle_time - self._planned_at
         if period > _LONGEST_STEP:
             self._planner.reset(q, sample.body_rates)
-            # The length of a gap says nothing about when the next sample comes.
+            # A gap is not the period of the samples, so an earlier period is used.
             period = self._period or min(arrival_period, _LONGEST_STEP)
         self._period = period
         self._planned_at = sample.vehicle_time
@@ -61,14 +61,14 @@ class PlannerRunner:
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.
 
-        One from before a heading reset is ignored: we cannot tell in which frame it is.
+        One from before a heading reset is ignored, because its frame is not known.
         """
         if self._resets.turn != self._turn:
             self._turn, self._turned_ms = self._resets.turn, sample.time_boot_ms
-        told = self.attitude_target()
-        if told is None or told is self._noted:
+        target = self.attitude_target()
+        if target is None or target is self._noted:
             return
-        if self._turned_ms < told.time_boot_ms <= sample.time_boot_ms:
-            self._noted = told
-            age = 1e-3 * (sample.time_boot_ms - told.time_boot_ms)
-            self._planner.note_attitude_target(self._resets.attitude(told.q), age)
+        if self._turned_ms < target.time_boot_ms <= sample.time_boot_ms:
+            self._noted = target
+            age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
+            self._planner.note_attitude_target(self._resets.attitude(target.q), age)

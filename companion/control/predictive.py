@@ -1,4 +1,4 @@
-"""Predictive control beside linear guidance, which flies every step that it misses."""
+"""Predictive control; linear guidance flies every step for which it has no answer."""
 
 from array import array
 from collections import Counter, deque
@@ -9,7 +9,7 @@ from time import monotonic, sleep
 from typing import NamedTuple
 
 from companion.attitude import Target
-from companion.guidance import GRAVITY, Pose
+from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
@@ -24,8 +24,8 @@ class Following(NamedTuple):
 
     Attributes:
         part: the trajectory as a maneuver.
-        time: since the maneuver began, s.
-        pose: where the maneuver began.
+        time: time since the maneuver began, s.
+        pose: pose at which the maneuver began.
         turn: sum of the heading resets, rad; the solver works in the estimator's own frame.
     """
 
@@ -37,7 +37,7 @@ class Following(NamedTuple):
 
 @dataclass
 class PredictiveRecord:
-    """What predictive control did in one flight.
+    """Counters of predictive control in one flight.
 
     Attributes:
         flown: number of answers that were flown.
@@ -51,16 +51,16 @@ class PredictiveRecord:
 
 
 class Predictive:
-    """Requests at each step of guidance the solver's answer for the next step.
+    """Requests the solver's answer for the next step, at each step of guidance.
 
-    Linear guidance makes its own command at every step, so it replaces an answer that is late,
-    failed or implausible without a pause. The first trouble of each kind is reported.
+    Linear guidance also makes a command at every step. It replaces an answer that is late, failed
+    or implausible without a pause. The first trouble of each kind is reported.
 
     Args:
         solver: starts the solver's process for a trajectory.
-        period: of guidance, s.
-        lockstep: wait for the solver, as the vehicle waits for us.
-        note: takes messages for the user.
+        period: period of guidance, s.
+        lockstep: whether to wait for the solver, as the vehicle waits in lockstep.
+        note: called with messages for the user.
     """
 
     def __init__(
@@ -83,15 +83,39 @@ class Predictive:
         """End the solver's process."""
         self._solver.close()
 
+    def instead_of(
+        self, linear: LinearCommand, turn: float, vehicle: Vehicle, following: Following | None
+    ) -> LinearCommand:
+        """The command of predictive control while it flies a trajectory, else `linear`.
+
+        Predictive control works in the estimator's frame, with heading resets. Its target is
+        constant for a period, which its model takes into account.
+
+        Args:
+            linear: command of linear guidance.
+            turn: sum of the heading resets, rad.
+            vehicle: present state of the vehicle.
+            following: the trajectory that is followed, or None.
+        """
+        own = linear.target._replace(heading=linear.target.heading + turn), linear.down
+        target, down = chosen = self.command(own, vehicle, following)
+        if chosen is own:
+            return linear
+        target = target._replace(heading=target.heading - turn)
+        return LinearCommand(target, target, down)
+
     def command(
         self, linear: tuple[Target, float], vehicle: Vehicle, following: Following | None
     ) -> tuple[Target, float]:
-        """The solver's answer for now, else `linear`; also requests the next answer.
+        """Take the solver's answer for this step, else `linear`, and request the next answer.
 
         Args:
-            linear: target and downward acceleration (m/s²) by linear guidance.
-            vehicle: state of the vehicle now.
-            following: the trajectory, or None.
+            linear: target and downward acceleration (m/s²) of linear guidance.
+            vehicle: present state of the vehicle.
+            following: the trajectory that is followed, or None.
+
+        Returns:
+            Target and downward acceleration (m/s²) to fly.
         """
         chosen = linear
         if following is not None:
@@ -100,21 +124,21 @@ class Predictive:
                 self.record.flown += 1
                 self.record.seconds.append(answer.seconds)
                 chosen = _command_of(answer)
-        self._remember(vehicle.time, chosen)
+        self._record_input(vehicle.time, chosen)
         if following is not None:
-            self._ask(vehicle, following)
+            self._request(vehicle, following)
         return chosen
 
     def _answer(self, now: float) -> Answer | None:
         if self._lockstep:
             self._wait_until_ready()
         answer = self._solver.take(_LONGEST_WAIT if self._lockstep else 0.0)
-        # An answer for a step that guidance has missed is too old.
+        # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None
         return answer
 
-    def _ask(self, vehicle: Vehicle, following: Following) -> None:
+    def _request(self, vehicle: Vehicle, following: Following) -> None:
         part, pose = following.part, following.pose
         at = following.time - part.turns_for
         if at < 0.0:
@@ -124,7 +148,7 @@ class Predictive:
         start = Start(pose.position_ned, turned + following.turn)
         self._solver.request(Request(self._number, vehicle, at, start, tuple(self._inputs)))
 
-    def _remember(self, now: float, command: tuple[Target, float]) -> None:
+    def _record_input(self, now: float, command: tuple[Target, float]) -> None:
         target, down = command
         lift = GRAVITY - down
         thrust = lift / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))
@@ -142,9 +166,9 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The target, and the vertical acceleration of its thrust at the answer's own tilt.
+    """The target, and the downward acceleration (m/s²) that the answer's thrust has at its tilt.
 
-    The present tilt differs, and the thrust map corrects for it to hold the height.
+    `HoverThrust` converts this acceleration to the thrust at the present tilt.
     """
     cosine = sqrt(max(0.0, 1.0 - answer.north**2 - answer.east**2))
     target = Target(answer.north, answer.east, answer.heading)

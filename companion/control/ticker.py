@@ -1,4 +1,4 @@
-"""A timer with a steady period that can be told to tick at once."""
+"""A timer with a steady period that can be triggered early."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,7 +10,7 @@ class Ticker:
 
     Args:
         period: s.
-        clock: ours, s.
+        clock: returns event-loop time, s.
     """
 
     def __init__(self, period: float, clock: Callable[[], float]) -> None:
@@ -19,11 +19,11 @@ class Ticker:
         self._soon = asyncio.Event()
 
     def soon(self) -> None:
-        """Tick at once; the next period begins then."""
+        """End the wait of `tick` at once; the next period begins then."""
         self._soon.set()
 
     async def tick(self) -> None:
-        """Wait; missed periods are not made up for."""
+        """Wait for the next period, or for `soon`; missed periods are not repeated."""
         self._due = max(self._due + self._period, self._clock())
         with suppress(TimeoutError):
             async with asyncio.timeout(self._due - self._clock()):

@@ -16,9 +16,10 @@ from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.maneuvers import unbegun
-from companion.flight.observer import Observer
+from companion.flight.observer import EventRecorder
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
+from companion.flight.status import PhaseNow, StatusReporter
 from companion.flight.vehicle_identity import SameVehicle, VehicleMemory
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
@@ -99,6 +100,8 @@ class Assembled:
     trace: FlightTrace
     dead_time_watch: DeadTimeWatch
     memory: VehicleMemory
+    ladder: SafetyLadder
+    reporter: StatusReporter
 
     def close(self) -> None:
         """End the process of predictive control."""
@@ -131,7 +134,7 @@ class Assembled:
 def assemble(
     config: Config,
     link: Link,
-    observer: Observer,
+    recorder: EventRecorder,
     ask_landing: AskLanding,
     folder: Path | None,
     plan: Plan,
@@ -165,8 +168,8 @@ def assemble(
     rate_requester = RateRequester(link, config.link)
     watch = Watch(context, ladder, rate_requester, clock)
     loop.ask_mode = watch.ask_mode
-    flight = Flight(context, plan, watch, observer, ask_landing)
-    ladder.note = context.note = preflight.note = flight.note
+    flight = Flight(context, plan, watch, recorder, ask_landing)
+    ladder.note = context.note = preflight.note = guidance_loop.record.note = flight.note
     link.clock.on_event = rate_requester.note = flight.note
     drag_is_set = config.guidance.drag is not None
     remembered = None if folder is None else folder.parent
@@ -179,7 +182,23 @@ def assemble(
             if config.guidance.kind == "nmpc":
                 guidance_loop.predictive = predictive(config, part, flight.note)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
-    return Assembled(flight, context, trace, dead_time_watch, memory)
+
+    def phase() -> PhaseNow:
+        running = flight.phase
+        entered = recorder.phases[-1][0] if recorder.phases else flight.began
+        return PhaseNow(running.name, running.timeout, running.monitored, entered)
+
+    reporter = StatusReporter(
+        context,
+        ladder,
+        trace,
+        flight.began,
+        phase,
+        recorder.status,
+        clock,
+        real_time=environment.realtime and not config.link.lockstep,
+    )
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter)
 
 
 def _control(

@@ -27,6 +27,7 @@ class Flight:
     """Runs the phases in order; the first failure ends the flight and selects the exit.
 
     Attributes:
+        began: when, s on our clock.
         phase: the running phase.
         failed_in: the phase that failed, or None.
         events: each as (time in s since the flight began, text).
@@ -56,7 +57,7 @@ class Flight:
         self._observer = observer
         self._ask_landing = ask_landing
         self._clock = asyncio.get_running_loop().time
-        self._began = self._entered = self._clock()
+        self.began = self._entered = self._clock()
         self._interrupted = self._asking = False
         self._end = self._new_end()
 
@@ -122,7 +123,7 @@ class Flight:
 
     def note(self, text: str) -> None:
         """Record an event and show it."""
-        time = self._clock() - self._began
+        time = self._clock() - self.began
         self.events.append((time, text))
         self._observer.event(time, text)
 
@@ -244,8 +245,7 @@ class Flight:
     async def _report_progress(self) -> None:
         while True:
             await asyncio.sleep(_TELL_PERIOD)
-            elapsed = self._clock() - self._entered
-            phase = self.phase
+            phase, elapsed = self.phase, self._clock() - self._entered
             self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
 
     @staticmethod

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from companion.flight.status import FlightStatus
 from companion.mavlink.texts import StatusText
 from companion.vehicle.state import VehicleState
 
@@ -16,6 +17,10 @@ class Observer(Protocol):
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Once a second: the phase, the condition it waits for, elapsed time and timeout (s)."""
+        ...
+
+    def status(self, status: FlightStatus) -> None:
+        """Five times a second: the state of the flight."""
         ...
 
     def event(self, time: float, text: str) -> None:
@@ -32,8 +37,52 @@ class Silent:
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Ignore it."""
 
+    def status(self, status: FlightStatus) -> None:
+        """Ignore it."""
+
     def event(self, time: float, text: str) -> None:
         """Ignore it."""
+
+
+class EventRecorder:
+    """An observer that keeps the phases, writes phases and events down, and passes all on.
+
+    Attributes:
+        phases: (when it began, s on our clock, name) of each phase.
+        write: writes words down at the present time.
+
+    Args:
+        observer: to which all is passed on.
+        clock: ours, s.
+        write: see above.
+    """
+
+    def __init__(
+        self, observer: Observer, clock: Callable[[], float], write: Callable[[str], None]
+    ) -> None:
+        self.phases: list[tuple[float, str]] = []
+        self.write = write
+        self._observer = observer
+        self._clock = clock
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Keep, write and pass on."""
+        self.phases.append((self._clock(), name))
+        self.write(f"phase: {name}")
+        self._observer.phase(name, waits_for)
+
+    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Pass on."""
+        self._observer.waiting(name, detail, elapsed, timeout)
+
+    def status(self, status: FlightStatus) -> None:
+        """Pass on."""
+        self._observer.status(status)
+
+    def event(self, time: float, text: str) -> None:
+        """Write and pass on."""
+        self.write(text)
+        self._observer.event(time, text)
 
 
 class StateLogger:

@@ -2,22 +2,27 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
 from companion.flight import flown_config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.context import cancel
+from companion.flight.course import advice, course_of
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.observer import Observer
+from companion.flight.observer import EventRecorder, Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
+from companion.mavlink.texts import TextFrames
 from companion.realtime import Wishes
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
+from companion.safety.actions import internal
 from companion.vehicle.link import Link
 
 
@@ -90,12 +95,13 @@ class Session:
             flown_config.record(self._config, self._folder, follows=self._plan is None)
         environment = self._environment
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
-        with realtime.asked_for(wishes) as grants, self._recorder() as tlog:
+        with realtime.asked_for(wishes) as grants, self._tlog() as tlog:
+            recorder = EventRecorder(self._observer, *self._writer(tlog))
             async with open_link(self._config, tlog, self.note, environment.open_transport) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
-                    self._observer,
+                    recorder,
                     self._ask_landing,
                     self._folder,
                     plan,
@@ -107,11 +113,15 @@ class Session:
                     result = await self._run(link, self._assembled)
                 finally:
                     self._assembled.close()
+            summary = self._summary(link, self._assembled, recorder, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         dropped = 0 if tlog is None else tlog.dropped
-        return self._finish(link, self._assembled, result, dropped, grants)
+        summary = replace(summary, link={**summary.link, "not_recorded": dropped})
+        if self._folder is not None:
+            self._save(self._folder, summary)
+        return summary
 
-    def _recorder(self) -> AbstractContextManager[TlogWriter | None]:
+    def _tlog(self) -> AbstractContextManager[TlogWriter | None]:
         """What writes the frames of the flight, if they are recorded."""
         if self._folder is None:
             return nullcontext()
@@ -124,58 +134,76 @@ class Session:
 
         return TlogWriter(self._folder / "flight.tlog", epoch, on_failure)
 
+    def _writer(self, tlog: TlogWriter | None) -> tuple[Callable[[], float], Callable[[str], None]]:
+        """Our clock, and what writes words into the `.tlog` as STATUSTEXT of ours."""
+        clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
+
+        def write(words: str) -> None:
+            if tlog is not None:
+                for frame in texts.frames(words):
+                    tlog(clock(), frame)
+
+        return clock, write
+
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Fly over the open link."""
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.
             self._flying = asyncio.ensure_future(flight.run())
+            reporting = asyncio.create_task(self._report(assembled))
             try:
                 return await self._flying
             except asyncio.CancelledError:
                 flight.failed_in = flight.failed_in or flight.phase
                 return "left at once by the user"
+            finally:
+                await cancel(reporting)
 
-    def _finish(
+    @staticmethod
+    async def _report(assembled: Assembled) -> None:
+        """Record and show the state of the flight; a fault in it does not end the flight."""
+        try:
+            await assembled.reporter.run()
+        except Exception as error:
+            assembled.flight.note(internal(error))
+
+    def _summary(
         self,
         link: Link,
         assembled: Assembled,
+        recorder: EventRecorder,
         result: str,
-        tlog_dropped: int,
         grants: tuple[realtime.Grant, ...],
     ) -> Summary:
+        """The summary of a flight that is over, while its log is still open."""
         counts = {
             name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
         }
-        flight = assembled.flight
+        flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.over_the_flight()
-        guidance_loop = assembled.context.guidance_loop
-        trace = assembled.trace
-        for mismatch_warning in (
-            guidance_loop.learning.mismatch_warning(),
-            guidance_loop.estimate.mismatch_warning(),
-            trace.lost_rows_warning(),
-        ):
-            if mismatch_warning is not None:
-                flight.note(mismatch_warning)
+        advised = advice(assembled, dead_times)
+        for text in advised:  # shown with the figures, not here
+            if text == dead_times.warning():
+                continue  # told in flight
+            flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
+            recorder.write(text)
         assembled.memory.save()
-        summary = Summary(
+        return Summary(
             result=result,
             phase=(flight.failed_in or flight.phase).name,
             planner=self._config.planner_name,
             gain=self._config.planner.gain_per_s,
             counts=assembled.counts(),
-            link={**counts, "not_recorded": tlog_dropped},
+            link=counts,
             trace=trace,
             events=flight.events,
             log=self._folder,
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
+            course=course_of(assembled, recorder.phases, result, advised),
         )
-        if self._folder is not None:
-            self._save(self._folder, summary)
-        return summary
 
     def _save(self, folder: Path, summary: Summary) -> None:
         try:

@@ -1,4 +1,4 @@
-"""Pure maths of the outer loop: what to fly, which acceleration that takes, and how much thrust."""
+"""Pure maths of the outer loop: maneuvers, the acceleration that follows them, and the thrust."""
 
 from companion.guidance.doublets import Doublets
 from companion.guidance.drag_estimate import DragEstimate

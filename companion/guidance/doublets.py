@@ -8,14 +8,21 @@ from companion.guidance.maneuvers import spread
 from companion.guidance.reference import Pose, Reference
 
 _SMALL = 0.5
-"""Size of the first doublet of an axis: one size alone cannot tell a slew limit from a lag."""
+"""Relative size of the first doublet of an axis; only two sizes tell a slew limit from a lag."""
 _REST = 0.5
-"""Zero rates after a doublet, until the slowest axis has come to rest, s."""
+"""Time of zero rates after a doublet, in which the slowest axis comes to rest, s."""
 _CLIMBS = 3
+"""Number of climb doublets."""
 
 
-class _Part(NamedTuple):
-    """One doublet, +1, −1, +1 for T, 2T, T, of these rates (rad/s) or of this climb (m/s²)."""
+class _Doublet(NamedTuple):
+    """One doublet: signs +1, −1, +1 for T, 2T, T, times body rates or a vertical acceleration.
+
+    Attributes:
+        step: T, s.
+        body_rates: rad/s; None: a doublet of climb.
+        climb: vertical acceleration, m/s², upwards.
+    """
 
     step: float
     body_rates: BodyRates | None = None
@@ -23,11 +30,11 @@ class _Part(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """With the rest after it, s."""
+        """Duration with the rest after the doublet, s."""
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST)
 
     def at(self, time: float, hold: Reference) -> Reference:
-        """The reference `time` seconds after its beginning; `hold` is what is held otherwise."""
+        """The reference `time` seconds after the doublet began; `hold` is that of position hold."""
         if self.body_rates is None:
             return self._climbing(time, hold)
         sign = self._sign(time)
@@ -61,18 +68,19 @@ class _Part(NamedTuple):
 class Doublets:
     """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
 
-    Each axis is excited with half its size, then with all of it. The angle, A·T at most, returns to
-    its value before. Position hold corrects the drift for `settle` seconds before each doublet and
-    at the end. Climbs are flown closed loop along a reference that moves like a doublet.
+    Each axis is excited with half its rate, then with the full rate. The angle changes by A·T at
+    most and then returns to its value before. Position hold corrects the drift for `settle` seconds
+    before each doublet and at the end. Climbs are flown closed loop: the acceleration of the
+    reference is a doublet.
 
     Attributes:
-        tilt_rate: of roll and pitch, rad/s.
-        tilt_step: T in s.
-        yaw_rate: rad/s.
-        yaw_step: T in s; yaw answers more slowly.
+        tilt_rate: A of roll and pitch, rad/s.
+        tilt_step: T of roll and pitch, s.
+        yaw_rate: A of yaw, rad/s.
+        yaw_step: T of yaw, s; yaw responds more slowly.
         climb: vertical acceleration, m/s².
-        climb_step: T in s.
-        settle: s.
+        climb_step: T of the climbs, s.
+        settle: time of position hold, s.
     """
 
     tilt_rate: float
@@ -86,14 +94,14 @@ class Doublets:
 
     @property
     def duration(self) -> float:
-        """All doublets with their rests, and the hold around each, s."""
-        return self.settle + sum(part.duration + self.settle for part in self._parts)
+        """All doublets with their rests, and the position hold before each and at the end, s."""
+        return self.settle + sum(part.duration + self.settle for part in self._doublets)
 
     @property
-    def _parts(self) -> tuple[_Part, ...]:
+    def _doublets(self) -> tuple[_Doublet, ...]:
         tilt, yaw = self.tilt_rate, self.yaw_rate
         rates = [
-            _Part(step, BodyRates(*(size * rate for rate in axis)))
+            _Doublet(step, BodyRates(*(size * rate for rate in axis)))
             for step, axis in (
                 (self.tilt_step, (tilt, 0.0, 0.0)),
                 (self.tilt_step, (0.0, tilt, 0.0)),
@@ -101,12 +109,12 @@ class Doublets:
             )
             for size in (_SMALL, 1.0)
         ]
-        return *rates, *(_CLIMBS * [_Part(self.climb_step, climb=self.climb)])
+        return *rates, *(_CLIMBS * [_Doublet(self.climb_step, climb=self.climb)])
 
     def check_times(self) -> list[float]:
-        """Finely over each doublet, and the end, s."""
+        """Times 0.01 s apart over each doublet, and the end, s."""
         times, begin = [0.0], 0.0
-        for part in self._parts:
+        for part in self._doublets:
             begin += self.settle
             times += spread(begin, begin + part.duration)
             begin += part.duration
@@ -115,7 +123,7 @@ class Doublets:
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: open-loop rates in a doublet, position hold between them."""
         hold = Reference(start.position_ned, heading=start.heading)
-        for part in self._parts:
+        for part in self._doublets:
             time -= self.settle
             if time < 0.0:
                 break

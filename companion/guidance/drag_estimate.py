@@ -1,4 +1,4 @@
-"""Drag, estimated from the measured acceleration less that of the thrust."""
+"""Drag, estimated from the measured acceleration less the acceleration by thrust."""
 
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
@@ -9,21 +9,21 @@ from companion.drag import Drag
 from companion.guidance.reference import Horizontal, Vector
 
 _WINDOW = 0.2
-"""Of one measurement, s: a velocity's noise counts less against a longer change."""
+"""Duration of one measurement, s; a longer one suffers less from velocity noise."""
 _NOISE = 0.2
-"""Standard deviation of a measurement, m/s²: the velocity's noise, and the thrust's direction."""
+"""Standard deviation of a measurement, m/s², from velocity noise and the thrust's direction."""
 _WIND = 2.0
-"""Standard deviation of the acceleration by wind at first, m/s²,"""
+"""Initial standard deviation of the acceleration by wind, m/s²."""
 _WIND_CHANGE = 0.2
-"""and of its change within a second."""
-_CLIPPED = 3.0
-"""An innovation is clamped to this many standard deviations: a bump is not drag."""
-_MOST_ABOVE = 2.0
-"""The learned drag is at most this much larger than at first, 1/s,"""
-_MOST_QUADRATIC = 0.3
-"""and the quadratic drag at most this, 1/m."""
+"""Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
+_CLAMP = 3.0
+"""An innovation is clamped to this many standard deviations, since a bump is no sign of drag."""
+_LARGEST_INCREASE = 2.0
+"""The linear drag is estimated at most this much above that of the prior, 1/s."""
+_LARGEST_QUADRATIC = 0.3
+"""Largest estimate of the quadratic drag, 1/m."""
 _CERTAIN = 0.1
-"""Standard deviation of the drag at the top speed with which it counts as known, 1/s."""
+"""The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class DragPrior:
     """Drag and its uncertainty before the vehicle has moved.
 
     Attributes:
-        drag: the most likely.
+        drag: the most likely drag.
         linear_deviation: standard deviation of the linear drag, 1/s.
         quadratic_deviation: standard deviation of the quadratic drag, 1/m.
     """
@@ -42,24 +42,25 @@ class DragPrior:
 
 
 ANY_VEHICLE = DragPrior(Drag(0.3), 0.4, 0.03)
-"""An unknown multirotor: between 0.2/s (bare frame) and 1/s (PX4's simulated vehicle)."""
+"""Prior for an unknown multirotor: between 0.2/s (bare frame) and 1/s (PX4's simulation)."""
 
 
 class DragEstimate:
-    """Least squares of v̇ − thrust = wind − (linear + quadratic·|v|)·v, recursive, over the flight.
+    """Kalman filter for drag and wind: v̇ − thrust = wind − (linear + quadratic·|v|)·v.
 
-    The wind changes slowly; what changes with the velocity is drag. A Kalman filter of linear and
-    quadratic drag, which stay, and of the acceleration by wind (north, east), which wanders.
+    The state is the linear and the quadratic drag, which are constant, and the acceleration by wind
+    (north, east), which is a random walk. Wind changes slowly, so what changes with the velocity is
+    drag.
 
     Attributes:
-        first: the drag that it began with.
+        first: drag of the prior.
     """
 
     def __init__(self, prior: DragPrior) -> None:
         self.begin(prior)
 
     def begin(self, prior: DragPrior) -> None:
-        """Start anew from `prior`."""
+        """Start again from `prior`."""
         self.first = prior.drag
         self._top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0])
@@ -87,12 +88,12 @@ class DragEstimate:
         return self._top_speed
 
     def observe(self, dt: float, velocity: Vector, left: Horizontal) -> None:
-        """Take the acceleration that the thrust does not explain; ignored if it is not finite.
+        """Take a measured acceleration; one that is not finite is ignored.
 
         Args:
-            dt: over which it was measured, s.
-            velocity: meanwhile, m/s, NED.
-            left: acceleration that was measured, less that by thrust, m/s².
+            dt: duration of the measurement, s.
+            velocity: during the measurement, m/s, NED.
+            left: measured acceleration less the acceleration by thrust, m/s², NED.
         """
         speed = hypot(*velocity)
         if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*left))) or dt <= 0.0:
@@ -107,7 +108,7 @@ class DragEstimate:
             self._forget_window()
 
     def _learn(self) -> None:
-        """Take the window as one measurement of each axis."""
+        """Update the filter with the window: one measurement of north and one of east."""
         span = self._span
         self._top_speed = max(self._top_speed, hypot(*self._passed) / span)
         for wind in (2, 3):
@@ -118,21 +119,24 @@ class DragEstimate:
             row[2 + axis] = 1.0
             spread = self._covariance @ row
             variance = float(row @ spread) + _NOISE**2
-            off, most = (
+            innovation, most = (
                 self._left[axis] / span - float(row @ self._state),
-                _CLIPPED * sqrt(variance),
+                _CLAMP * sqrt(variance),
             )
             gain = spread / variance
-            self._state = self._state + gain * min(max(off, -most), most)
+            self._state = self._state + gain * min(max(innovation, -most), most)
             self._covariance = self._covariance - np.outer(gain, spread)
         self._drag = self._bounded()
 
     def _bounded(self) -> Drag:
-        """The most likely drag within the bounds: where one of the two is at its, the other's."""
+        """The most likely drag within the bounds.
+
+        If the quadratic drag is clamped, the linear drag is the most likely one with it.
+        """
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
-        within = min(max(quadratic, 0.0), _MOST_QUADRATIC)
+        within = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
         linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
-        return Drag(min(max(linear, 0.0), self.first.linear + _MOST_ABOVE), within)
+        return Drag(min(max(linear, 0.0), self.first.linear + _LARGEST_INCREASE), within)
 
     def _forget_window(self) -> None:
         self._span = 0.0

@@ -10,14 +10,14 @@ from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """Of the cost ∫ position·e_p² + velocity·e_v² + u² dt.
+    """Weights of the cost ∫ position·e_p² + velocity·e_v² + u² dt.
 
     Attributes:
-        position: 1/s⁴, of the position error.
-        velocity: 1/s², of the velocity error.
+        position: weight of the position error, 1/s⁴.
+        velocity: weight of the velocity error, 1/s².
 
     Raises:
-        ValueError: a weight that is not finite, a negative one, or no weight on position.
+        ValueError: a weight is not finite or negative, or that of the position is 0.
     """
 
     position: float
@@ -32,12 +32,12 @@ class Weights:
 
 @dataclass(frozen=True, slots=True)
 class ChainGains:
-    """u = −(position·e_p + velocity·e_v + acceleration·e_a), u an acceleration in m/s².
+    """Gains of the feedback u = −(position·e_p + velocity·e_v + acceleration·e_a), u in m/s².
 
     Attributes:
         position: 1/s².
         velocity: 1/s.
-        acceleration: no unit.
+        acceleration: without unit.
     """
 
     position: float
@@ -48,12 +48,12 @@ class ChainGains:
 def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     """The optimal gains (LQR) for ė_p = e_v, ė_v = e_a − drag·e_v, ė_a = (u − e_a)/lag.
 
-    From the stable eigenvectors of the Hamiltonian matrix: with X and Y their upper and lower
-    halves, Y·X⁻¹ solves the algebraic Riccati equation.
+    X and Y are the upper and lower halves of the stable eigenvectors of the Hamiltonian matrix.
+    Y·X⁻¹ solves the algebraic Riccati equation.
 
     Args:
-        weights: of the cost.
-        lag: of the acceleration behind what is asked for, s, positive.
+        weights: weights of the cost.
+        lag: lag of the acceleration behind its command, s, positive.
         drag: linear drag per mass, 1/s.
 
     Raises:
@@ -71,19 +71,20 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     return ChainGains(position, velocity, acceleration)
 
 
-_LARGEST_FALL = 0.5 * GRAVITY
-_LARGEST_RISE = 0.5 * GRAVITY
+_LARGEST_DOWN = 0.5 * GRAVITY
+_LARGEST_UP = 0.5 * GRAVITY
+"""Largest vertical accelerations that are commanded, m/s²."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeightGains:
-    """Gains and limits of the cascade.
+    """Gains and limits of the height cascade.
 
     Attributes:
-        height: vertical speed per m, 1/s.
-        climb: vertical acceleration per m/s, 1/s.
-        max_climb: m/s upwards.
-        max_descent: m/s downwards.
+        height: vertical speed per height error, 1/s.
+        climb: vertical acceleration per error of the vertical speed, 1/s.
+        max_climb: largest climb rate, m/s.
+        max_descent: largest descent rate, m/s.
     """
 
     height: float
@@ -100,4 +101,4 @@ def acceleration_down(gains: HeightGains, reference: Reference, motion: VehicleM
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
         wanted += gains.climb * (speed - motion.velocity_ned[2])
-    return min(max(wanted, -_LARGEST_RISE), _LARGEST_FALL)
+    return min(max(wanted, -_LARGEST_UP), _LARGEST_DOWN)

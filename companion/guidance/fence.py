@@ -1,4 +1,4 @@
-"""Where the vehicle may fly: about the place where control began, and above a floor."""
+"""The fence: where the vehicle may fly, about the place where offboard control began."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,24 +15,24 @@ Components = tuple[Any, Any, Any]
 """A `Vector`, or one whose components are arrays."""
 
 EARTH_RADIUS = 6_371_000.0
-"""Mean, m; over the size of a fence the earth is flat."""
+"""Mean radius, m; over the size of a fence the earth counts as flat."""
 
 
 class Place(NamedTuple):
-    """WGS84, degrees."""
+    """A place in WGS84, degrees."""
 
     latitude: float
     longitude: float
 
 
 class Breach(NamedTuple):
-    """What is wrong with a place.
+    """How a place breaches the fence.
 
     Attributes:
-        limit: the key of the configuration that says so.
-        side: on which side of the limit the place lies.
-        where: the place, as the end of a sentence.
-        by: how far it lies outside, m; negative inside.
+        limit: the configuration key of the limit that is breached.
+        side: on which side of the limit the place lies, such as "beyond" or "below".
+        where: the place, in words that end a sentence.
+        by: how far the place lies outside, m; negative inside.
     """
 
     limit: str
@@ -47,16 +47,16 @@ class Breach(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A cylinder, within it perhaps a polygon, between a floor and a ceiling; m.
+    """A cylinder between a floor and a ceiling, with an optional polygon inside.
 
     Attributes:
-        radius: about where control began.
-        ceiling: above where control began.
-        floor: above home.
-        polygon: corners about where control began; none: the cylinder alone.
-        places: the corners as (latitude, longitude) in degrees, instead.
-        deceleration: that is certain, m/s².
-        reaction: time until it begins, s.
+        radius: about the place where control began, m.
+        ceiling: above the place where control began, m.
+        floor: above home, m.
+        polygon: corners, m north and east of where control began; empty: the cylinder alone.
+        places: corners as (latitude, longitude) in degrees, instead of `polygon`.
+        deceleration: deceleration that the vehicle certainly reaches, m/s².
+        reaction: time until braking begins, s.
     """
 
     radius: float
@@ -70,13 +70,13 @@ class Fence:
     def breach(
         self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
     ) -> Breach | None:
-        """What is wrong with a place.
+        """How a place breaches the fence; None: it does not.
 
         Args:
-            offset: from where control began, m NED.
-            height: above home, m, or None where home is not known.
-            origin: where control began, or None where that is not known.
-            margin: the place must lie inside by this, m.
+            offset: position of the place relative to where control began, m NED.
+            height: height of the place above home, m; None: home is not known.
+            origin: the place where control began; None: it is not known.
+            margin: how far inside the fence the place must lie, m.
         """
         north, east, down = offset
         distance = hypot(north, east)
@@ -101,18 +101,21 @@ class Fence:
         return None
 
     def stop(self, offset: Components, velocity: Components) -> Components:
-        """Where the vehicle comes to a stop, m: v·t + v²/(2a), horizontally and vertically.
+        """Where the vehicle stops if it brakes now, m NED from where control began.
+
+        The stopping distance is v·t + v²/(2a), for the horizontal and for the vertical speed v.
 
         Args:
-            offset: from where control began, m NED; numbers, or arrays of them.
-            velocity: m/s NED.
+            offset: position of the vehicle relative to where control began, m NED; numbers, or
+                arrays of them.
+            velocity: m/s NED; numbers, or arrays of them.
         """
         north, east, down = velocity
-        level = self._seconds((north * north + east * east) ** 0.5)
+        level = self._distance_per_speed((north * north + east * east) ** 0.5)
         return (
             offset[0] + level * north,
             offset[1] + level * east,
-            offset[2] + self._seconds(abs(down)) * down,
+            offset[2] + self._distance_per_speed(abs(down)) * down,
         )
 
     def stop_breach(
@@ -123,20 +126,23 @@ class Fence:
         origin: Place | None,
         margin: float = 0.0,
     ) -> Breach | None:
-        """What is wrong with the place where the vehicle stops if it begins to brake now."""
+        """The breach of the fence at the place of `stop`; None: the vehicle stops inside.
+
+        The arguments are those of `breach` and `stop`.
+        """
         stop = self.stop(offset, velocity)
         sunk = stop[2] - offset[2]
         return self.breach(stop, None if height is None else height - sunk, origin, margin)
 
-    def _seconds(self, speed: Any) -> Any:
-        """For how long the vehicle would go on at this speed to come as far as it does, s."""
+    def _distance_per_speed(self, speed: Any) -> Any:
+        """Stopping distance divided by the speed, s."""
         return self.reaction + speed / (2.0 * self.deceleration)
 
 
 def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
-    """Whether a place lies in a polygon: a ray northwards crosses its sides an odd number of times.
+    """Whether a place lies in a polygon, by the even-odd rule.
 
-    Source: the even-odd rule.
+    A ray northwards from a place inside crosses the sides an odd number of times.
     """
     odd = False
     for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
@@ -146,7 +152,7 @@ def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
 
 
 def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> float:
-    """From a place in a polygon to the nearest of its sides, m; negative outside."""
+    """Distance from a place to the nearest side of a polygon, m; negative outside."""
     nearest = inf
     for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         along_north, along_east = n1 - n0, e1 - e0
@@ -160,7 +166,7 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
 
 @lru_cache(maxsize=4)
 def local_polygon(places: tuple[Corner, ...], origin: Place) -> tuple[Corner, ...]:
-    """Corners given as (latitude, longitude) in degrees, in metres about `origin`."""
+    """Convert corners from (latitude, longitude) in degrees to m north and east of `origin`."""
     narrower = cos(radians(origin.latitude))
     return tuple(
         (

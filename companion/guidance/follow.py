@@ -13,12 +13,12 @@ def hover(duration: float) -> "HeldFigure":
 
 
 def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
-    """Maneuver `circle`: laps of a circle that begins and ends at rest where the vehicle is.
+    """Maneuver `circle`: a circle that begins and ends at rest at the vehicle's position.
 
     Args:
         radius: m.
-        speed: between the ramps, m/s.
-        laps: how often round, with the ramps.
+        speed: speed between the ramps, m/s.
+        laps: number of laps, including the ramps.
     """
     return HeldFigure(steady_circle(radius, speed, laps, longest=inf))
 
@@ -27,10 +27,10 @@ def circle(radius: float, speed: float, laps: float) -> "HeldFigure":
 class HeldFigure:
     """A trajectory that holds its heading and is flown as configured, without slowing it down.
 
-    Linear guidance flies it, whichever guidance flies the trajectories of files (`Follow`).
+    Linear guidance always flies it, even if predictive guidance flies trajectory files (`Follow`).
 
     Attributes:
-        trajectory: with `holds_heading`.
+        trajectory: a trajectory whose `holds_heading` is true.
     """
 
     trajectory: Trajectory
@@ -49,13 +49,13 @@ class HeldFigure:
         """Check times of the trajectory, s.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the trajectory is too long to be checked.
         """
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the maneuver began at `start`."""
-        return _from(start, self.trajectory.at(time), start.heading)
+        return _reference_from(start, self.trajectory.at(time), start.heading)
 
 
 @dataclass(slots=True)
@@ -63,9 +63,9 @@ class Follow:
     """Flies a trajectory from a file, after a turn on the spot to its heading.
 
     Attributes:
-        trajectory: to follow.
-        yaw_rate: largest in the turn before it, rad/s.
-        notes: how its file was understood and how it is flown, a sentence each.
+        trajectory: the trajectory to follow.
+        yaw_rate: largest yaw rate in the turn before the trajectory, rad/s.
+        notes: how its file was understood and how it is flown, one sentence each.
     """
 
     trajectory: Trajectory
@@ -81,7 +81,7 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before it, s; until the start is known, with the longest turn."""
+        """Duration with the turn before it, s; with the longest turn while the start is unknown."""
         if self._turned is not None:
             return self._turned.duration
         longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
@@ -89,24 +89,24 @@ class Follow:
 
     @property
     def turns_for(self) -> float:
-        """Duration of the turn before the trajectory, s; 0 until it is known."""
+        """Duration of the turn before the trajectory, s; 0 while the start is unknown."""
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s; the turn before it is on the spot."""
+        """Check times of the trajectory, s; the turn on the spot is not checked."""
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference `time` seconds after the beginning at `start`."""
+        """The reference `time` seconds after the maneuver, with its turn, began at `start`."""
         if self._turned is None or start is not self._pose:
             self._pose = start
             self._turned = turned_first(self.trajectory, start.heading, self.yaw_rate)
         held = start.heading if self.trajectory.holds_heading else 0.0
-        return _from(start, self._turned.at(time), held)
+        return _reference_from(start, self._turned.at(time), held)
 
 
-def _from(start: Pose, sample: Sample, heading: float) -> Reference:
-    """A sample of a trajectory that begins at `start`; its heading counts from `heading`, rad."""
+def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:
+    """The reference of a sample, moved to `start` and with `heading` (rad) added to its heading."""
     north, east, down = start.position_ned
     return Reference(
         (north + sample.position[0], east + sample.position[1], down + sample.position[2]),

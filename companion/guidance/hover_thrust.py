@@ -1,4 +1,4 @@
-"""The map from specific thrust to MAVLink's 0..1, and its correction from how the vehicle moved."""
+"""Conversion of specific thrust to MAVLink's thrust 0..1, and the learned hover thrust."""
 
 from dataclasses import dataclass
 
@@ -9,29 +9,29 @@ from companion.guidance.thrust import BatterySag, ThrustCurve, cos_tilt_ahead, s
 from companion.guidance.thrust_filter import SHORTEST, ThrustFilter
 
 _LONGEST_WINDOW = 0.5
-"""Beyond it the thrust in between is not known well enough to learn from, s."""
+"""Velocities further apart than this are not learned from, s: the thrust between is uncertain."""
 
 _PLAUSIBLE = (0.3 * GRAVITY, 2.5 * GRAVITY)
-"""Measured specific thrust outside this is not learned from (free fall, a bump), m/s²."""
+"""Range of measured specific thrust, m/s²; outside it (free fall, a bump) nothing is learned."""
 
-_UNKNOWN_DRAG = 0.5
+_DRAG_DEVIATION = 0.5
 """Standard deviation of the linear drag per mass in climb and descent, 1/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class ThrustSettings:
-    """What is known of the vehicle's thrust.
+    """Settings of the vehicle's thrust.
 
     Attributes:
         hover: normalised thrust at hover, 0..1.
-        correction_limit: by which share the hover thrust is corrected at most.
-        correction_time: time constant with which a slow change is followed, s.
-        lowest: smallest normalised thrust given out.
-        highest: largest normalised thrust given out.
-        curve_factor: of `ThrustCurve`.
-        battery_exponent: of `BatterySag`.
-        lag: of the rotors, s.
-        tilt_compensated: whether the autopilot divides by cos(tilt) itself.
+        correction_limit: largest correction of the hover thrust, as a share of it.
+        correction_time: time constant with which the learned hover thrust follows a change, s.
+        lowest: smallest normalised thrust that is sent, 0..1.
+        highest: largest normalised thrust that is sent, 0..1.
+        curve_factor: factor of `ThrustCurve`.
+        battery_exponent: exponent of `BatterySag`.
+        lag: lag of the rotors, s.
+        tilt_compensated: whether the autopilot divides the thrust by cos(tilt) itself.
         drag: linear drag per mass, 1/s.
     """
 
@@ -48,10 +48,10 @@ class ThrustSettings:
 
 
 class HoverThrust:
-    """Normalised thrust for a wanted vertical acceleration, by a hover thrust that is learned.
+    """Normalised thrust for a wanted vertical acceleration, from a hover thrust that is learned.
 
-    It is learned only while `observe` is called, which is only in the air, from the thrust that was
-    `sent`: ours while we are in control, the autopilot's own before.
+    The caller calls `observe` only in the air, and passes to `sent` the thrust that the vehicle
+    follows: the thrust that `companion` sends while it is in control, before that the autopilot's.
     """
 
     def __init__(self, settings: ThrustSettings) -> None:
@@ -61,55 +61,58 @@ class HoverThrust:
         self._filter = ThrustFilter(
             self._curve.share(settings.hover), settings.correction_limit, settings.correction_time
         )
-        self._began: tuple[float, float] | None = None
+        self._window_start: tuple[float, float] | None = None
         self._sum = 0.0
         self._count = 0
 
     @property
     def configured(self) -> float:
-        """Normalised thrust at hover by the settings."""
+        """Normalised thrust at hover in the settings."""
         return self._settings.hover
 
     @property
     def learned(self) -> float:
-        """Normalised thrust at hover by what was learned, with the battery as it was at first."""
+        """Learned normalised thrust at hover, at the battery voltage at the start of the flight."""
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
     def largest(self) -> float:
-        """Largest specific thrust that is given out, m/s²."""
+        """Largest specific thrust that is sent, m/s²."""
         return self._specific(self._settings.highest)
 
     @property
     def largest_tilted(self) -> float:
-        """The same along the axis of a tilted vehicle: an autopilot may make up for tilt itself."""
+        """Largest specific thrust of a tilted vehicle along its thrust axis, m/s².
+
+        An autopilot that compensates the tilt itself may raise the thrust beyond `largest`.
+        """
         settings = self._settings
         return self._specific(1.0 if settings.tilt_compensated else settings.highest)
 
     @property
     def smallest(self) -> float:
-        """Smallest specific thrust that is given out, m/s²."""
+        """Smallest specific thrust that is sent, m/s²."""
         return self._specific(self._settings.lowest)
 
     def normalised(self, acceleration_down: float, q: Quaternion, body_rates: BodyRates) -> float:
-        """Normalised thrust, inside the bounds, for a wanted vertical acceleration.
+        """Normalised thrust within its bounds for a wanted vertical acceleration.
 
         Args:
-            acceleration_down: m/s².
+            acceleration_down: wanted acceleration, m/s², positive down.
             q: attitude.
             body_rates: rad/s.
         """
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)
         thrust = specific_thrust(acceleration_down, 1.0 if settings.tilt_compensated else cosine)
-        return self.within_limits(self._signal(thrust))
+        return self.within_limits(self._normalised(thrust))
 
     def within_limits(self, normalised: float) -> float:
-        """The nearest normalised thrust inside the bounds."""
+        """The normalised thrust, limited to its bounds."""
         return min(max(normalised, self._settings.lowest), self._settings.highest)
 
     def sent(self, normalised: float, q: Quaternion) -> None:
-        """Note a thrust that the vehicle follows, and its attitude then."""
+        """Note a normalised thrust that the vehicle follows, and its attitude at that time."""
         vertical = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
             vertical *= cos_tilt(q[1], q[2])
@@ -117,11 +120,11 @@ class HoverThrust:
         self._count += 1
 
     def observe(self, time: float, velocity_down: float) -> None:
-        """Learn from a measured vertical velocity (m/s) at a vehicle time (s)."""
-        if self._began is None:
-            self._begin(time, velocity_down)
+        """Learn the hover thrust from a vertical velocity (m/s, down) at a vehicle time (s)."""
+        if self._window_start is None:
+            self._begin_window(time, velocity_down)
             return
-        began, before = self._began
+        began, before = self._window_start
         span = time - began
         if 0.0 <= span < SHORTEST:
             return
@@ -130,16 +133,16 @@ class HoverThrust:
             acceleration = (velocity_down - before) / span
             measured = GRAVITY - acceleration - self._settings.drag * velocity
             if _PLAUSIBLE[0] <= measured <= _PLAUSIBLE[1]:
-                extra_variance = (_UNKNOWN_DRAG * velocity) ** 2
+                extra_variance = (_DRAG_DEVIATION * velocity) ** 2
                 self._filter.learn(span, self._sum / self._count, measured, extra_variance)
-        self._begin(time, velocity_down)
+        self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
         """Drop the current window: nothing is learned across a pause."""
-        self._began = None
+        self._window_start = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
-        """Take the battery's voltage in V, at a time in s; None where it is not known."""
+        """Take the battery voltage (V; None: not known) at a time in s."""
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
@@ -147,13 +150,13 @@ class HoverThrust:
         self.pause()
         self._battery.reset()
 
-    def _signal(self, thrust: float) -> float:
-        return self._curve.signal(thrust / (self._filter.gain * self._battery.factor))
+    def _normalised(self, specific: float) -> float:
+        return self._curve.signal(specific / (self._filter.gain * self._battery.factor))
 
     def _specific(self, normalised: float) -> float:
         return self._filter.gain * self._battery.factor * self._curve.share(normalised)
 
-    def _begin(self, time: float, velocity_down: float) -> None:
-        self._began = (time, velocity_down)
+    def _begin_window(self, time: float, velocity_down: float) -> None:
+        self._window_start = (time, velocity_down)
         self._sum = 0.0
         self._count = 0

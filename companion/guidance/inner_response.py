@@ -1,30 +1,36 @@
-"""Response of the attitude loop to its targets, and the lead that compensates it."""
+"""Response of the attitude loop to its targets, and the lead that compensates this response."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import exp, inf
 
 from companion.attitude import Coefficients
+from companion.attitude.reference import first_order_step
 from companion.attitude.representation import wrap_angle
 
 Path = Callable[[float], Coefficients]
-"""Coefficients over time, s."""
+"""Coefficients as a function of time (s)."""
 
 _STEP = 2e-3
-"""Step of the central differences along a path, s: their error is about 1e-7 in flight."""
+"""Step of the central differences along a path, s; it makes an error of about 1e-7 in flight."""
+_MOMENT = 1e-3
+"""Step of the integration in `step_time`, s."""
+_MOST_MOMENTS = 60_000
+_COVERED = 1.0 - exp(-1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class InnerResponse:
-    """ċ + lag·c̈ = gain·(c_d − c), after a dead time.
+    """Response of the coefficients: ċ + lag·c̈ = gain·(c_d − c), after a dead time.
 
     Attributes:
         gain: p, 1/s.
-        lag: of the second order, s; 0 where there is none.
+        lag: lag of the second order, s; 0: the response is of first order.
         dead_time: s.
-        follows_model: whether the planner accounts for its dead time, so that the response is the
-            model's, `dead_time` late: ċ + lag·c̈ = gain·(c_d(t − dead_time) − c). Else the planner
-            compares its target with what it measures, and both act late:
+        follows_model: True: the planner accounts for the dead time, and the response is that of its
+            model, delayed: ċ + lag·c̈ = gain·(c_d(t − dead_time) − c). False: the planner compares
+            the target with the measurement, and both are delayed:
             ċ + lag·c̈ = gain·(c_d − c)(t − dead_time).
     """
 
@@ -35,8 +41,31 @@ class InnerResponse:
 
     @property
     def effective_delay(self) -> float:
-        """The response as a single lag, s: the delay it has on a steadily moving path."""
+        """Delay of the response behind a target that moves steadily, s."""
         return 1.0 / self.gain + self.lag + self.dead_time
+
+    def step_time(self, size: float, max_speed: float = inf) -> float:
+        """Time that the coefficients need for 63 % of a step of the target, s.
+
+        Args:
+            size: size of the step, a coefficient.
+            max_speed: largest speed of the coefficients, 1/s.
+
+        Returns:
+            The time; infinite if it is longer than 60 s.
+        """
+        delay = 0.0 if self.follows_model else self.dead_time
+        speeds = deque([0.0] * (1 + round(delay / _MOMENT)))
+        c = speed = 0.0
+        for k in range(_MOST_MOMENTS):
+            if c >= _COVERED * size:
+                return k * _MOMENT + (self.dead_time if self.follows_model else 0.0)
+            # Without a model, the error of now takes effect one dead time later.
+            speeds.append(min(self.gain * (size - c), max_speed))
+            wanted = speeds.popleft()
+            moved, speed = first_order_step(speed, wanted, max(self.lag, _MOMENT), _MOMENT)
+            c += moved
+        return inf
 
     def target(self, path: Path, time: float) -> Coefficients:
         """The target at `time` with which the coefficients follow `path` without error."""
@@ -49,9 +78,9 @@ class InnerResponse:
         )
 
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
-        """Heading (rad) and its rate (rad/s) to ask for, so that the heading follows its path.
+        """Target heading (rad) and heading rate (rad/s) with which the heading follows its path.
 
-        The planner turns with gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ is left to lead.
+        The planner turns at gain·(ψ_d − ψ) + ψ̇_d, so only lag·ψ̈ remains to be compensated.
         """
         acts = time + self.dead_time
         there = heading(acts)
@@ -65,11 +94,11 @@ class InnerResponse:
         return held + self.lag * bend / self.gain, rate
 
     def _lead(self, before: float, there: float, after: float) -> float:
-        """(ċ + lag·c̈)/gain by central differences."""
+        """(ċ + lag·c̈)/gain from central differences of three coefficients."""
         speed = 0.5 * (after - before) / _STEP
         bend = (after - 2.0 * there + before) / (_STEP * _STEP)
         return (speed + self.lag * bend) / self.gain
 
 
 IMMEDIATE = InnerResponse(gain=inf, lag=0.0, dead_time=0.0, follows_model=True)
-"""No delay at all, so nothing is led."""
+"""A response without delay, so that a target needs no lead."""

@@ -1,4 +1,4 @@
-"""Linear guidance: a reference followed without lag through the known linear inner response."""
+"""Linear guidance: follows a reference without lag, as the response of the tilt is known."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -24,13 +24,13 @@ class LinearSettings:
     """Settings of linear guidance.
 
     Attributes:
-        gains: of the horizontal feedback.
-        height: of the height hold.
+        gains: gains of the horizontal feedback.
+        height: gains of the height hold.
         tilt: response of the coefficients to their targets.
         heading: response of the heading to its target.
-        max_horizontal: largest horizontal acceleration asked for, m/s².
-        thrust_lag: of the rotors, s.
-        period: of the guidance loop, s; within it the target moves and the feedback is constant.
+        max_horizontal: largest horizontal acceleration that is commanded, m/s².
+        thrust_lag: lag of the rotors, s.
+        period: period of the guidance loop, s; in a period the target moves, the feedback does not.
     """
 
     gains: ChainGains
@@ -46,12 +46,12 @@ class GuidanceInput(NamedTuple):
     """Input of one guidance step.
 
     Attributes:
-        now: motion as it is.
-        acts: motion as it will be when what is commanded now acts.
-        thrust: horizontal acceleration by the thrust there is, m/s².
+        now: present motion.
+        acts: motion predicted for the time when the present command takes effect.
+        thrust: horizontal acceleration by the present thrust, m/s².
         disturbance: horizontal acceleration by wind and bias, m/s².
-        drag: of the vehicle.
-        thrust_limits: smallest and largest specific thrust there is, m/s².
+        drag: drag of the vehicle.
+        thrust_limits: smallest and largest specific thrust available, m/s².
     """
 
     now: VehicleMotion
@@ -66,8 +66,8 @@ class LinearCommand(NamedTuple):
     """Output of one guidance step.
 
     Attributes:
-        target: the planner's, now.
-        later: target one period later; between the two it moves on a straight line.
+        target: the planner's target now.
+        later: the target one period later; between the two the target moves on a straight line.
         down: wanted acceleration downwards, m/s².
     """
 
@@ -83,7 +83,7 @@ class Guidance(Protocol):
     def acts_after(self) -> float:
         """Mean delay from computing a command until the vehicle responds to its feedback, s.
 
-        `GuidanceInput.acts` is predicted by it.
+        `GuidanceInput.acts` is predicted for this time.
         """
         ...
 
@@ -95,10 +95,10 @@ class Guidance(Protocol):
 
 
 class LinearGuidance:
-    """Acceleration = the reference's + feedback of the chain position – velocity – acceleration.
+    """Acceleration of the reference, plus feedback of position, velocity and acceleration errors.
 
-    Drag and the observed disturbance are fed forward. The result is a path of coefficients. The
-    target is led so that they follow the path through the inner response (`InnerResponse.target`).
+    Drag and the observed disturbance are fed forward. The result is a path of coefficients.
+    `InnerResponse.target` leads the target, so that the coefficients follow this path.
     """
 
     def __init__(self, settings: LinearSettings) -> None:
@@ -115,8 +115,8 @@ class LinearGuidance:
         """One step.
 
         Args:
-            reference_at: the reference over time; also read a little ahead of `time`.
-            time: now, s.
+            reference_at: the reference over time; it is also read a little ahead of `time`.
+            time: the present time, s.
             inputs: motion, thrust and disturbance of the vehicle.
         """
         reference = reference_at(time)
@@ -142,7 +142,7 @@ class LinearGuidance:
         return LinearCommand(target, later, down)
 
     def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
-        """Horizontal acceleration against the errors and the disturbance, m/s², limited."""
+        """Horizontal acceleration that corrects errors and disturbance, m/s², limited."""
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.drifting:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
@@ -164,7 +164,7 @@ class LinearGuidance:
     def _coefficients(
         self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients of the thrust for the reference's acceleration and `more`, against drag."""
+        """Coefficients for the reference's acceleration, its drag, and `more` (m/s²)."""
         slowed = inputs.drag.deceleration(reference.velocity_ned)
         north, east = limited(
             reference.acceleration_ned[0] + slowed[0] + more[0],
@@ -172,11 +172,11 @@ class LinearGuidance:
             self._settings.max_horizontal,
         )
         north, east, down = height_first((north, east, down), *inputs.thrust_limits)
-        # Its vertical part carries g − a_D, the rest is horizontal.
+        # The vertical part of the thrust is g − a_D.
         vertical = GRAVITY - down
         thrust = sqrt(north * north + east * east + vertical * vertical)
         return Coefficients(north / thrust, east / thrust)
 
     def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
-        """Heading and its rate to ask for, so that the heading follows the reference's."""
+        """Target heading and heading rate with which the heading follows the reference."""
         return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)

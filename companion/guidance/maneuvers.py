@@ -9,29 +9,29 @@ from companion.attitude import Coefficients
 from companion.guidance.reference import Pose, Reference
 
 _REST = 1.0
-"""The position hold pauses this long before open-loop steps, s: its corrections would disturb the
-attitude from which a step is measured."""
+"""Pause of the position hold before open-loop steps, s: its corrections would disturb the attitude
+from which a step is measured."""
 
 
 class Maneuver(Protocol):
-    """A reference over time; anchored to the pose at which it was told to begin."""
+    """A reference over time, relative to the pose at which the maneuver begins."""
 
     @property
     def name(self) -> str:
-        """What the user calls it."""
+        """Name in the configuration and in messages."""
         ...
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         ...
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference `time` seconds after the beginning at `start`."""
+        """The reference `time` seconds after the maneuver began at `start`."""
         ...
 
     def check_times(self) -> list[float]:
-        """Times at which to check it against limits and fence, s, ascending."""
+        """Times at which the maneuver is checked against limits and fence, s, ascending."""
         ...
 
 
@@ -45,13 +45,14 @@ def spread(begin: float, end: float, step: float = 0.01) -> list[float]:
 class Steps:
     """Acceleration doublets +c, −c, +c (lasting T, 2T, T) along north, east and north-west.
 
-    Each begins from an attitude at rest, for which the hold pauses. With an ideal response the
-    vehicle ends where it began, at rest. Position hold corrects the rest for `settle` seconds.
+    Before each doublet the position hold pauses, so that the attitude is at rest. With an ideal
+    response the vehicle ends where it began, at rest. Position hold corrects the remaining error
+    for `settle` seconds.
 
     Attributes:
         coefficient: length of c, the sine of the tilt.
-        step: T in s.
-        settle: s.
+        step: T, s.
+        settle: time of position hold after each doublet, s.
     """
 
     coefficient: float
@@ -63,7 +64,7 @@ class Steps:
 
     @property
     def duration(self) -> float:
-        """Three doublets, each with the rest before and its settling, s."""
+        """Three doublets, each with the pause before it and the settling after it, s."""
         return len(self.DIRECTIONS) * self._period
 
     @property
@@ -71,7 +72,7 @@ class Steps:
         return _REST + 4.0 * self.step + self.settle
 
     def check_times(self) -> list[float]:
-        """Finely over each doublet, whose end stands for the settling, s."""
+        """Times 0.01 s apart over each doublet, s; the settling is not checked."""
         begins = [which * self._period + _REST for which in range(len(self.DIRECTIONS))]
         return [time for begin in begins for time in spread(begin, begin + 4.0 * self.step)]
 
@@ -94,16 +95,17 @@ class Steps:
 class Corners:
     """Acceleration steps between the corners of a rectangle, none of them through level.
 
-    There the methods differ, as in the paper's figure 2; steps through level run straight with any
-    of them. The first begins from an attitude at rest, for which the hold pauses. Twice round, the
-    second time mirrored, brings the vehicle, on an ideal response, back to where it was and to
-    rest; what remains is taken out by position hold for `settle` seconds.
+    Such steps show the differences between the planners, as in the paper's figure 2; a step through
+    level is straight with every planner. Before the first step the position hold pauses, so that
+    the attitude is at rest. The vehicle goes round twice, the second time mirrored. With an ideal
+    response it ends where it began, at rest. Position hold corrects the remaining error for
+    `settle` seconds.
 
     Attributes:
-        north, east: coefficients of the corners, up to their signs; the tilt there has the sine
+        north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
-        step: how long each corner is held, s.
-        settle: s.
+        step: duration of each corner, s.
+        settle: time of position hold at the end, s.
     """
 
     north: float
@@ -125,11 +127,11 @@ class Corners:
 
     @property
     def duration(self) -> float:
-        """The rest, all corners, and the settling, s."""
+        """The pause before the steps, all corners, and the settling, s."""
         return _REST + len(self.CORNERS) * self.step + self.settle
 
     def check_times(self) -> list[float]:
-        """Finely over the corners, and the end, s."""
+        """Times 0.01 s apart over the corners, and the end, s."""
         return [*spread(_REST, _REST + len(self.CORNERS) * self.step), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:

@@ -14,10 +14,10 @@ class ObserverSettings:
     """How strongly measurements correct the observer.
 
     Attributes:
-        bandwidth: of the disturbance, rad/s: both poles of the observer.
+        bandwidth: both poles of velocity and disturbance, rad/s.
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
-        largest: bound on the disturbance, m/s².
+        largest: largest disturbance, m/s².
     """
 
     bandwidth: float
@@ -27,14 +27,14 @@ class ObserverSettings:
 
 
 class MotionObserver:
-    """A model driven by the measured attitude and corrected by the measured motion.
+    """A motion model driven by the measured attitude and corrected by the measured motion.
 
-    The horizontal acceleration is that of the thrust by the measured tilt, plus drag, plus a
-    disturbance that changes slowly. The measured tilt counts, not the commanded one, so a saturated
-    command does not wind the disturbance up.
+    The horizontal acceleration is the sum of thrust, drag and a disturbance that changes slowly.
+    The thrust follows from the measured tilt, not the commanded one, so that the disturbance does
+    not wind up when the command saturates.
 
     Attributes:
-        disturbance: horizontal, m/s².
+        disturbance: horizontal acceleration by wind and bias, m/s², NED.
     """
 
     def __init__(self, settings: ObserverSettings) -> None:
@@ -44,7 +44,7 @@ class MotionObserver:
         self._time = 0.0
 
     def reset(self) -> None:
-        """Start anew: offboard control was not active, or the estimator jumped."""
+        """Start again: offboard control was not active, or the estimate jumped."""
         self._motion = None
         self.disturbance = (0.0, 0.0)
 
@@ -52,8 +52,8 @@ class MotionObserver:
         """Take a measured position and velocity.
 
         Args:
-            time: of the measurement, vehicle time, s.
-            measured: m and m/s, NED.
+            time: vehicle time of the measurement, s.
+            measured: measured motion, NED.
             known: horizontal acceleration by thrust and drag since the last measurement, m/s².
         """
         motion, dt = self._motion, time - self._time
@@ -62,9 +62,11 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        believed = 1.0 - exp(-2.0 * settings.bandwidth * dt)
-        learned = (1.0 - exp(-settings.bandwidth * dt)) ** 2 / dt
-        near = 1.0 - exp(-dt / settings.position_time) if settings.position_time > 0.0 else 1.0
+        velocity_gain = 1.0 - exp(-2.0 * settings.bandwidth * dt)
+        disturbance_gain = (1.0 - exp(-settings.bandwidth * dt)) ** 2 / dt
+        position_gain = 1.0
+        if settings.position_time > 0.0:
+            position_gain = 1.0 - exp(-dt / settings.position_time)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):
@@ -73,18 +75,19 @@ class MotionObserver:
                 motion.velocity_ned[axis] + 0.5 * dt * acceleration
             )
             v = motion.velocity_ned[axis] + dt * acceleration
-            away = position[axis] - p
-            off = velocity[axis] - v + settings.position_pull * away
-            position[axis] = p + near * away
-            velocity[axis] = v + believed * off
-            found[axis] = disturbance[axis] + learned * off
+            position_error = position[axis] - p
+            error = velocity[axis] - v + settings.position_pull * position_error
+            position[axis] = p + position_gain * position_error
+            velocity[axis] = v + velocity_gain * error
+            found[axis] = disturbance[axis] + disturbance_gain * error
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
         self.disturbance = limited(found[0], found[1], settings.largest)
 
     def turn(self, angle: float) -> None:
-        """Turn the disturbance by a jump of the measured heading, rad.
+        """Rotate the disturbance by `angle` (rad), a jump of the estimated heading.
 
-        The vehicle did not turn: it must keep leaning the same way against the disturbance.
+        The vehicle itself did not turn, and must keep the tilt with which it resists the
+        disturbance.
         """
         self.disturbance = rotated(*self.disturbance, angle)
 
@@ -115,28 +118,28 @@ def _vector(values: list[float]) -> Vector:
     return north, east, down
 
 
-_KEPT = 200
-"""Attitudes kept: 0.8 s at 250 Hz, longer than any position is delayed."""
+_LENGTH = 200
+"""Number of attitudes kept: 0.8 s at 250 Hz, longer than the delay of any position."""
 
 
 class SlopeHistory:
-    """Horizontal per vertical thrust over vehicle time, as its running integral.
+    """History of the slope, the horizontal thrust divided by the vertical thrust.
 
-    Positions come late, seldom, and not in step with guidance. The mean between two of them is
-    taken between their own time stamps.
+    The observer needs the mean slope between the time stamps of two positions. These come late and
+    at other times than the attitudes, so the history keeps the integral of the slope.
     """
 
     def __init__(self) -> None:
-        self._times: deque[float] = deque(maxlen=_KEPT)
-        self._sums: deque[Horizontal] = deque(maxlen=_KEPT)
+        self._times: deque[float] = deque(maxlen=_LENGTH)
+        self._sums: deque[Horizontal] = deque(maxlen=_LENGTH)
         self.newest: Horizontal = (0.0, 0.0)
 
     def add(self, time: float, slope: Horizontal) -> None:
-        """Take the slope of an attitude; one that is not newer than the last starts anew.
+        """Add the slope of an attitude; if it is not newer than the last, the history restarts.
 
         Args:
             time: vehicle time, s.
-            slope: north and east, no unit.
+            slope: north and east, without unit.
         """
         if not self._times or time <= self._times[-1]:
             self._times.clear()
@@ -157,19 +160,22 @@ class SlopeHistory:
         self.newest = slope
 
     def forget(self) -> None:
-        """Start anew: the north of the earlier attitudes was another one."""
+        """Forget all attitudes: a jump of the heading has changed where north is."""
         self._times.clear()
         self._sums.clear()
 
     def mean(self, start: float, end: float) -> Horizontal:
-        """The mean slope between two vehicle times, s; constant beyond the known attitudes."""
+        """The mean slope between two vehicle times, s.
+
+        Before the first attitude and after the last, the slope is taken as constant.
+        """
         if not start < end or not self._times:
             return self.newest
         (n0, e0), (n1, e1) = self._integral(start), self._integral(end)
         return (n1 - n0) / (end - start), (e1 - e0) / (end - start)
 
     def _integral(self, time: float) -> Horizontal:
-        """Up to `time`, between and beyond the attitudes along the straight line."""
+        """The integral of the slope until `time`, linear between and beyond the attitudes."""
         times, sums = self._times, self._sums
         if time >= times[-1]:
             after = time - times[-1]

@@ -1,7 +1,7 @@
-"""Predicted motion of a maneuver: its reference, and the effect of its open-loop commands.
+"""Predicted motion of a maneuver, from its reference and its open-loop commands.
 
-An open-loop step accelerates as its tilt does while the height is held. The time in which the tilt
-builds up is neglected: it delays the motion and hardly changes it.
+An open-loop step accelerates the vehicle as its tilt does at constant height. The time until the
+tilt is reached is neglected: it delays the motion and hardly changes it.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,14 @@ _LARGEST_TILT = 1.4
 
 
 class Moment(NamedTuple):
-    """The vehicle at one time of a maneuver: s, m from where it began and m/s, NED."""
+    """The vehicle at one time of a maneuver, NED.
+
+    Attributes:
+        time: time since the maneuver began, s.
+        offset: position from where the maneuver began, m.
+        velocity: m/s.
+        acceleration: m/s².
+    """
 
     time: float
     offset: Vector
@@ -26,12 +33,12 @@ class Moment(NamedTuple):
 
 
 def predicted(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Iterator[Moment]:
-    """The maneuver at its `check_times`, begun at rest.
+    """The predicted motion at the maneuver's `check_times`; it begins at rest.
 
     Args:
         part: the maneuver.
-        heading: at its beginning, rad.
-        drag: against still air.
+        heading: heading at the beginning, rad.
+        drag: drag in still air.
     """
     start = Pose((0.0, 0.0, 0.0), heading)
     before, open_loop = 0.0, _OpenLoop(heading, drag)
@@ -41,22 +48,22 @@ def predicted(part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG) -> Ite
         moment = Moment(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
-        yield moment if between.closed_loop else open_loop.carried(moment, between, time - before)
+        yield moment if between.closed_loop else open_loop.advance(moment, between, time - before)
         if reference.closed_loop:
             open_loop = _OpenLoop(heading, drag)
         before = time
 
 
 class _OpenLoop:
-    """Horizontal motion by commanded tilt, from rest."""
+    """Integrates the horizontal motion by commanded tilt, from rest."""
 
     def __init__(self, heading: float, drag: Drag) -> None:
         self._heading, self._drag = heading, drag
         self._place = self._speed = (0.0, 0.0)
         self._roll = self._pitch = 0.0
 
-    def carried(self, moment: Moment, reference: Reference, span: float) -> Moment:
-        """The moment `span` seconds later, with what the reference commands between."""
+    def advance(self, moment: Moment, reference: Reference, span: float) -> Moment:
+        """Integrate `span` seconds of what `reference` commands; `moment` with the result."""
         (north, east), (fast_north, fast_east) = self._place, self._speed
         by_tilt = self._acceleration(reference, span)
         slowed = self._drag.deceleration((fast_north, fast_east, 0.0))

@@ -28,12 +28,13 @@ class VehicleMotion(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """Where the vehicle should be at one instant.
+    """What the vehicle should do at one instant; NED, m, m/s, m/s², rad.
 
-    `coefficients` command the horizontal acceleration open loop; position and velocity then count
-    for the height only. So do `body_rates`. `drifting` pauses the horizontal feedback: only the
-    disturbance is compensated. Without `holds_height`, the vertical acceleration is commanded as it
-    is, and the height is not held. `thrust` (0..1) replaces the thrust that guidance computes.
+    `coefficients` or `body_rates` (rad/s) command the horizontal motion open loop; position and
+    velocity then count for the height only. `thrust_steps` says that the vertical acceleration
+    jumps. `drifting` pauses the horizontal feedback: only the disturbance is compensated. Without
+    `holds_height`, the vertical acceleration is commanded as it is, and the height is not held.
+    `thrust` (0..1) replaces the thrust that guidance computes.
     """
 
     position_ned: Vector
@@ -50,12 +51,12 @@ class Reference(NamedTuple):
 
     @property
     def closed_loop(self) -> bool:
-        """Whether guidance computes the acceleration: no coefficients or rates are commanded."""
+        """Whether guidance computes the acceleration: no open-loop command is given."""
         return self.coefficients is None and self.body_rates is None
 
     @property
-    def position_is_meant(self) -> bool:
-        """Whether the horizontal position counts, not only the height."""
+    def holds_position(self) -> bool:
+        """Whether the vehicle should be at the horizontal position, not only at the height."""
         return self.closed_loop and not self.drifting
 
     @property
@@ -73,7 +74,7 @@ Horizontal = tuple[float, float]
 
 
 def limited(north: float, east: float, most: float) -> Horizontal:
-    """The vector, shortened along its direction where it is longer than `most`."""
+    """The vector, shortened to `most` if it is longer; its direction is kept."""
     length = hypot(north, east)
     if length <= most:
         return north, east
@@ -81,6 +82,6 @@ def limited(north: float, east: float, most: float) -> Horizontal:
 
 
 def rotated(north: float, east: float, angle: float) -> Horizontal:
-    """The vector turned clockwise, seen from above, by an angle in rad."""
+    """The vector turned clockwise, seen from above, by `angle` in rad."""
     c, s = cos(angle), sin(angle)
     return c * north - s * east, s * north + c * east

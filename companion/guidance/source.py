@@ -1,4 +1,4 @@
-"""Sources of guidance: where the reference comes from while the vehicle is under our control."""
+"""Sources of references for guidance: maneuvers, or references given one by one."""
 
 from typing import Protocol
 
@@ -7,19 +7,19 @@ from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMo
 
 
 class Source(Protocol):
-    """Tells the reference. Maneuvers, another program's setpoints and a coroutine are its kinds.
+    """Gives guidance its reference: maneuvers, another program's setpoints, or a user's coroutine.
 
-    Times are s on our clock. Positions are NED in m, in the frame without estimator resets.
+    Times are event-loop times, s. Positions are m NED, in the frame without estimator resets.
     """
 
     @property
     def name(self) -> str:
-        """Shown to the user."""
+        """Name to show to the user."""
         ...
 
     @property
     def failure(self) -> str | None:
-        """Why the source has nothing to fly any more although it is not finished, or None."""
+        """Why the source cannot continue although it is not finished; None: it can."""
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -31,12 +31,12 @@ class Source(Protocol):
 
         Args:
             now: time of this step of guidance.
-            motion: of the vehicle at `now`.
+            motion: motion of the vehicle at `now`.
         """
         ...
 
     def finished(self, now: float) -> bool:
-        """Whether the source has no more to fly; its last reference holds on."""
+        """Whether the source has no more to fly; its last reference stays in force."""
         ...
 
 
@@ -44,10 +44,10 @@ class ManeuverSource:
     """Flies maneuvers, one after the other, from the pose at which it begins.
 
     Attributes:
-        maneuvers: to fly.
+        maneuvers: the maneuvers to fly.
         begun_at: when they began, or None.
-        pose: where they began, or None.
-        failure: None; a maneuver that is given up is held by guidance.
+        pose: the pose at which they began, or None.
+        failure: always None; guidance itself holds when a maneuver is given up.
     """
 
     failure: str | None = None
@@ -70,7 +70,7 @@ class ManeuverSource:
         """The reference of the maneuver that is flown at each time.
 
         Raises:
-            RuntimeError: they have not begun.
+            RuntimeError: the maneuvers have not begun.
         """
         begun_at, pose = self.begun_at, self.pose
         if begun_at is None or pose is None:
@@ -83,20 +83,20 @@ class ManeuverSource:
 
 
 class CommandedSource:
-    """The newest reference that another program or the user's code gave, while it is fresh.
+    """References that another program or the user's code gives one by one.
 
-    Between two of them the reference moves on by its own velocity, acceleration and jerk. Once one
-    has become older than `stale`, or the next one comes later than that, the source has failed: the
-    vehicle is held where it is, and no later reference is flown.
-
-    Attributes:
-        name: who gives the references.
-        pose: where the source began, or None before.
+    Between two of them the reference moves on by its own velocity, acceleration and jerk. If a
+    reference becomes older than `stale` before the next one comes, the source fails: the vehicle
+    holds its position, and later references are not flown.
 
     Args:
         name: who gives the references.
         stale: age beyond which a reference is not flown, s.
         begins_within: time allowed for the first reference, s.
+
+    Attributes:
+        name: who gives the references.
+        pose: the pose at which the source began, or None.
     """
 
     def __init__(self, name: str, stale: float, begins_within: float) -> None:
@@ -121,10 +121,10 @@ class CommandedSource:
         """Take a new reference.
 
         Args:
-            reference: at `now`.
-            now: s on our clock.
-            jerk_ned: rate of the reference's acceleration, m/s³. None: by the difference from the
-                reference before.
+            reference: the reference at `now`.
+            now: s of event-loop time.
+            jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
+                the difference to the reference before; 0 for the first.
         """
         before, since = self._newest, now - self._given_at
         self._require_fresh(now)
@@ -142,11 +142,11 @@ class CommandedSource:
         self._newest, self._given_at = reference, now
 
     def end(self) -> None:
-        """Give no more references."""
+        """Note that no more references will come."""
         self._ended = True
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
-        """The newest reference, continued; or a hold where the vehicle is when it is too old."""
+        """The newest reference, extrapolated; if it is too old, a hold of the present position."""
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
         if newest is not None and self._failure is None:
@@ -157,7 +157,7 @@ class CommandedSource:
         return lambda _: held
 
     def _hold(self, motion: VehicleMotion) -> Reference:
-        """Hold where the source began; after references were flown, where the vehicle is."""
+        """Hold the pose at which the source began, or after references the present position."""
         if self._newest is None and self.pose is not None:
             return Reference(self.pose.position_ned, heading=self.pose.heading)
         heading = 0.0 if self._newest is None else self._newest.heading
@@ -165,17 +165,17 @@ class CommandedSource:
 
     def _require_fresh(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one does not come."""
-        patience = self._begins_within if self._newest is None else self._stale
-        if self._failure is None and not self._ended and now - self._given_at > patience:
-            self._failure = f"{self.name} gave no new command for {patience:g} s"
+        allowed = self._begins_within if self._newest is None else self._stale
+        if self._failure is None and not self._ended and now - self._given_at > allowed:
+            self._failure = f"{self.name} gave no new command for {allowed:g} s"
 
     @property
     def failure(self) -> str | None:
-        """Why control must end: told by `fail`, or the references have stopped."""
+        """Why control must end: the reason given to `fail`, or that references have stopped."""
         return self._failure
 
     def fail(self, reason: str) -> None:
-        """Give no more references, because of `reason`."""
+        """Note that no more references will come, because of `reason`."""
         self._failure = reason
 
     def finished(self, now: float) -> bool:

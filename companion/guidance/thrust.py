@@ -1,4 +1,4 @@
-"""Thrust: from the wanted acceleration to specific thrust, m/s², and to the signal, 0..1."""
+"""Thrust: specific thrust (m/s²) for a wanted acceleration, and its normalised signal (0..1)."""
 
 from math import acos, hypot, isfinite, sqrt
 
@@ -7,17 +7,17 @@ from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY, Vector
 
 FOR_TILT = 0.95
-"""Share of the largest thrust available for tilt; the rest is a reserve against a gust."""
+"""Share of the largest thrust that is used when tilted; the rest is a reserve for gusts."""
 
 _MIN_COSINE = 0.5
-"""Beyond 60° of tilt the thrust is not raised further, at the cost of height."""
+"""Cosine of the largest tilt (60°) up to which the thrust is raised with the tilt."""
 
 
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
-    """T = (g − a_D)/cos(tilt) in m/s², with the tilt there is.
+    """T = (g − a_D)/cos(tilt) in m/s², for the present tilt.
 
-    Beyond 60° of tilt thrust fades instead, to none at 90°: upside down it would push the vehicle
-    to the ground.
+    Beyond 60° of tilt the thrust falls, to none at 90°: upside down it would push the vehicle to
+    the ground.
     """
     wanted = max(0.0, GRAVITY - acceleration_down)
     if cos_tilt < _MIN_COSINE:
@@ -26,10 +26,10 @@ def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
 
 
 def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
-    """Cosine of the tilt that the vehicle will have in `ahead` seconds if it rotates on like this.
+    """Cosine of the tilt in `ahead` seconds, if the vehicle keeps rotating at `body_rates` (rad/s).
 
-    Thrust for this tilt instead of the present one makes up for the lag of the rotors while the
-    vehicle tilts: T + lag·Ṫ, to first order. From Ṙ = R·[ω]ₓ, third row.
+    Thrust for this tilt instead of the present one compensates the lag of the rotors while the
+    vehicle tilts, to first order (T + lag·Ṫ). Source: third row of Ṙ = R·[ω]ₓ.
     """
     w, x, y, z = q
     north, east = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
@@ -38,11 +38,11 @@ def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
 
 
 def largest_tilt(lift: float, largest: float) -> float:
-    """The largest tilt at which the thrust still gives the lift, rad; 0 where none is to spare.
+    """The largest tilt at which the thrust still gives the lift, rad; 0 if no thrust is left.
 
     Args:
-        lift: upward part of the specific thrust, m/s².
-        largest: specific thrust, m/s².
+        lift: upward component of the specific thrust, m/s².
+        largest: largest specific thrust, m/s².
     """
     if lift >= FOR_TILT * largest:
         return 0.0
@@ -50,17 +50,16 @@ def largest_tilt(lift: float, largest: float) -> float:
 
 
 def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
-    """The acceleration nearest to `wanted` that thrust within its limits gives.
+    """Limit the acceleration to what the thrust gives, with priority for the height.
 
-    What thrust cannot give is taken from the horizontal part, whose direction is kept: the target's
-    tilt shrinks and the height stays. The last of the thrust (`FOR_TILT`) is kept for the height.
-    Only with too little thrust asked for, as in a fast descent, the vertical part gives way, for
-    thrust cannot be less.
+    If the thrust is too small, the horizontal part is shortened in its direction: the tilt shrinks
+    and the height is kept. Tilt uses at most the share `FOR_TILT` of the largest thrust. If
+    `wanted` needs less than the smallest thrust, as in a fast descent, the vertical part changes.
 
     Args:
         wanted: acceleration NED, m/s².
-        smallest: specific thrust, m/s².
-        largest: specific thrust, m/s².
+        smallest: smallest specific thrust, m/s².
+        largest: largest specific thrust, m/s².
 
     Returns:
         Acceleration NED, m/s².
@@ -77,14 +76,14 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
 
 
 _SMOOTHING = 0.3
-"""Time constant of the voltage, s; ArduPilot's (MOT_BAT_V_MAX) is filtered at 0.5 Hz."""
+"""Time constant of the voltage filter, s; ArduPilot's (MOT_BAT_V_MAX) has a cutoff of 0.5 Hz."""
 
 _PLAUSIBLE = 0.6, 1.2
-"""Range of voltage / first voltage; outside it the reading is broken."""
+"""Plausible range of voltage / first voltage; a reading outside it is ignored."""
 
 
 class ThrustCurve:
-    """share = factor·u² + (1 − factor)·u: the share of full thrust over the signal, both 0..1.
+    """share = factor·u² + (1 − factor)·u: the share of full thrust at the signal u, both 0..1.
 
     PX4's THR_MDL_FAC and ArduPilot's MOT_THST_EXPO are this factor.
 
@@ -110,17 +109,17 @@ class ThrustCurve:
 
 
 class BatterySag:
-    """Thrust relative to that at the first voltage in the air: (V/V₀)^exponent.
+    """Loss of thrust by a falling battery voltage: factor (V/V₀)^exponent.
 
-    The configured hover thrust holds for a vehicle that hovers, so V₀ is the first voltage in the
-    air, under load.
-
-    Attributes:
-        factor: of the thrust; 1 while the voltage is not known.
+    V₀ is the first voltage in the air, under load, because the configured hover thrust is that of a
+    hovering vehicle.
 
     Args:
-        exponent: 2 for plain speed controllers, whose rotor speed follows the voltage; 0 where the
+        exponent: 2 for plain speed controllers, whose rotor speed follows the voltage; 0 if the
             autopilot or the speed controllers compensate the voltage.
+
+    Attributes:
+        factor: thrust relative to that at V₀; 1 while the voltage is not known.
     """
 
     def __init__(self, exponent: float) -> None:
@@ -136,7 +135,7 @@ class BatterySag:
         self._ratio = self.factor = 1.0
 
     def note(self, time: float, voltage: float | None) -> None:
-        """Take the whole battery's voltage in V, at a time in s; an unusable one is ignored."""
+        """Take the voltage of the whole battery (V) at a time in s; an unusable one is ignored."""
         if voltage is None or not isfinite(voltage) or voltage <= 0.0 or self._exponent == 0.0:
             return
         if self._first is None:

@@ -1,54 +1,57 @@
-"""Specific thrust per share of full thrust, estimated from the measured acceleration."""
+"""Estimates the specific thrust per share of full thrust from the measured acceleration."""
 
 from math import copysign
 
 from companion.guidance.reference import GRAVITY
 
 SHORTEST = 0.1
-"""Velocity is differenced over at least this long, s: its noise is divided by the span."""
+"""Shortest time between two velocities that are differenced, s; a longer one reduces the noise."""
 
 _FIRST_DEVIATION = 0.4
-"""Standard deviation of the configured hover thrust, as a share of it."""
+"""Relative standard deviation of the configured hover thrust."""
 
 _GATE = 3.0
-"""Innovations of more standard deviations than this are not believed (PX4: HTE_ACC_GATE)."""
+"""An innovation of more standard deviations than this is rejected (PX4: HTE_ACC_GATE)."""
 
 _NOISE = 0.2
-"""Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds for it."""
+"""Usual variance of a measured specific thrust, (m/s²)²; `time_constant` holds at this value."""
 
-_FIRST_NOISE, _LEAST_NOISE, _MOST_NOISE = 1.0, 0.05, 100.0
-"""Larger at first: the rotors still change from the thrust before takeover. (m/s²)²."""
+_FIRST_NOISE, _SMALLEST_NOISE, _LARGEST_NOISE = 1.0, 0.05, 100.0
+"""Initial variance of a measured specific thrust and its bounds, (m/s²)².
+
+The initial variance is large because the rotors still change from the thrust before takeover.
+"""
 
 _NOISE_TIME = 2.0
-"""Time constant with which that variance is learned, s."""
+"""Time constant with which the variance of the measurements is learned, s."""
 
-_REFUSAL_TIME = 1.0
-"""Time constant of the mean of refusals, s."""
+_REJECTION_TIME = 1.0
+"""Time constant of the low-pass filter on rejections, s."""
 
 _LASTING = 0.2
-"""Filtered mean of refusals (+1 too high, −1 too low) that counts as lasting: about 0.25 s."""
+"""Filtered rejections (+1 too high, −1 too low) above this reset the variance: after 0.25 s."""
 
 
 class ThrustFilter:
-    """Kalman filter with an innovation gate, as PX4's `hover_thrust_estimator` is built.
+    """Kalman filter with an innovation gate, like PX4's `hover_thrust_estimator`.
 
-    The state is k = g / hover thrust, the measurement T = k·share + noise; the share is that of a
-    linear thrust curve. The noise is learned from the residuals (Akhlaghi et al., Adaptive
-    Adjustment of Noise Covariance in Kalman Filter for Dynamic State Estimation, 2017). A load that
-    is picked up or dropped would be refused for ever: when refusals last, the state's variance is
-    what it was at first.
+    The state is k = g / hover thrust, and the measurement is T = k·share + noise; the share of
+    thrust is that of a linear thrust curve. The noise is learned from the residuals (Akhlaghi et
+    al., Adaptive Adjustment of Noise Covariance in Kalman Filter for Dynamic State Estimation,
+    2017). After a load is picked up or dropped, all measurements would be rejected: if rejections
+    last, the variance of the state is reset to its initial value.
 
-    PX4 has the hover thrust itself for its state, and must linearise: H = −g·u/h². In k the
-    measurement is linear, so that a first guess that is far off costs no more than a near one.
-
-    Attributes:
-        gain: k, m/s² for all of the thrust.
+    PX4 estimates the hover thrust itself and must linearise: H = −g·u/h². The measurement is linear
+    in k, so the filter converges equally fast from a poor first guess.
 
     Args:
-        hover: share of thrust that is expected to hover.
-        limit: the hover thrust is at most 1 + limit times that, and at least the same part of it.
-        time_constant: with which a slow change is followed, s; noisier measurements are followed
-            more slowly, with the square root.
+        hover: expected share of thrust at hover.
+        limit: the learned share is at most `hover`·(1 + limit), and at least `hover`/(1 + limit).
+        time_constant: time constant with which a slow change is followed, s; it grows with the
+            standard deviation of the measurements.
+
+    Attributes:
+        gain: k, the specific thrust at full thrust, m/s².
     """
 
     def __init__(self, hover: float, limit: float, time_constant: float) -> None:
@@ -59,7 +62,7 @@ class ThrustFilter:
         self._drift = _NOISE * SHORTEST / (time_constant * hover) ** 2
         self._variance = self._first_variance
         self._noise = _FIRST_NOISE
-        self._refusals = 0.0
+        self._rejections = 0.0
 
     def learn(
         self, span: float, share: float, specific_thrust: float, extra_variance: float
@@ -67,20 +70,20 @@ class ThrustFilter:
         """Take one measurement.
 
         Args:
-            span: since the last one or over which it was taken, s.
-            share: of thrust, 0..1, mean over the span.
-            specific_thrust: along the same axis, m/s², mean over the span.
-            extra_variance: variance that this one has beyond the usual, (m/s²)².
+            span: duration of the measurement, s.
+            share: mean share of thrust, 0..1.
+            specific_thrust: mean specific thrust along the same axis, m/s².
+            extra_variance: variance to add to that of the noise, (m/s²)².
         """
         self._variance = min(self._variance + self._drift * span, self._first_variance)
         innovation = specific_thrust - self.gain * share
         expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE * _GATE * expected)
-        passed = min(1.0, span / _REFUSAL_TIME)
-        self._refusals += passed * (copysign(min(ratio, 1.0), innovation) - self._refusals)
+        passed = min(1.0, span / _REJECTION_TIME)
+        self._rejections += passed * (copysign(min(ratio, 1.0), innovation) - self._rejections)
         if ratio > 1.0:
-            if abs(self._refusals) > _LASTING:
-                self._variance, self._refusals = self._first_variance, 0.0
+            if abs(self._rejections) > _LASTING:
+                self._variance, self._rejections = self._first_variance, 0.0
             return
         kalman = self._variance * share / expected
         self.gain = min(max(self.gain + kalman * innovation, self._bounds[0]), self._bounds[1])
@@ -90,4 +93,4 @@ class ThrustFilter:
     def _learn_noise(self, span: float, share: float, residual: float) -> None:
         seen = residual * residual + share * share * self._variance
         noise = self._noise + min(1.0, span / _NOISE_TIME) * (seen - self._noise)
-        self._noise = min(max(noise, _LEAST_NOISE), _MOST_NOISE)
+        self._noise = min(max(noise, _SMALLEST_NOISE), _LARGEST_NOISE)

@@ -1,4 +1,4 @@
-"""How a vehicle answers body rates and thrust, from what a flight has recorded; needs only NumPy.
+"""Identifies a vehicle's response to body rates and thrust from a recorded flight, with NumPy.
 
     >>> import numpy as np
     >>> from companion.identification import fit_rate_response
@@ -11,8 +11,8 @@
     >>> round(fit.lag, 2), round(fit.dead_time, 2), fit.is_good()
     (0.05, 0.04, True)
 
-The time of a command is the vehicle time of the sample that it answered. So a dead time found here
-is the time from a sample to the first effect of its answer, as `vehicle.dead_time_ms` is.
+The time of a command is the vehicle time of the sample to which it responds. So a dead time found
+here is the time from a sample to the first effect of its command, like `vehicle.dead_time_ms`.
 `companion.vehicle.flight_log.read_flight_log` gives the rows of a `.tlog`.
 
 A whole vehicle
@@ -20,14 +20,14 @@ A whole vehicle
     IdentifiedVehicle         roll, pitch, yaw, thrust; `faults` says which fits must not be used
     vehicle_table             the fits as a table for the terminal
     vehicle_fragment          the fits as YAML for a configuration
-    kept_axes                 axes whose values are kept because their fit is bad
+    kept_axes                 configured values of the axes whose fit is bad
 
 One axis
     fit_rate_response         lag, dead time, gain and slew limit: a `RateResponse`
     RateResponse              the fit; `is_good` and `reason` say whether it may be used
     FitQuality, FitNeeds      how good a fit is, and how good it must be
-    SecondOrderFit            the nearest second-order response
-    BadFitError               a fit must not be used
+    SecondOrderFit            the second-order response that fits best
+    BadFitError               raised if a fit must not be used
     dead_time_by_correlation  the delay alone, by cross-correlation
 
 Thrust

@@ -1,33 +1,32 @@
-"""The delay between commands and measurements, by their cross-correlation.
+"""The delay between commands and measurements, from their cross-correlation.
 
-Both are filtered to the frequency where a first-order lag describes a real rate loop best. In slow
-turns the autopilot's rate integrator compensates the lag: PX4 answers a circle's 1 rad/s after
-40 ms, and steps after 87 ms. In fast turns its second order shows.
+Both are filtered to the frequencies at which a first-order lag describes a real rate loop best. At
+low frequencies the autopilot's rate integrator compensates the lag: PX4 follows a circle (1 rad/s)
+with a delay of 40 ms, and steps with 87 ms. At high frequencies the rate loop is of second order.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.identification.lags import held, lagged, slewed, value_at
+from companion.identification.lags import held_commands, lagged, slewed, value_at
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
 Floats = NDArray[np.float64]
 
 _GRID = 0.004
-"""Period of the samples that are correlated, s."""
+"""Sample period of the correlation, s."""
 _DELAYS = int(LONGEST_DEAD_TIME / _GRID)
 _PHASE = 0.38
-"""They are compared at the frequency where the lag's phase is about this, rad, clamped to"""
+"""Phase of the lag at the centre frequency of the filter, rad."""
 _FREQUENCIES = 5.0, 9.0
-"""these two, rad/s. Measured on PX4 (8 rad/s) and ArduPilot (9 rad/s): there the dead times of
-steps, circles, figure-eights and doublets agree within 3 ms."""
-_RESEMBLING = 0.63
-"""First-order lag nearest to PX4's second-order lag, as a share of that."""
+"""Range of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
+measured in steps, circles, figure-eights and doublets agree within 3 ms."""
+_FIRST_ORDER_SHARE = 0.63
+"""The first-order lag that is closest to PX4's second-order lag, as a share of the latter."""
 _REACH = 3.5
 """Half width of the filter, in its standard deviations."""
-_ALIKE = 0.985
-"""Share of the movement (R²) that the commands must explain: gusts or the motion of another axis
-would distort the delay."""
+_EXPLAINED = 0.985
+"""Smallest R² of a correlation that is used: with less, gusts or another axis distort the delay."""
 _EXCITED = 0.005
 """Smallest root mean square of the filtered commands, rad/s."""
 
@@ -41,23 +40,23 @@ def dead_time_by_correlation(
     slew: float | None = None,
     damping: float = np.inf,
 ) -> float | None:
-    """The delay at which the movements of commands and measurements correlate most.
+    """The delay at which filtered commands and measurements correlate most.
 
-    The commands are passed through the known lag first, so that what remains is the dead time.
-    With a lag of 0 it is the delay as a whole: the dead time and nearly all of a short lag.
+    The commands are first passed through the known lag, so that the remaining delay is the dead
+    time. With a lag of 0, the result is the whole delay: dead time plus most of a short lag.
 
     Args:
-        time: (n,), vehicle time of the sample that each command answered, s.
+        time: (n,), vehicle time of the sample to which each command responds, s.
         commanded: (n,), body rates of one axis, rad/s; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
-        lag: of the rate loop, s.
-        slew: its slew limit, rad/s², if it has one.
-        damping: ζ of a lag of second order, which is `lag` = 2ζ/ω late; infinite in first order.
+        lag: known lag of the rate loop, s; 2ζ/ω for a lag of second order.
+        slew: slew limit of the rate loop, rad/s²; None: no limit.
+        damping: ζ of a lag of second order; infinite for first order.
 
     Returns:
-        s, at most 0.5; None where the commands changed too little, or explain too little of
-        the movement.
+        The delay, s, at most 0.5; None if the commands changed too little, or explain too little
+        of the measurements.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length, or the lag is
@@ -70,30 +69,30 @@ def dead_time_by_correlation(
     products, powers, squares, count = np.zeros(_DELAYS + 1), np.zeros(_DELAYS + 1), 0.0, 0
     band = _band_pass(lag, damping)
     for part in stretches(time, commanded, measured_time, measured):
-        movements = _movements(part, lag, slew, band)
-        if movements is None:
+        filtered = _filtered(part, lag, slew, band)
+        if filtered is None:
             continue
-        asked, answered = movements
-        products += np.correlate(asked, answered, "valid")[::-1]
-        powers += np.correlate(asked**2, np.ones(answered.size), "valid")[::-1]
-        squares += float(answered @ answered)
-        count += answered.size
+        commands, response = filtered
+        products += np.correlate(commands, response, "valid")[::-1]
+        powers += np.correlate(commands**2, np.ones(response.size), "valid")[::-1]
+        squares += float(response @ response)
+        count += response.size
     if count == 0 or powers.max() < count * _EXCITED**2 or squares == 0.0:
         return None
     found = _peak(products / np.sqrt(np.maximum(powers, count * _EXCITED**2) * squares))
-    return None if found is None else max(0.0, found - _later(lag, damping))
+    return None if found is None else max(0.0, found - _second_order_delay(lag, damping))
 
 
 def _frequency(lag: float, damping: float) -> float:
     """Centre frequency of the filter, rad/s."""
     slowest, quickest = _FREQUENCIES
     if damping < np.inf:
-        lag *= _RESEMBLING
+        lag *= _FIRST_ORDER_SHARE
     return min(max(_PHASE / max(lag, _GRID), slowest), quickest)
 
 
-def _later(lag: float, damping: float) -> float:
-    """Delay of a second-order lag beyond that of a first-order one, s."""
+def _second_order_delay(lag: float, damping: float) -> float:
+    """Extra delay of a second-order lag compared with a first-order one, s."""
     frequency = _frequency(lag, damping)
     turned = frequency * lag
     phase = np.arctan2(turned, 1.0 - (0.5 * turned / damping) ** 2)
@@ -101,9 +100,10 @@ def _later(lag: float, damping: float) -> float:
 
 
 def _band_pass(lag: float, damping: float) -> Floats:
-    """(k,), a filter without phase for samples on the grid: a Gaussian's third derivative.
+    """(k,), taps of a band-pass filter for samples on the grid: a Gaussian's third derivative.
 
-    Its gain ∝ ω³·exp(−1.5·(ω/ω₀)²) has a maximum of 1 and nearly suppresses slow turns.
+    Its gain, proportional to ω³·exp(−1.5·(ω/ω₀)²), has a maximum of 1 and nearly suppresses slow
+    turns. It delays commands and measurements equally.
     """
     frequency = _frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
@@ -115,29 +115,29 @@ def _band_pass(lag: float, damping: float) -> Floats:
     return taps
 
 
-def _movements(
+def _filtered(
     part: Stretch, lag: float, slew: float | None, band: Floats
 ) -> tuple[Floats, Floats] | None:
-    """(n + delays,) and (n,) movements of commands and measurements on one grid, ends aligned."""
+    """Filtered commands (n + delays,) and measurements (n,) on one grid that ends with both."""
     first, last = part.measured_time[0], part.measured_time[-1]
-    answers = int((last - first) / _GRID)
-    if answers <= band.size:
+    count = int((last - first) / _GRID)
+    if count <= band.size:
         return None
-    at = last - _GRID * np.arange(answers + _DELAYS)[::-1]
+    at = last - _GRID * np.arange(count + _DELAYS)[::-1]
     at = np.maximum(at, part.time[0])
-    knots = held(part.time, part.commanded)
+    knots = held_commands(part.time, part.commanded)
     if slew is not None:
         knots = slewed(knots, slew)
-    asked = lagged(knots, lag, at) if lag > 0.0 else value_at(knots, at)
-    answered = np.interp(at[_DELAYS:], part.measured_time, part.measured)
-    return np.convolve(asked, band, "valid"), np.convolve(answered, band, "valid")
+    commands = lagged(knots, lag, at) if lag > 0.0 else value_at(knots, at)
+    response = np.interp(at[_DELAYS:], part.measured_time, part.measured)
+    return np.convolve(commands, band, "valid"), np.convolve(response, band, "valid")
 
 
-def _peak(alike: Floats) -> float | None:
-    """Delay of the largest correlation, s, between the grid's points by a parabola."""
-    top = int(np.argmax(alike))
-    if alike[top] < _ALIKE**0.5 or top in {0, alike.size - 1}:
+def _peak(correlation: Floats) -> float | None:
+    """Delay of the largest correlation, s, interpolated by a parabola; None if it is too small."""
+    top = int(np.argmax(correlation))
+    if correlation[top] < _EXPLAINED**0.5 or top in {0, correlation.size - 1}:
         return None
-    before, here, after = alike[top - 1 : top + 2].tolist()
+    before, here, after = correlation[top - 1 : top + 2].tolist()
     bend = before - 2.0 * here + after
     return _GRID * (top + (0.5 * (before - after) / bend if bend < 0.0 else 0.0))

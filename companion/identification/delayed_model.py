@@ -1,4 +1,4 @@
-"""The two models of a rate loop that are fitted, and their fit to a record with a dead time."""
+"""The two models of a rate loop, and their fit to a record with a dead time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from companion.identification.lags import (
     Knots,
-    held,
+    held_commands,
     lagged,
     second_order,
     second_order_decay,
@@ -24,27 +24,27 @@ Floats = NDArray[np.float64]
 
 
 class Model(Protocol):
-    """A linear response of gain 1.
+    """A linear response of gain 1 whose parameters, its shape, are searched as logarithms.
 
     Attributes:
-        lowest: (k,), lower bound of the search, logarithms of the parameters.
-        highest: (k,), upper bound.
+        lowest: (k,), lower bounds of the shape.
+        highest: (k,), upper bounds of the shape.
     """
 
     lowest: Floats
     highest: Floats
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
-        """Response to the commands at the times (m,), from rest."""
+        """(m,), response to the commands at the times `at` (m,), s, from rest."""
         ...
 
     def decay(self, shape: Floats, since: Floats) -> Floats:
-        """(m, k), decay of the initial state after `since` (m,) seconds."""
+        """(m, k), components of the free response, `since` (m,) seconds after the start."""
         ...
 
 
 class FirstOrder:
-    """A lag; its shape is (log lag), s."""
+    """A first-order lag; its shape is (log lag), lag in s."""
 
     lowest, highest = np.log([0.001]), np.log([1.0])
 
@@ -58,9 +58,9 @@ class FirstOrder:
 
 
 class SecondOrder:
-    """ω and ζ; its shape is (log 2ζ/ω, log ζ): unlike ω and ζ these hardly depend on one another.
+    """A second-order lag; its shape is (log 2ζ/ω, log ζ).
 
-    2ζ/ω is its delay on a ramp, s.
+    These two are nearly independent in a fit, unlike ω and ζ. 2ζ/ω is the delay on a ramp, s.
     """
 
     lowest, highest = np.log([0.002, 0.2]), np.log([1.0, 4.0])
@@ -75,21 +75,21 @@ class SecondOrder:
 
 
 def frequency_damping(shape: Floats) -> tuple[float, float]:
-    """ω (rad/s) and ζ of a `SecondOrder`."""
+    """ω (rad/s) and ζ of a `SecondOrder` with this shape."""
     damping = exp(shape[1])
     return 2.0 * damping / exp(shape[0]), damping
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderFit:
-    """ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
+    """A second-order fit: ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
 
     Attributes:
         frequency: ω, rad/s.
         damping: ζ.
         dead_time: s.
-        gain: measured per commanded.
-        slew: of the command, per second; None where there is no sign of a limit.
+        gain: measured per commanded rate.
+        slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².
     """
 
@@ -102,7 +102,7 @@ class SecondOrderFit:
 
     @property
     def described(self) -> str:
-        """In one line."""
+        """The fit in one line."""
         return (
             f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
             f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
@@ -113,24 +113,25 @@ class SecondOrderFit:
 DEAD_TIMES = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMPS = 0.01, 0.5
-"""Shortest and longest time the largest change of command may take at the slew limit, s."""
-_ALIKE = 0.005
-"""Commands that differ by less than this share of their range count as one."""
+"""Shortest and longest time that the largest change of command takes at the slew limit, s."""
+_SAME_COMMAND = 0.005
+"""Commands that differ by less than this share of their range count as the same."""
 
 
 class DelayedModel:
-    """A record, thinned, and the response of a model to its commands.
+    """A record with every n-th sample, and the response of a model to its commands.
 
-    y(t) = gain·x(t − dead time) + offset + decay of the initial state of each stretch, with x the
-    model's exact response. Gain, offset and initial states are linear: they are eliminated. The
-    unknowns are the model's shape, the dead time (s), and perhaps the logarithm of the slew limit.
+    y(t) = gain·x(t − dead time) + offset + remainder of the initial state of each stretch, where x
+    is the model's exact response. Gain, offset and initial states are linear and are eliminated.
+    The unknowns are the model's shape, the dead time (s), and optionally the logarithm of the slew
+    limit.
 
     Attributes:
-        thinning: of the samples.
-        commands: each stretch's, unlimited.
-        times: (m,), each stretch's samples, s.
-        measured: (m,), those of all stretches.
-        largest_change: of a command.
+        thinning: n; every n-th sample is used.
+        commands: commands of each stretch, without slew limit.
+        times: times of the samples of each stretch, s.
+        measured: (m,), the samples of all stretches.
+        largest_change: largest change of a command.
     """
 
     def __init__(
@@ -139,7 +140,9 @@ class DelayedModel:
         self.model, self.gain, self.thinning = model, gain, thinning
         self._delay = model.lowest.size
         span = max(float(np.ptp(part.commanded)) for part in record)
-        self.commands = [held(part.time, part.commanded, _ALIKE * span) for part in record]
+        self.commands = [
+            held_commands(part.time, part.commanded, _SAME_COMMAND * span) for part in record
+        ]
         self.times = [part.measured_time[::thinning] for part in record]
         self.measured = np.concatenate([part.measured[::thinning] for part in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
@@ -150,52 +153,53 @@ class DelayedModel:
         """Weights (gain, offset, initial states), and the residual (m,)."""
         moved = self.response(unknown)
         if self.gain is None:
-            columns = np.column_stack((moved, self._rest(unknown)))
+            columns = np.column_stack((moved, self._offset_columns(unknown)))
             return project(columns, self.measured)
-        weights, residual = project(self._rest(unknown), self.measured - self.gain * moved)
+        columns = self._offset_columns(unknown)
+        weights, residual = project(columns, self.measured - self.gain * moved)
         return np.concatenate(([self.gain], weights)), residual
 
     def response(self, unknown: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
         shape = unknown[: self._delay]
-        return self._each(unknown, lambda knots, at: self.model.response(shape, knots, at))
+        return self._per_stretch(unknown, lambda knots, at: self.model.response(shape, knots, at))
 
-    def asked(self, unknown: Floats, later: float = 0.0) -> Floats:
-        """(m,), the commands after slew limit and dead time, delayed by `later` more seconds."""
-        return self._each(
+    def delayed_commands(self, unknown: Floats, later: float = 0.0) -> Floats:
+        """(m,), the commands after slew limit and dead time, delayed by another `later` s."""
+        return self._per_stretch(
             unknown, lambda knots, at: value_at(knots, np.maximum(at - later, knots.time[0]))
         )
 
     def dead_time(self, unknown: Floats) -> float:
-        """Dead time of these unknowns, s."""
+        """Dead time among these unknowns, s."""
         return float(unknown[self._delay])
 
     def slew(self, unknown: Floats) -> float | None:
-        """Slew limit of these unknowns, per second; None where they have none."""
+        """Slew limit among these unknowns, per second; None if they have none."""
         return exp(unknown[-1]) if unknown.size > self._delay + 1 else None
 
     def search(self, start: Floats) -> Solution:
-        """The best fit near a start."""
+        """The best fit near `start`."""
         ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMPS)]
         limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIMES, ramps]
         lowest, highest = np.array(limits[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
 
     def best_of(self, points: list[Floats]) -> Floats:
-        """The point of a grid with the smallest sum of squares."""
+        """The point with the smallest sum of squares."""
         residuals = [self.projection(point)[1] for point in points]
         return points[int(np.argmin([float(rest @ rest) for rest in residuals]))]
 
     def explained(self, found: Solution) -> float:
-        """R²."""
+        """R² of a fit."""
         spread = self.measured - self.measured.mean()
         return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
 
-    def _rest(self, unknown: Floats) -> Floats:
-        """(m, 1 + initial states): ones, and the decay of the initial state of each stretch.
+    def _offset_columns(self, unknown: Floats) -> Floats:
+        """(m, 1 + initial states): ones, and the remainder of the initial state of each stretch.
 
-        Counted from its first sample: counted from its first command, the state would have decayed
-        to nearly nothing, and its weight would be unbounded.
+        The state is that at the first sample of the stretch. That at the first command would have
+        decayed to nearly nothing at the samples, and its weight would be unbounded.
         """
         shape = unknown[: self._delay]
         decays = [self.model.decay(shape, times - times[0]) for times in self.times]
@@ -208,15 +212,15 @@ class DelayedModel:
             row, column = row + rows, column + width
         return columns
 
-    def _each(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), of each stretch's commands (slewed, if that is in the unknowns), delayed."""
+    def _per_stretch(self, unknown: Floats, of: Callable[[Knots, Floats], Floats]) -> Floats:
+        """(m,), the result of `of` for the commands of each stretch after slew limit and delay."""
         slew, delay = self.slew(unknown), self.dead_time(unknown)
-        commands = self.commands if slew is None else self._limited(slew)
+        commands = self.commands if slew is None else self._slew_limited(slew)
         each = zip(commands, self.times, strict=True)
         return np.concatenate([of(knots, times - delay) for knots, times in each])
 
-    def _limited(self, slew: float) -> list[Knots]:
-        """The slewed commands, kept until another slew is asked for: steps of the rest need it."""
+    def _slew_limited(self, slew: float) -> list[Knots]:
+        """The commands after the slew limit; kept, as the search often keeps this unknown."""
         if slew != self._slewed[0]:
             self._slewed = slew, [slewed(knots, slew) for knots in self.commands]
         return self._slewed[1]

@@ -1,6 +1,6 @@
-"""A first-order lag with dead time, fitted to stretches of commands and measurements of any unit.
+"""Fits a first-order lag with dead time to commands and measurements of any unit.
 
-Gain, offset and starts are linear: only lag, dead time and slew are searched (`DelayedModel`).
+Gain, offset and initial states are linear; only lag, dead time and slew limit are searched for.
 """
 
 from dataclasses import dataclass, replace
@@ -28,46 +28,46 @@ LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""Starts of the search: times of the largest change of command at the slew limit, s."""
-_LEFT_OF_LAG = (0.15, 0.4, 1.0)
-_LEFT_OF_DEAD_TIME = (0.6, 1.0)
+"""First tried slew limits, each as the time (s) of the largest change of command at the limit."""
+_LAG_SHARES = (0.15, 0.4, 1.0)
+_DEAD_TIME_SHARES = (0.6, 1.0)
 """Starts of the search with a slew limit, as shares of lag and dead time found without one."""
 _CLEARLY = 0.6
-"""A larger model is accepted if its sum of squares is below this share of the smaller one's."""
+"""A model with more unknowns is accepted if its sum of squares is below this share of the other."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_SHARES = (0.0, 0.3, 0.6)
-"""Starts of the search for the second order's dead time, as shares of the whole delay."""
-_ON_ITS_WAY = 0.02
-"""A sample is excited if it is further from the command than this share of their range."""
+"""Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
+_EXCITED = 0.02
+"""A sample is excited if it differs from the command by more than this share of their range."""
 _MEMORY = 4.0
-"""Memory of the vehicle and correlation time of its noise, in multiples of the whole delay."""
+"""Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
 _COARSE = 500
-"""About this many samples are used to find the start."""
+"""Approximate number of samples used to find the start of the search."""
 _FINE = 4000
-"""At most this many samples are used for the fit: more take longer and change nothing."""
+"""Largest number of samples used for the fit: more take longer and change nothing."""
 _FEWEST = 10
 _NEIGHBOUR = 0.005
-"""Shift of lag and dead time to the neighbouring minima, s."""
+"""Distance in lag and dead time to the neighbouring minima, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """Result of a fit; seconds, and the units of commands and measurements.
+    """Result of a fit, in s and the units of commands and measurements.
 
     Attributes:
         dead_time: s.
         lag: s.
-        gain: measured per commanded, found freely even where lag and dead time are for a known one.
-        offset: measured at a command of zero.
-        slew: of the command, per second; None where there is no sign of a limit.
+        gain: measured per commanded; fitted freely, even if lag and dead time are for a given gain.
+        offset: measurement at a command of zero.
+        slew: slew limit of the command, per second; None: no sign of a limit.
         explained: R².
-        misfit: root mean square of what the commands explain of the residual, as a share of the
-            measurements' standard deviation.
-        dead_time_error: standard error, s, by what the commands do not explain of the residual.
-        lag_error: likewise, s.
-        span: from the smallest to the largest command.
-        excited: samples further from the command than 2 % of the span.
-        second_order: where it is clearly nearer; None elsewhere.
+        misfit: root mean square of the part of the residual that the commands explain, as a share
+            of the measurements' standard deviation.
+        dead_time_error: standard error of the dead time by noise, s.
+        lag_error: standard error of the lag by noise, s.
+        span: largest command minus smallest command.
+        excited: number of samples further from the command than 2 % of the span.
+        second_order: second-order fit, if it is clearly better; else None.
     """
 
     dead_time: float
@@ -87,11 +87,11 @@ class LagFit:
 def fit_lag(
     record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
 ) -> LagFit | None:
-    """The best fit, or None where no command changed or next to nothing was measured.
+    """The best fit, or None if no command changed or there are fewer than 10 samples.
 
     Args:
-        record: what was commanded and measured.
-        gain: given gain, for which lag and dead time are fitted; None fits it too.
+        record: commands and measurements.
+        gain: given gain, for which lag and dead time are fitted; None: the gain is fitted too.
         may_slew: whether to look for a slew limit.
     """
     record = most_excited(record)
@@ -101,10 +101,10 @@ def fit_lag(
     fine, coarse = 1 + samples // _FINE, 1 + samples // _COARSE
     data = DelayedModel(record, FirstOrder(), gain, fine)
     first_look = DelayedModel(record, FirstOrder(), gain, coarse)
-    best = _settled(data, _start(first_look))
+    best = _best_without_slew(data, _grid_start(first_look))
     if may_slew:
         best = _slewed_if_clearly(best, data, first_look)
-    found = _described(data, best)
+    found = _lag_fit(data, best)
     freely = data
     if gain is not None:
         freely = DelayedModel(record, FirstOrder(), None, fine)
@@ -114,7 +114,7 @@ def fit_lag(
 
 
 def _slewed_if_clearly(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
-    """The best fit behind a slew limit, if it is clearly better than the one without."""
+    """The best fit with a slew limit, if it is clearly better than `best`, else `best`."""
     promising = coarse.search(_slewed_start(best, coarse))
     if promising.squares > _CLEARLY * coarse.search(best.unknown).squares:
         return best
@@ -123,14 +123,17 @@ def _slewed_if_clearly(best: Solution, data: DelayedModel, coarse: DelayedModel)
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
-    """(3,), the best of a coarse grid: what a ramp delays is taken from lag and dead time."""
+    """(3,), the best start with a slew limit from a coarse grid.
+
+    A slew limit delays too, so smaller lags and dead times than without it are tried.
+    """
     lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
     return coarse.best_of(
         [
             np.array([log(share * lag), left * dead_time, log(coarse.largest_change / ramp)])
             for ramp in _TRIED_RAMPS
-            for share in _LEFT_OF_LAG
-            for left in _LEFT_OF_DEAD_TIME
+            for share in _LAG_SHARES
+            for left in _DEAD_TIME_SHARES
         ]
     )
 
@@ -138,7 +141,7 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
 def _second_order(
     record: list[Stretch], first: DelayedModel, found: Solution, coarse: int
 ) -> SecondOrderFit | None:
-    """The best second order of free gain, if it is clearly nearer than that first order."""
+    """The best second-order fit of free gain, if it is clearly better than the first-order one."""
     lag, dead_time, *slew = found.unknown.tolist()
     whole = exp(lag) + dead_time
     model: Model = SecondOrder()
@@ -164,13 +167,13 @@ def _second_order(
     )
 
 
-def _described(data: DelayedModel, found: Solution) -> LagFit:
-    """The fit in its own units."""
+def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
+    """The `LagFit` of a solution."""
     lag, dead_time = exp(found.unknown[0]), data.dead_time(found.unknown)
-    asked = data.asked(found.unknown)
-    span = float(np.ptp(asked))
-    excited = int((np.abs(data.response(found.unknown) - asked) > _ON_ITS_WAY * span).sum())
-    parted = _parted(data, found, excited)
+    commands = data.delayed_commands(found.unknown)
+    span = float(np.ptp(commands))
+    excited = int((np.abs(data.response(found.unknown) - commands) > _EXCITED * span).sum())
+    residuals = _residuals(data, found, excited)
     moved = float(np.std(data.measured))
     return LagFit(
         dead_time=dead_time,
@@ -179,15 +182,15 @@ def _described(data: DelayedModel, found: Solution) -> LagFit:
         offset=float(found.weights[1]),
         slew=data.slew(found.unknown),
         explained=data.explained(found),
-        misfit=parted.misfit / moved if moved > 0.0 else 0.0,
-        dead_time_error=float(parted.errors[1]),
-        lag_error=lag * float(parted.errors[0]),
+        misfit=residuals.misfit / moved if moved > 0.0 else 0.0,
+        dead_time_error=float(residuals.errors[1]),
+        lag_error=lag * float(residuals.errors[0]),
         span=span,
         excited=excited,
     )
 
 
-def _parted(data: DelayedModel, found: Solution, excited: int) -> Residuals:
+def _residuals(data: DelayedModel, found: Solution, excited: int) -> Residuals:
     unknown = found.unknown
     memory = _MEMORY * (exp(unknown[0]) + data.dead_time(unknown))
     step = float(np.median(np.diff(np.concatenate(data.times))))
@@ -195,18 +198,18 @@ def _parted(data: DelayedModel, found: Solution, excited: int) -> Residuals:
     return analyse(
         found.residual,
         found.slopes,
-        lambda later: data.asked(unknown, later),
+        lambda later: data.delayed_commands(unknown, later),
         memory,
         excited,
         correlated,
     )
 
 
-def _settled(data: DelayedModel, start: Floats) -> Solution:
+def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
     """The best fit without a slew limit.
 
-    Where commands and samples come at few distinct distances from each other, there is a shallow
-    minimum at each, one sample apart and of the same delay as a whole: the neighbours are tried.
+    If samples come at regular times after commands, there are shallow minima one sample apart, with
+    the same sum of lag and dead time. So the neighbouring minima are tried too.
     """
     found = data.search(start)
     lag, dead_time = exp(found.unknown[0]), float(found.unknown[1])
@@ -218,8 +221,8 @@ def _settled(data: DelayedModel, start: Floats) -> Solution:
     return min(found, *neighbours, key=lambda each: each.squares)
 
 
-def _start(data: DelayedModel) -> Floats:
-    """(2,), the best of a coarse grid: (log lag, dead time)."""
+def _grid_start(data: DelayedModel) -> Floats:
+    """(2,), the best start (log lag, dead time) from a coarse grid."""
     return data.best_of(
         [np.array([log(lag), dead]) for lag in _TRIED_LAGS for dead in _TRIED_DEAD_TIMES]
     )

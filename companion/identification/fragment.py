@@ -1,9 +1,10 @@
-"""The configuration fragment of an identified vehicle, written from good fits."""
+"""Writes the configuration fragment of an identified vehicle from the good fits."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
 from typing import NamedTuple
 
+from companion.files import bounded_yaml
 from companion.identification.response import BadFitError, RateResponse
 from companion.identification.vehicle import IdentifiedVehicle
 
@@ -12,20 +13,21 @@ Known = Mapping[str, Sequence[float | None]]
 
 _PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _UNLIMITED = 100_000.0
-"""Written where roll has a slew limit and this axis has none: null would mean roll's, °/s²."""
-_ALIKE_MS = 3.0
-_ALIKE_SLEW = 0.1
-"""Roll and pitch that differ by less, as a share, have one slew limit."""
+"""Slew limit written for an axis that has none while roll has one, °/s²; null would mean roll's."""
+_SAME_MS = 3.0
+"""Lags and dead times of roll and pitch that differ by less count as the same, ms."""
+_SAME_SLEW = 0.1
+"""Slew limits of roll and pitch that differ by less than this share count as the same."""
 
 
 class AxisValues(NamedTuple):
-    """What the configuration says of one axis.
+    """The configuration values of one axis.
 
     Attributes:
         lag: ms.
         dead_time: ms.
-        slew: °/s²; None without a limit.
-        damping: of second order; None in first order.
+        slew: slew limit, °/s²; None: no limit.
+        damping: ζ of a lag of second order; None: first order.
     """
 
     lag: float
@@ -34,31 +36,34 @@ class AxisValues(NamedTuple):
     damping: float | None = None
 
     def described(self) -> str:
-        """In one line."""
+        """The values in one line."""
         slew = "" if self.slew is None else f", slew {self.slew:.0f} °/s²"
         damping = "" if self.damping is None else f", damping {self.damping:.2f}"
         return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
 
 
-def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -> str:
+def vehicle_fragment(
+    vehicle: IdentifiedVehicle, gravity: float, known: Known, flight: str = ""
+) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
-    Each axis whose fit is good is written; any other keeps what the configuration knows of it, and
-    a comment says so. Pitch is written where it differs from roll, a slew limit where one was found
-    (the planner takes the lead of ArduPilot's frame from these times), the hover thrust where the
-    thrust map is good.
+    An axis with a good fit gets its fitted values. An axis with a bad fit keeps its configured
+    values, and a comment says so. Pitch is written only if it differs from roll, a slew limit only
+    if one was found, and the hover thrust only if the thrust map is good.
 
-    A second-order fit is written as a comment only: flown with it, a real PX4 bends the steps at
-    90 °/s less (0.002, not 0.004) and those at 400 °/s more (0.006, not 0.004).
+    A second-order fit is written only as a comment. With it, the steps of a real PX4 at 90 °/s were
+    straighter (deviation 0.002 instead of 0.004), but those at 400 °/s less straight (0.006 instead
+    of 0.004).
 
     Args:
-        vehicle: as identified.
-        gravity: m/s², at which it hovers.
-        known: of each axis, from the configuration in force; may lack axes and values.
+        vehicle: the identified vehicle.
+        gravity: gravity, m/s², which gives the hover thrust.
+        known: present configuration of each axis; axes and values may be missing.
+        flight: name of the flight, written as `identified`; empty: it is not written.
 
     Raises:
-        BadFitError: no response may be used, or one may not and nothing else is known of its axis;
-            it says why, one sentence an axis.
+        BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
+            gives a reason for each bad axis.
     """
     kept = kept_axes(vehicle, known)
     lines = [_comment(name, response, kept) for name, response in vehicle.axes.items()]
@@ -66,17 +71,18 @@ def vehicle_fragment(vehicle: IdentifiedVehicle, gravity: float, known: Known) -
     if thrust is not None and thrust.is_good(gravity):
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
-    axes = {name: kept.get(name) or _found(each) for name, each in vehicle.axes.items()}
-    lines += ["vehicle:", *_tilt_keys(axes["roll"], axes["pitch"])]
+    axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
+    mark = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
+    lines += ["vehicle:", *mark, *_tilt_keys(axes["roll"], axes["pitch"])]
     lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 
 
 def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]:
-    """What the configuration keeps saying of the axes whose fits are bad.
+    """The configured values of the axes whose fit is bad.
 
     Raises:
-        BadFitError: no fit is good, or nothing is known of an axis whose fit is bad.
+        BadFitError: no fit is good, or an axis with a bad fit has no configured values.
     """
     faults = vehicle.faults()
     kept = {}
@@ -89,14 +95,14 @@ def kept_axes(vehicle: IdentifiedVehicle, known: Known) -> dict[str, AxisValues]
     return kept
 
 
-def _found(response: RateResponse) -> AxisValues:
+def _fitted_values(response: RateResponse) -> AxisValues:
     slew = None if response.slew is None else degrees(response.slew)
     return AxisValues(1e3 * response.lag, 1e3 * response.dead_time, slew)
 
 
 def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
-    """The keys of both: their mean where they hardly differ."""
-    if _alike(roll, pitch):
+    """Lines of roll and pitch; if they hardly differ, lines of roll with their mean values."""
+    if _nearly_same(roll, pitch):
         slews = [axis.slew for axis in (roll, pitch) if axis.slew is not None]
         slew = sum(slews) / len(slews) if slews else None
         mean = AxisValues(
@@ -109,20 +115,20 @@ def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
     return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
 
 
-def _alike(one: AxisValues, other: AxisValues) -> bool:
+def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
     if one.slew is not None and other.slew is not None:
-        if abs(one.slew - other.slew) > _ALIKE_SLEW * max(one.slew, other.slew):
+        if abs(one.slew - other.slew) > _SAME_SLEW * max(one.slew, other.slew):
             return False
     elif one.slew != other.slew:
         return False
     if one.damping != other.damping:
         return False
     apart = max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
-    return apart <= _ALIKE_MS
+    return apart <= _SAME_MS
 
 
 def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
-    """Lines of one axis; `inherited` is the slew limit that it would have without its own."""
+    """Lines of one axis; `inherited` is roll's slew limit, which counts if none is written."""
     prefix = _PREFIX[name]
     lines = [f"  {prefix}lag_ms: {axis.lag:.1f}", f"  {prefix}dead_time_ms: {axis.dead_time:.1f}"]
     slew = axis.slew if axis.slew is not None or inherited is None else _UNLIMITED

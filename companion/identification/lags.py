@@ -1,6 +1,6 @@
 """Exact response of first- and second-order lags to held commands, with or without a slew limit.
 
-Between two knots the lag's input is a straight line v + m·(t − t_i), and the output solves
+Between two knots the input of the lag is a straight line v + m·(t − t_i). The output solves
 τ·ẋ = v + m·(t − t_i) − x:  x(t) = v + m·(t − t_i − τ) + (x_i − v + m·τ)·exp(−(t − t_i)/τ).
 """
 
@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[Any]
-"""Real or complex."""
+"""An array of real or complex numbers."""
 
 _LONGEST_PART = 500.0
-"""Largest exponent that does not overflow."""
+"""Largest exponent used, so that `exp` does not overflow."""
 
 
 class Knots(NamedTuple):
-    """A command in straight pieces, which may jump.
+    """A command in straight pieces, with possible jumps between them.
 
     Attributes:
         time: (n,), start of each piece, s, not decreasing.
-        value: (n,), at the start of each piece.
-        slope: (n,), per second.
+        value: (n,), value at the start of each piece.
+        slope: (n,), slope of each piece, per second.
     """
 
     time: Floats
@@ -32,37 +32,37 @@ class Knots(NamedTuple):
     slope: Floats
 
 
-def held(time: Floats, commanded: Floats, alike: float = 0.0) -> Knots:
-    """Commands (n,) held from their times (n,) on.
+def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Knots:
+    """Commands (n,), each held from its time (n,) until the next.
 
-    A command begins a new piece where it differs by more than `alike` from the latest piece: noise
-    in the commands would otherwise be most of the work.
+    A command begins a new piece only if it differs by more than `tolerance` from the latest piece.
+    So noise in the commands does not make many pieces, which take time.
     """
     kept, latest = [], np.inf
     for number, value in enumerate(commanded.tolist()):
-        if abs(value - latest) > alike:
+        if abs(value - latest) > tolerance:
             kept.append(number)
             latest = value
     return Knots(time[kept], commanded[kept], np.zeros(len(kept)))
 
 
 def slewed(commands: Knots, slew: float) -> Knots:
-    """Held commands approached no faster than `slew` (per second), from rest at the first."""
-    start = _before_each(commands, slew)
+    """Held commands after a slew limit `slew` (per second); it starts at the first command."""
+    start = _values_before(commands, slew)
     way = commands.value - start
     arrival = commands.time + np.abs(way) / slew
     ramps = np.column_stack((commands.time, start, np.copysign(slew, way)))
     rests = np.column_stack((arrival, commands.value, np.zeros(way.size)))
     moves, arrives = arrival > commands.time, arrival < np.append(commands.time[1:], np.inf)
-    # A ramp and the rest behind it take turns, each only where there is one.
+    # Ramps and the rests after them alternate; those of no duration are left out.
     rows = np.stack((ramps, rests), axis=1).reshape(-1, 3)
     return Knots(*rows[np.column_stack((moves, arrives)).ravel()].T)
 
 
-def _before_each(commands: Knots, slew: float) -> Floats:
-    """(n,), the slewed value at the time of each command.
+def _values_before(commands: Knots, slew: float) -> Floats:
+    """(n,), value after the slew limit at the time of each command.
 
-    A loop, because each start is the end of the piece before it.
+    It needs a loop, because each piece starts where the one before ended.
     """
     value = float(commands.value[0])
     starts, reaches = [value], slew * np.diff(commands.time)
@@ -79,19 +79,19 @@ def _before_each(commands: Knots, slew: float) -> Floats:
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
-    """Response of a lag of `lag` > 0 seconds to the commands at the times (m,), from rest.
+    """Response of a lag of `lag` > 0 s to the commands, at the times `at` (m,), s, from rest.
 
-    No time in `at` may lie before the first knot.
+    No time in `at` may be before the first knot.
     """
     return np.asarray(lagged_by(commands, lag, at), dtype=np.float64)
 
 
 def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """`lagged` for a lag that may be complex: one of the pair of an oscillation."""
+    """`lagged` for a complex lag, one of the conjugate pair of an oscillating second order."""
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
-    excess = _decaying(commands.time / lag, jumps)
+    excess = _decayed_sums(commands.time / lag, jumps)
     piece = np.searchsorted(commands.time, at, side="right") - 1
     since = at - commands.time[piece]
     straight = steady[piece] + commands.slope[piece] * since
@@ -99,10 +99,10 @@ def lagged_by(commands: Knots, lag: complex, at: Floats) -> Numbers:
     return response
 
 
-def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
-    """(n,) sum of all jumps up to each age, each decayed exponentially since it occurred.
+def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
+    """(n,), sum of all jumps up to each age, each decayed exponentially since its own age.
 
-    As running sums, in as long parts as exponentials allow.
+    It is computed by running sums, in parts short enough that no exponential overflows.
     """
     sums = np.empty_like(jumps)
     real = np.real(ages)
@@ -119,21 +119,21 @@ def _decaying(ages: Numbers, jumps: Numbers) -> Numbers:
 
 
 def value_at(commands: Knots, at: Floats) -> Floats:
-    """The commands themselves at the times (m,), none before the first knot."""
+    """(m,), values of the commands at the times `at` (m,), s, none before the first knot."""
     piece = np.searchsorted(commands.time, at, side="right") - 1
     values: Floats = commands.value[piece] + commands.slope[piece] * (at - commands.time[piece])
     return values
 
 
 _NEARLY_CRITICAL = 1e-6
-"""Nearer to ζ² = 1 the two lags would be one, and their difference 0."""
+"""Smallest |ζ² − 1| that is used; at 0 both lags are equal, and their difference is 0."""
 
 
 def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
-    """Response of a second-order lag to the commands at the times (m,), from rest.
+    """Response of a second-order lag to the commands, at the times `at`, from rest.
 
     Args:
-        commands: none of `at` may lie before the first knot.
+        commands: the commands; no time in `at` may be before the first knot.
         frequency: ω, rad/s.
         damping: ζ.
         at: (m,), s.
@@ -148,13 +148,13 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
 
 
 def second_order_decay(since: Floats, frequency: float, damping: float) -> Floats:
-    """(m, 2), decay of the initial state after `since` (m,) seconds."""
+    """(m, 2), components of the free response, `since` (m,) seconds after the start."""
     first, second = _lags(frequency, damping)
     if first.imag:
         turning = np.exp(-since / first)
         return np.column_stack((np.real(turning), np.imag(turning)))
     slow, quick = np.exp(-since / first.real), np.exp(-since / second.real)
-    # The second as a difference, so that the two stay apart near critical damping.
+    # The second column is a difference, so that the two stay independent near critical damping.
     return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
 
 

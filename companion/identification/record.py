@@ -1,4 +1,4 @@
-"""Commands and measurements, cut into stretches where control paused."""
+"""Commands and measurements, divided into stretches at pauses of control."""
 
 from typing import NamedTuple
 
@@ -10,25 +10,25 @@ Floats = NDArray[np.float64]
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""A command is taken as held this long, s; autopilots leave our control after about 1 s."""
+"""A longer pause between two commands ends a stretch, s; autopilots end offboard after 1 s."""
 
 _MOST_ROWS = 16_000
-"""Most commands and samples of a fit: about half a minute of both at 250 Hz."""
+"""Largest number of commands and samples in a fit: half a minute of both at 250 Hz."""
 _WINDOW = 10.0
-"""Length of the parts of which the most excited are kept, s: some doublets and their answers."""
+"""Length of a window, s; of a long record only the most excited windows are used."""
 _LEAD = 1.5
-"""Commands kept before a part, s: the longest dead time and ramp."""
+"""Time before a window from which commands are kept, s: the longest dead time and ramp."""
 
 
 class Stretch(NamedTuple):
-    """Control without a pause: n commands, each held until the next, and m samples.
+    """A part of a record without a pause: n commands, each held until the next, and m samples.
 
     Attributes:
-        time: (n,), of the commands, s.
-        commanded: (n,).
-        measured_time: (m,), s; none is earlier than `LONGEST_DEAD_TIME` after the first command or
-            later than the last one, so that its command is known for every dead time.
-        measured: (m,), in the commands' unit.
+        time: (n,), times of the commands, s.
+        commanded: (n,), the commands.
+        measured_time: (m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first
+            command to the last command, so that for every dead time the command is known.
+        measured: (m,), the samples, in the unit of the commands.
     """
 
     time: Floats
@@ -40,13 +40,13 @@ class Stretch(NamedTuple):
 def stretches(
     time: ArrayLike, commanded: ArrayLike, measured_time: ArrayLike, measured: ArrayLike
 ) -> list[Stretch]:
-    """The stretches of a record that are long enough to hold a sample.
+    """The stretches of a record that contain at least one sample.
 
     Args:
-        time: (n,), vehicle time of the sample that each command answered, s, in any order.
-        commanded: (n,); rows that are not finite are left out.
-        measured_time: (m,), vehicle time, s, in any order.
-        measured: (m,); rows that are not finite are left out.
+        time: (n,), vehicle time of the sample to which each command responds, s, in any order.
+        commanded: (n,), commands; rows that are not finite are left out.
+        measured_time: (m,), vehicle time of the samples, s, in any order.
+        measured: (m,), samples; rows that are not finite are left out.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length.
@@ -65,10 +65,10 @@ def stretches(
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
-    """A record; of a long one the parts in which the commands changed most.
+    """The record, or of a long one the windows in which the commands changed most.
 
-    Half an hour of flight holds no more information on the response than its most excited minute.
-    Each part keeps the commands shortly before it.
+    Half an hour of flight contains no more information on the response than its most excited
+    minute. Each window keeps the commands shortly before it.
     """
     if sum(part.time.size + part.measured_time.size for part in record) <= _MOST_ROWS:
         return record
@@ -85,7 +85,7 @@ def most_excited(record: list[Stretch]) -> list[Stretch]:
 
 
 def _windows(part: Stretch) -> list[Stretch]:
-    """A stretch cut into windows; those without a sample are left out."""
+    """A stretch divided into windows; those without a sample are left out."""
     windows = []
     for start in np.arange(part.measured_time[0], part.measured_time[-1], _WINDOW):
         first, last = np.searchsorted(part.measured_time, (start, start + _WINDOW))

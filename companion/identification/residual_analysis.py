@@ -1,9 +1,9 @@
-"""The residual of a fit, split: the part that the commands explain is misfit, the rest is noise.
+"""Splits the residual of a fit: the part that the commands explain is misfit, the rest is noise.
 
-Misfit is an error of the model: it is the same in each flight, and says how wrong predictions are.
-Noise makes the results of flights differ: the standard errors follow from it alone. The residual is
-regressed on the commands at many delays (a finite impulse response), which explains whatever a
-linear model of any order could (Ljung, System Identification, 16.6).
+Misfit is an error of the model. It is the same in each flight, and is the error of predictions.
+Noise makes the results of flights differ, and only noise gives the standard errors. The residual is
+regressed on the commands at many delays (a finite impulse response), which explains as much as a
+linear model of any order can (Ljung, System Identification, 16.6).
 """
 
 from collections.abc import Callable
@@ -18,15 +18,15 @@ Floats = NDArray[np.float64]
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
-"""Excited samples needed for each delay: with fewer the regression would fit the noise."""
+"""Number of excited samples needed for each delay; with fewer, the regression fits the noise."""
 
 
 class Residuals(NamedTuple):
-    """The two parts, and the standard errors of the unknowns.
+    """The two parts of a residual, and the standard errors of the unknowns.
 
     Attributes:
-        misfit: root mean square of what the commands explain, in the measurements' unit.
-        noise: root mean square of the rest.
+        misfit: root mean square of the part that the commands explain, in the measurements' unit.
+        noise: root mean square of the other part, in the same unit.
         errors: (k,), standard errors of the unknowns.
     """
 
@@ -47,16 +47,17 @@ def analyse(
 
     Args:
         residual: (m,), measured − modelled.
-        slopes: (m, k), how it changes with each unknown, the linear ones projected out.
-        commands: delay in s → (m,), the commands that much later than the model has them.
-        memory: s, over which the vehicle may remember commands.
+        slopes: (m, k), derivatives of the residual with respect to the unknowns; the effect of the
+            linear unknowns is projected out.
+        commands: function of a delay (s) → (m,), the model's commands delayed by it.
+        memory: longest time for which the vehicle responds to a command, s.
         excited: number of excited samples.
         correlated: number of samples over which the noise is correlated.
     """
     delays = min(_MOST_DELAYS, excited // _SAMPLES_PER_DELAY)
     noise = residual
     if delays:
-        # Also earlier than the model has it: its dead time may be too long for most of an answer.
+        # Negative delays too, because the fitted dead time may be too long.
         each = np.linspace(-0.25 * memory, memory, delays)
         columns = np.column_stack([commands(delay) for delay in each.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
@@ -73,7 +74,7 @@ def _errors(slopes: Floats, noise: Floats, correlated: int) -> Floats:
     for shift in range(1, min(correlated, noise.size)):
         shared = scores[shift:].T @ scores[:-shift]
         spread += (1.0 - shift / correlated) * (shared + shared.T)
-    # Slopes near the smallest number there is have no inverse: nothing is determined by them.
+    # Slopes near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.linalg.pinv(slopes.T @ slopes)
         errors: Floats = np.sqrt(np.maximum(np.diagonal(inverse @ spread @ inverse), 0.0))

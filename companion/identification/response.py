@@ -19,13 +19,13 @@ class FitQuality:
 
     Attributes:
         explained: R², share of the measurements' variance that the model explains.
-        misfit: how far the model is off, as a share of the movement: the root mean square of what
-            commands explain of the residual. The same in each flight.
-        dead_time_error: standard error of the dead time, s, by noise: how far flights differ.
-        lag_error: standard error of the lag, s, likewise.
-        span: from the smallest to the largest command, rad/s.
-        excited: samples at which the model was still on its way to the command (by 2 % of the span
-            or more): only these tell of lag and dead time.
+        misfit: error of the model: root mean square of the part of the residual that the commands
+            explain, as a share of the measurements' standard deviation.
+        dead_time_error: standard error of the dead time by noise, s.
+        lag_error: standard error of the lag by noise, s.
+        span: largest command minus smallest command, rad/s.
+        excited: number of samples at which the model differs from the command by 2 % of the span or
+            more; only these contain information on lag and dead time.
     """
 
     explained: float
@@ -38,15 +38,15 @@ class FitQuality:
 
 @dataclass(frozen=True, slots=True)
 class FitNeeds:
-    """Requirements of a fit that may be used.
+    """Requirements that a fit must meet to be used; see `FitQuality`.
 
     Attributes:
-        misfit: largest misfit, as a share of the movement.
-        error: largest standard error of lag and dead time, s, or
-        relative_error: as a share of lag + dead time, whichever is larger.
+        misfit: largest misfit.
+        error: largest standard error of lag and dead time, s.
+        relative_error: the same as a share of lag + dead time; the larger of both limits counts.
         span: smallest span of the commands, rad/s.
-        excited: fewest excited samples.
-        gain: smallest and largest gain; a rate loop that follows has about 1.
+        excited: smallest number of excited samples.
+        gain: smallest and largest gain; that of a working rate loop is about 1.
     """
 
     misfit: float = 0.3
@@ -66,12 +66,12 @@ class RateResponse:
     """First order with dead time: lag·ω̇(t) = gain·ω_command(t − dead_time) + offset − ω(t).
 
     Attributes:
-        dead_time: from the sample that a command answers to its first effect, s; NaN if not found.
+        dead_time: time from a sample to the first effect of its command, s; NaN if not found.
         lag: time constant, s; NaN if not found.
-        gain: of the steady rate, as measured; NaN if not found.
-        slew: slew limit of the autopilot before the lag, rad/s²; None where none was found.
-        fit: how good it is.
-        second_order: the model that is clearly nearer, where one is.
+        gain: steady rate per commanded rate; NaN if not found.
+        slew: slew limit of the autopilot before the lag, rad/s²; None if none was found.
+        fit: quality of the fit.
+        second_order: second-order fit, if it is clearly better; else None.
     """
 
     dead_time: float
@@ -82,7 +82,7 @@ class RateResponse:
     second_order: SecondOrderFit | None = None
 
     def reason(self, needs: FitNeeds = NEEDS) -> str | None:
-        """Why this must not be used, as a sentence without its stop; None if it may be."""
+        """Why this fit must not be used, a sentence without full stop; None if it may be used."""
         fit, uncertain = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
         low, high = needs.gain
         faults = (
@@ -106,8 +106,8 @@ class RateResponse:
             ),
             (
                 fit.misfit > needs.misfit,
-                f"poor fit: the model is off by {fit.misfit:.0%} of the movement, "
-                f"at most {needs.misfit:.0%} may be",
+                f"poor fit: the model's error is {fit.misfit:.0%} of the movement, more than "
+                f"{needs.misfit:.0%}",
             ),
             (
                 not low <= self.gain <= high,
@@ -121,7 +121,7 @@ class RateResponse:
         return next((text for wrong, text in faults if wrong), None)
 
     def is_good(self, needs: FitNeeds = NEEDS) -> bool:
-        """Whether it may be used: there is no `reason` against it."""
+        """Whether the fit may be used: there is no `reason` against it."""
         return self.reason(needs) is None
 
 
@@ -141,24 +141,24 @@ def fit_rate_response(
     measured: ArrayLike,
     gain: float | None = None,
 ) -> RateResponse:
-    """Least squares of a first-order lag with dead time, and with a slew limit where there is one.
+    """Fit a first-order lag with dead time, and with a slew limit if there is one (least squares).
 
-    Commands are held from their times on; a pause of more than 0.5 s ends a stretch of control.
-    The first half second of each stretch is left out, since commands before it would act on it. A
-    constant offset of the measurements and the rate at the start of each stretch are found too.
+    Each command is held until the next; a pause of more than 0.5 s ends a stretch of control. The
+    first half second of each stretch is left out, since it depends on commands before the stretch.
+    A constant offset of the measurements and the rate at the start of each stretch are fitted too.
 
-    To tell a slew limit from a slow lag, commands of clearly different size are needed.
+    A slew limit can be told from a slow lag only if there are commands of clearly different size.
 
     Args:
-        time: (n,), vehicle time of the sample that each command answered, s.
+        time: (n,), vehicle time of the sample to which each command responds, s.
         commanded: (n,), body rates of one axis, rad/s; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         measured: (m,), body rates, rad/s; rows that are not finite are left out.
-        gain: given gain, for which lag and dead time are fitted, such as the 1 that planners
-            assume. None fits it too.
+        gain: given gain, for which lag and dead time are fitted; planners assume 1. None: the gain
+            is fitted too.
 
     Returns:
-        The response; without any change of command, one of NaN whose `reason` says so.
+        The response. If no command changed, its values are NaN and `reason` says so.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length.

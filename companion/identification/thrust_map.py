@@ -9,8 +9,8 @@ from companion.identification.fit import fit_lag
 from companion.identification.record import Stretch, stretches
 
 _LEAST_EXPLAINED = 0.8
-_FAR = 0.2
-"""A command is excited if it differs from the median by this share of the range."""
+_EXCITED = 0.2
+"""A command is excited if it differs from the median by more than this share of the range."""
 _HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
@@ -19,13 +19,13 @@ _LARGEST_DELAY = 0.5
 
 @dataclass(frozen=True, slots=True)
 class ThrustMap:
-    """T = slope·u + offset, reached with the rotors' lag.
+    """Specific thrust T = slope·u + offset at normalised thrust u, behind the rotors' lag.
 
     Attributes:
         slope: m/s² per unit of normalised thrust.
         offset: m/s².
-        lag: of the rotors, s.
-        dead_time: s.
+        lag: lag of the rotors, s.
+        dead_time: dead time of the rotors, s.
         explained: R².
     """
 
@@ -40,10 +40,10 @@ class ThrustMap:
         return (specific_thrust - self.offset) / self.slope
 
     def is_good(self, gravity: float) -> bool:
-        """Whether the thrust followed the commands: rising, soon, and well explained.
+        """Whether the map may be used: it rises, has a short delay, and explains the measurements.
 
         Args:
-            gravity: m/s²; the vehicle must hover between 0.05 and 0.95.
+            gravity: m/s²; by the map, the vehicle must hover at a thrust between 0.05 and 0.95.
         """
         return (
             self.slope > 0.0
@@ -53,7 +53,7 @@ class ThrustMap:
         )
 
     def described(self) -> str:
-        """In one line."""
+        """The map in one line."""
         return (
             f"T/m = {self.slope:.2f}·u {self.offset:+.2f} m/s² for u in 0..1, lag "
             f"{1e3 * self.lag:.0f} ms, dead time {1e3 * self.dead_time:.0f} ms, explains "
@@ -61,20 +61,20 @@ class ThrustMap:
         )
 
 
-def _excited(record: list[Stretch]) -> list[Stretch]:
-    """The record without samples of steady thrust: they hold only vibration and gusts."""
+def _excited_samples(record: list[Stretch]) -> list[Stretch]:
+    """The record without samples of steady thrust, which contain only vibration and gusts."""
     if not record:
         return []
     thrust = np.concatenate([part.commanded for part in record])
-    usual, far = float(np.median(thrust)), _FAR * float(np.ptp(thrust))
+    usual, least_change = float(np.median(thrust)), _EXCITED * float(np.ptp(thrust))
     excited = []
     for part in record:
-        changed = part.time[np.abs(part.commanded - usual) > far]
+        changed = part.time[np.abs(part.commanded - usual) > least_change]
         latest = np.searchsorted(changed, part.measured_time, side="right")
         since = part.measured_time - np.concatenate(([-np.inf], changed))[latest]
-        told = since < _LARGEST_DELAY
-        if told.any():
-            measured = part.measured_time[told], part.measured[told]
+        kept = since < _LARGEST_DELAY
+        if kept.any():
+            measured = part.measured_time[kept], part.measured[kept]
             excited.append(Stretch(part.time, part.commanded, *measured))
     return excited
 
@@ -82,24 +82,24 @@ def _excited(record: list[Stretch]) -> list[Stretch]:
 def fit_thrust_map(
     time: ArrayLike, thrust: ArrayLike, measured_time: ArrayLike, specific_thrust: ArrayLike
 ) -> ThrustMap | None:
-    """Least squares of a straight line behind a first-order lag with dead time.
+    """Fit a straight line behind a first-order lag with dead time (least squares).
 
-    Thrust doublets of a level, slow vehicle tell best: in fast flight drag along the body's z axis
-    is taken for thrust.
+    Thrust doublets of a level, slow vehicle give the best fit. In fast flight, drag along the body
+    z axis would be taken for thrust.
 
     Args:
-        time: (n,), vehicle time of the sample that each command answered, s.
-        thrust: (n,), normalised, 0..1; rows that are not finite are left out.
+        time: (n,), vehicle time of the sample to which each command responds, s.
+        thrust: (n,), normalised thrust, 0..1; rows that are not finite are left out.
         measured_time: (m,), vehicle time, s; need not be regular.
         specific_thrust: (m,), m/s²: the accelerometer's −z (FRD), or (g − v̇_down)/cos(tilt).
 
     Returns:
-        The map, or None where the thrust never changed. Samples of steady thrust are left out.
+        The map, or None if the thrust never changed. Samples of steady thrust are left out.
 
     Raises:
         ValueError: a time series and its values are not two rows of equal length.
     """
-    record = _excited(stretches(time, thrust, measured_time, specific_thrust))
+    record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
     found = fit_lag(record, may_slew=False)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""A whole vehicle identified from the rows of one flight."""
+"""Identifies a whole vehicle from the rows of one flight."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ AXES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedVehicle:
-    """How a vehicle answers body rates and thrust; each fit says whether it may be used.
+    """The fitted response of a vehicle; each fit says whether it may be used.
 
     Attributes:
-        roll: as fitted.
-        pitch: as fitted.
-        yaw: as fitted.
-        thrust: the map, or None where thrust never changed or was not measured.
+        roll: response of the roll rate.
+        pitch: response of the pitch rate.
+        yaw: response of the yaw rate.
+        thrust: the thrust map, or None if thrust never changed or was not measured.
     """
 
     roll: RateResponse
@@ -39,7 +39,7 @@ class IdentifiedVehicle:
 
     @property
     def axes(self) -> dict[str, RateResponse]:
-        """The responses by the axis's name."""
+        """The responses by the name of the axis."""
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
     def faults(self) -> dict[str, str]:
@@ -51,36 +51,39 @@ class IdentifiedVehicle:
 def identify_vehicle(setpoints: Rows, rates: Rows, specific_thrust: Rows) -> IdentifiedVehicle:
     """Fit each axis and the thrust map.
 
-    Lag and dead time are fitted for a rate loop of gain 1, because planners assume that. Where the
-    loop is of another order or gain, they are the nearest ones.
+    Lag and dead time are fitted for a first-order rate loop of gain 1, as planners assume it. For
+    a loop of another order or gain, they are the best approximation.
 
     Args:
-        setpoints: (n, 5), vehicle time of the sample answered in s, roll, pitch and yaw rate in
-            rad/s, normalised thrust; those that the vehicle followed.
+        setpoints: (n, 5), setpoints that the vehicle obeyed: vehicle time of the sample to which
+            the setpoint responds in s, roll, pitch and yaw rate in rad/s, normalised thrust.
         rates: (m, 4), vehicle time in s, measured roll, pitch and yaw rate in rad/s.
         specific_thrust: (k, 2), vehicle time in s, m/s²; may be empty.
     """
-    asked, measured, pushed = _table(setpoints, 5), _table(rates, 4), _table(specific_thrust, 2)
-    roll, pitch, yaw = (_response(asked, measured, axis) for axis in (1, 2, 3))
-    thrust = fit_thrust_map(asked[:, 0], asked[:, 4], pushed[:, 0], pushed[:, 1])
+    commands, measured = _as_array(setpoints, 5), _as_array(rates, 4)
+    accelerations = _as_array(specific_thrust, 2)
+    roll, pitch, yaw = (_response(commands, measured, axis) for axis in (1, 2, 3))
+    thrust = fit_thrust_map(
+        commands[:, 0], commands[:, 4], accelerations[:, 0], accelerations[:, 1]
+    )
     return IdentifiedVehicle(roll, pitch, yaw, thrust)
 
 
-def _table(rows: Rows, columns: int) -> Floats:
+def _as_array(rows: Rows, columns: int) -> Floats:
     return np.array(rows, dtype=np.float64).reshape(-1, columns)
 
 
-def _response(asked: Floats, measured: Floats, axis: int) -> RateResponse:
-    record = asked[:, 0], asked[:, axis], measured[:, 0], measured[:, axis]
+def _response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
+    record = commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis]
     return fit_rate_response(*record, gain=_PLANNERS_GAIN)
 
 
 def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
-    """Table of the fits, a row an axis, and a line on the thrust; at most 80 columns wide.
+    """Table of the fits with one row per axis, and a line on the thrust; at most 80 columns wide.
 
     Args:
-        vehicle: as identified.
-        gravity: m/s², at which it hovers.
+        vehicle: the identified vehicle.
+        gravity: gravity, m/s², which gives the hover thrust.
     """
     table = Table(title="Response to body rates", title_justify="left", title_style="bold")
     table.add_column("")
@@ -93,7 +96,7 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         for name, response in vehicle.axes.items()
         if response.second_order is not None
     ]
-    return Group(table, *nearer, Text(_thrust(vehicle.thrust, gravity)))
+    return Group(table, *nearer, Text(_thrust_line(vehicle.thrust, gravity)))
 
 
 def _cells(response: RateResponse) -> tuple[str, ...]:
@@ -111,9 +114,9 @@ def _cells(response: RateResponse) -> tuple[str, ...]:
     )
 
 
-def _thrust(thrust: ThrustMap | None, gravity: float) -> str:
+def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:
     if thrust is None:
         return "thrust: not measured, or never changed"
     if not thrust.is_good(gravity):
-        return f"thrust: a map that explains {thrust.explained:.0%} of it is too poor to use"
+        return f"thrust: the fit is bad: it explains {thrust.explained:.0%} of the measured thrust"
     return f"thrust: {thrust.described()}; hovers at {thrust.normalised(gravity):.3f}"

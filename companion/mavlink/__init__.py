@@ -1,1 +1,1 @@
-"""MAVLink: bytes, messages, transports, signing. It knows no autopilot and no policy."""
+"""MAVLink: bytes, messages, transports, signing. Nothing here depends on the autopilot."""

@@ -35,7 +35,7 @@ class Command(NamedTuple):
 _ACCEPTED = 0
 _IN_PROGRESS = 5
 _IN_PROGRESS_TIMEOUT_S = 30.0  # until the next ACK of a command in progress
-_WORDS_WINDOW_S = 0.3  # the reason comes as a STATUSTEXT shortly before or after the ACK
+_REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this long after the ACK
 
 
 def command_name(command: int) -> str:
@@ -51,9 +51,12 @@ def result_name(result: int) -> str:
 
 
 class CommandClient:
-    """Sends commands and waits for their ACKs; one at a time of each command.
+    """Sends commands and waits for their ACKs.
 
-    An ACK names only its command, so two of the same command could not be told apart.
+    An ACK names only the command, so the same command is not sent again before its ACK has come.
+
+    Attributes:
+        last_acks: Newest MAV_RESULT of each MAV_CMD.
     """
 
     def __init__(
@@ -74,12 +77,18 @@ class CommandClient:
     async def send(
         self, command: int, params: tuple[float, ...], timeout_s: float, retries: int
     ) -> None:
-        """Send and wait until the autopilot accepts.
+        """Send a command and wait until the autopilot accepts it.
+
+        Args:
+            command: MAV_CMD.
+            params: Up to seven parameters; the rest are 0.
+            timeout_s: Time allowed for the ACK of each try, s.
+            retries: Number of repetitions after the first try.
 
         Raises:
-            CommandRefused: It answered anything but ACCEPTED.
-            CommandTimeout: It did not answer, after `retries` repetitions.
-            LinkLost: The connection dropped meanwhile.
+            CommandRefused: The result is not ACCEPTED.
+            CommandTimeout: No ACK came to any of the tries.
+            LinkLost: The connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
         async with lock:
@@ -91,7 +100,7 @@ class CommandClient:
                 finally:
                     del self._waiting[command]
             if result != _ACCEPTED:
-                await asyncio.sleep(_WORDS_WINDOW_S)
+                await asyncio.sleep(_REASON_DELAY_S)
                 words = self._texts.since(began)
                 raise CommandRefused(command_name(command), result, result_name(result), words)
 
@@ -104,7 +113,7 @@ class CommandClient:
         answers: Pending[int],
     ) -> int:
         for confirmation in range(retries + 1):
-            self._send_once(command, params, confirmation)
+            self._send_try(command, params, confirmation)
             try:
                 result = await answers.next(timeout_s)
                 while result == _IN_PROGRESS:
@@ -117,7 +126,7 @@ class CommandClient:
             f"is system {self._settings.target_system} still there?"
         )
 
-    def _send_once(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
+    def _send_try(self, command: int, params: tuple[float, ...], confirmation: int) -> None:
         padded = (*params, *(0.0,) * 7)[:7]
         self._outbox.message(
             dialect.MAVLink_command_long_message(
@@ -130,8 +139,8 @@ class CommandClient:
         )
 
     def _on_ack(self, message: Message) -> None:
-        # The extension fields name the addressee; zeros mean an autopilot that leaves them out.
-        # An ACK to another station is not ours.
+        # An ACK may be for another station. The extension fields name the addressee; an autopilot
+        # that does not fill them sends zeros.
         if message.target_system not in (0, self._settings.source_system):
             return
         if message.target_component not in (0, self._settings.source_component):

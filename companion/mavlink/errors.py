@@ -1,4 +1,4 @@
-"""Everything that can go wrong between us and the vehicle, as types with one clear message."""
+"""The errors of the link to the vehicle; each has one clear message."""
 
 
 class LinkError(Exception):
@@ -9,7 +9,7 @@ class EndpointError(LinkError):
     """The endpoint cannot be understood or opened; the message says what to do."""
 
 
-class LinkTimeout(LinkError):  # noqa: N818 - "timeout" is the field's word, and says it is one
+class LinkTimeout(LinkError):  # noqa: N818 - "timeout" already says that it is an error
     """The expected message did not come in the given time."""
 
 
@@ -18,7 +18,7 @@ class LinkLost(LinkError):  # noqa: N818
 
 
 class NotConnected(LinkError):  # noqa: N818
-    """No heartbeat of the vehicle was received yet."""
+    """No heartbeat of the vehicle has been received yet."""
 
 
 class UnsupportedAutopilot(LinkError):  # noqa: N818
@@ -56,7 +56,7 @@ class CommandRefused(LinkError):  # noqa: N818
         command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
         result: MAV_RESULT number of the ACK.
         result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
-        words: The autopilot's own STATUSTEXTs around the refusal, oldest first; may be empty.
+        words: STATUSTEXTs that the autopilot sent around the refusal, oldest first; may be empty.
     """
 
     def __init__(self, command: str, result: int, result_name: str, words: tuple[str, ...]) -> None:
@@ -73,12 +73,12 @@ class ParameterError(LinkError):
 
 
 class UnknownParameter(ParameterError):  # noqa: N818
-    """The autopilot has no parameter of that name, or never answered for it."""
+    """The autopilot has no parameter of that name, or did not answer."""
 
 
 class UnansweredParameter(UnknownParameter):
-    """The autopilot never answered for it: it has none of that name, or the link lost it."""
+    """The autopilot did not answer: it has no parameter of that name, or frames were lost."""
 
 
 class ParameterRefused(ParameterError):  # noqa: N818
-    """The autopilot kept another value than the one written."""
+    """The autopilot refused to report the parameter, or did not take the value written."""

@@ -1,4 +1,4 @@
-"""Which frames are the vehicle's own: by their system and component, and by their signature."""
+"""Which frames come from the vehicle, by their system and component ids and by their signature."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from companion.mavlink.stamps import SignatureResult
 from companion.mavlink.stats import LinkStats
 
 Notice = Callable[[str], None]
-"""Takes a sentence about the link that its user should read."""
+"""Takes a sentence about the link, to show to the user."""
 
 _REFUSED = {
     SignatureResult.UNSIGNED: "the vehicle does not sign its frames, so they are refused; give it "
@@ -16,21 +16,21 @@ _REFUSED = {
     SignatureResult.WRONG_KEY: "the vehicle signs its frames with another key, so they are "
     "refused; give both sides the same key (link.signing_key_file)",
 }
-"""Notices of refused signatures. `Signing.remarks` has those about time stamps."""
+"""Notices about refused signatures. Notices about their time stamps are in `Signing.remarks`."""
 
-_WE_DO_NOT_SIGN = (
+_KEY_MISSING = (
     "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
     "link.signing_key_file to a file with its passphrase"
 )
 
 
 class FrameFilter:
-    """Tells the vehicle's frames from all others, and counts those it refuses.
+    """Passes only the vehicle's frames, and counts those that it refuses.
 
     Args:
-        settings: The vehicle's ids, and the key.
+        settings: The vehicle's ids, and the signing key.
         stats: Counts foreign frames and bad signatures.
-        notice: Told once of each reason why the two sides do not understand each other.
+        notice: Called once for each reason why signatures are refused.
     """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, notice: Notice) -> None:
@@ -41,7 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether only an answer to our TIMESYNC request is missing to believe the last frame."""
+        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
@@ -49,7 +49,7 @@ class FrameFilter:
         return (frame.system, frame.component) == self._source
 
     def from_vehicle(self, frame: Frame) -> bool:
-        """As `is_vehicle`; counts the others."""
+        """Whether a frame carries the vehicle's system and component; counts other frames."""
         source = (frame.system, frame.component)
         if source == self._source:
             return True
@@ -61,7 +61,7 @@ class FrameFilter:
         """Whether a frame is signed as it must be; without a key every frame is good."""
         if self._signing is None:
             if frame.signed:
-                self.notice_once(_WE_DO_NOT_SIGN)
+                self.notice_once(_KEY_MISSING)
             return True
         result = self._signing.check(frame)
         self.tell_remarks()
@@ -73,12 +73,12 @@ class FrameFilter:
         return False
 
     def tell_remarks(self) -> None:
-        """Pass on what signing has to say about time stamps."""
+        """Pass the remarks about the time stamps of signatures to the user."""
         while self._signing is not None and self._signing.remarks:
             self.notice_once(self._signing.remarks.pop(0))
 
     def notice_once(self, text: str) -> None:
-        """Tell the user, unless this was told before."""
+        """Tell the user, unless the same text was told before."""
         if text not in self._noticed:
             self._noticed.add(text)
             self._notice(text)

@@ -1,8 +1,7 @@
-"""MAVLink framing: bytes to checked frames and back, for version 2 and (inwards) version 1.
+"""MAVLink framing: finds frames of versions 1 and 2 in bytes, and builds frames of version 2.
 
-Source: the MAVLink serialization guide. A frame that is not intact is never delivered. The
-checksum covers the message's CRC_EXTRA, so a frame of an unknown message cannot be checked and is
-skipped.
+Source: the MAVLink serialization guide. Only intact frames are delivered. The checksum includes the
+message's CRC_EXTRA, so a frame of an unknown message cannot be checked and is skipped.
 """
 
 import struct
@@ -32,10 +31,10 @@ class Frame(NamedTuple):
         message_id: Number of the message.
         system: Source system id.
         component: Source component id.
-        sequence: The sender's running number, 0..255.
-        payload: As sent, trailing zeros cut; pad it before unpacking.
+        sequence: The sender's sequence number, 0..255.
+        payload: Payload as sent, without trailing zeros; pad it before unpacking.
         raw: The whole frame with header, checksum and signature.
-        signed: Whether it carries a signature (not whether that is right).
+        signed: Whether the frame carries a signature; it has not been checked.
     """
 
     message_id: int
@@ -48,15 +47,15 @@ class Frame(NamedTuple):
 
 
 class FrameScanner:
-    """Finds the intact frames in what arrives.
+    """Finds the intact frames in the bytes that arrive.
 
     Args:
         crc_extra: The dialect's CRC_EXTRA as one byte for each known message id.
-        streaming: True if a frame may go on in the next call (TCP, serial); false for datagrams,
-            where an unfinished frame is dropped.
-        stats: Where wrong checksums and unknown messages are counted.
-        keep_unknown: True to return frames of unknown messages, too. Their checksum is not checked;
-            their id is not in `crc_extra`.
+        streaming: True if a frame may continue in the next call (TCP, serial). False for
+            datagrams: an incomplete frame is dropped.
+        stats: Counts wrong checksums and unknown messages.
+        keep_unknown: Whether frames of unknown messages are returned too, with their checksum not
+            checked. Their id is not in `crc_extra`.
     """
 
     def __init__(
@@ -74,7 +73,7 @@ class FrameScanner:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take bytes as they come; return the frames that they completed, in order."""
+        """Take the next bytes; return the frames that they complete, in order."""
         if self._rest:
             data = self._rest + data
             self._rest = b""
@@ -99,7 +98,7 @@ class FrameScanner:
     def _version_2(self, data: bytes, at: int, frames: list[Frame]) -> int:
         if len(data) - at < _V2_HEADER_LENGTH:
             return _INCOMPLETE
-        # Byte by byte: for a cold start this is quicker than `struct`.
+        # Indexing single bytes is quicker than `struct` when the caches are cold.
         incompatible = data[at + 2]
         if incompatible & ~SIGNED:
             return _NOT_A_FRAME
@@ -151,8 +150,8 @@ class FrameScanner:
         return _NOT_A_FRAME
 
     def _unknown_frame(self, data: bytes, at: int, end: int) -> int:
-        # Without a checksum only what follows can tell a frame from garbage: the start of another
-        # frame, or the end of the data.
+        # The checksum cannot tell this frame from garbage. It counts as a frame if another frame
+        # or the end of the data follows it.
         if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
             self._stats.unknown += 1
             return end - at
@@ -162,7 +161,7 @@ class FrameScanner:
 
 
 def _is_plausible(data: bytes, at: int) -> bool:
-    """Whether garbage is unlikely to look like this version 2 header: both bytes are usually 0."""
+    """Whether this looks like a version 2 header: two of its bytes are 0, as they usually are."""
     return data[at] == V2 and data[at + 3] == 0 and data[at + 9] == 0
 
 
@@ -176,9 +175,9 @@ def build_frame(
     component: int,
     signed: bool = False,
 ) -> bytes:
-    """Build a version 2 frame; with `signed`, all but the signature, which must follow.
+    """Build a version 2 frame; with `signed`, the signature must be appended.
 
-    Trailing zeros of the payload are cut, except the first byte, as the standard asks.
+    Trailing zeros of the payload are cut, but never its first byte, as MAVLink requires.
     """
     trimmed = payload.rstrip(b"\0") or payload[:1]
     body = (

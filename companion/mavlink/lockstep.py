@@ -1,9 +1,9 @@
-"""Lockstep: an event loop whose clock the vehicle moves, step by step.
+"""Lockstep: an event loop whose clock the vehicle advances, step by step.
 
-The vehicle ends each of its steps with a beacon, SYSTEM_TIME(time_boot_ms = t), and waits for our
-answer. Between beacon and answer everything that is due on our side runs, in vehicle time; then
-the answer goes out as the last datagram of the step. Nothing depends on the speed of either side,
-so a flight is bit-identical each time, and runs as fast as both can compute.
+The vehicle ends each of its steps with a beacon, SYSTEM_TIME(time_boot_ms = t), and waits for the
+answer of `companion`. Between beacon and answer, everything that is due runs in vehicle time. The
+answer is the last datagram of the step. No result depends on the speed of either side, so a flight
+is bit-identical each time, and runs as fast as both can compute.
 """
 
 import asyncio
@@ -20,32 +20,32 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
-"""Wall time without I/O, s, after which the vehicle counts as gone and time goes on without it."""
+"""Wall time without I/O, s, after which the vehicle counts as gone and time advances without it."""
 
 _SPIN_S = 0.0005
+"""Wall time of polling for the next beacon before the process sleeps, s."""
 
 _TIMERS_IN_ORDER = 1_000_000
 _TIMER_SPACING_S = 1e-12  # a million of them are a microsecond, below any step
 
-_MAX_ITERATIONS = (
-    200  # of the loop until it counts as settled: a task that never rests must not block
-)
+_MAX_ITERATIONS = 200
+"""The loop counts as settled after this many iterations: a task that never rests must not block."""
 
 
 class LockstepClock(Protocol):
-    """The time of an event loop that the vehicle moves."""
+    """The clock of an event loop that the vehicle advances."""
 
     def read(self) -> float:
-        """The loop's time, s."""
+        """Event-loop time, s."""
         ...
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set vehicle time, s; false for a repeated beacon."""
+        """Set the vehicle time, s; return False for a repeated beacon."""
         ...
 
 
 class _VehicleClock:
-    """Wall time until the vehicle speaks, vehicle time from then on."""
+    """Wall time until the first beacon, vehicle time from then on; s."""
 
     def __init__(self) -> None:
         self._wall_start = time.monotonic()
@@ -59,7 +59,7 @@ class _VehicleClock:
         return self._vehicle + self._offset
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set vehicle time; false for a repeated beacon."""
+        """Set the vehicle time, s; return False for a repeated beacon."""
         if self._vehicle is not None and vehicle_time <= self._vehicle:
             if self._vehicle - vehicle_time < 1.0:
                 return False
@@ -69,23 +69,23 @@ class _VehicleClock:
         return True
 
     def start_waiting(self) -> None:
-        """The vehicle's turn begins now."""
+        """Start the time in which the vehicle must send its next beacon."""
         self._waiting_since = time.monotonic()
 
-    def patience(self) -> float | None:
-        """Wall time in s that is left to the vehicle; `None` before its first beacon."""
+    def time_left(self) -> float | None:
+        """Wall time left for the next beacon, s; `None` before the first beacon."""
         if self._vehicle is None:
             return None
         return max(0.0, self._waiting_since + PATIENCE_S - time.monotonic())
 
-    def go_on_alone(self) -> None:
-        """The vehicle did not answer in time: timeouts on our side must still end."""
+    def advance_alone(self) -> None:
+        """Advance time without the vehicle, which sent no beacon in time: timeouts must end."""
         self._offset += PATIENCE_S
         self.start_waiting()
 
 
 class SettlingSelector(HotSelector, ABC):
-    """Tells when the loop has nothing left to do."""
+    """Detects when the loop has nothing left to do."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -93,12 +93,12 @@ class SettlingSelector(HotSelector, ABC):
         self._iterations = 0
 
     def settle(self, then: Callable[[], None]) -> None:
-        """Call `then` once nothing on the loop is ready any more; no I/O happens before."""
+        """Call `then` once no callback or timer of the loop is ready; no I/O happens before."""
         self._when_idle, self._iterations = then, 0
 
     @property
     def settling(self) -> bool:
-        """Whether a step is open: what is ready or due runs, and no I/O happens."""
+        """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
         return self._when_idle is not None
 
     def select(self, timeout: float | None = None) -> Ready:
@@ -114,11 +114,11 @@ class SettlingSelector(HotSelector, ABC):
 
     @abstractmethod
     def wait(self, timeout: float | None) -> Ready:
-        """Wait as every selector does."""
+        """Wait for I/O, as `select` of every selector does."""
 
 
 class _SteppingSelector(SettlingSelector):
-    """Never lets a timer wait on the wall clock while the vehicle is there."""
+    """Lets no timer wait on the wall clock while the vehicle sends beacons."""
 
     def __init__(self, clock: _VehicleClock) -> None:
         super().__init__()
@@ -132,18 +132,18 @@ class _SteppingSelector(SettlingSelector):
         return ready
 
     def wait(self, timeout: float | None) -> Ready:
-        left = None if timeout == 0 else self._clock.patience()
+        left = None if timeout == 0 else self._clock.time_left()
         if left is None:
             return HotSelector.select(self, timeout)
         ready = self._spin()
         if not ready and not self.settling:
             ready = HotSelector.select(self, left)
-        if not self.settling and self._clock.patience() == 0.0:
-            self._clock.go_on_alone()
+        if not self.settling and self._clock.time_left() == 0.0:
+            self._clock.advance_alone()
         return ready
 
     def _spin(self) -> Ready:
-        """Poll for the next beacon without sleeping: being woken takes longer."""
+        """Poll for the next beacon without sleeping: waking up would take longer."""
         give_up = time.perf_counter() + _SPIN_S
         while time.perf_counter() < give_up:
             ready = HotSelector.select(self, 0)
@@ -154,14 +154,14 @@ class _SteppingSelector(SettlingSelector):
 
 
 class LockstepEventLoop(LinkEventLoop):
-    """An event loop in vehicle time: `time()` moves only by `advance`.
+    """An event loop in vehicle time: only `advance` changes `time()`.
 
-    Before the first beacon, and when nothing has been heard for 2 s of wall time, it runs on wall
-    time, so that waiting for a vehicle that is not there ends by the usual timeouts.
+    Before the first beacon it runs on wall time. If nothing has been received for `PATIENCE_S` of
+    wall time, its time advances by that. So the usual timeouts end if the vehicle is gone.
 
     Args:
-        clock: another clock than that, with the selector that moves it.
-        selector: waits for the vehicle.
+        clock: clock to use instead of the one described above; needs `selector` too.
+        selector: the selector that advances `clock`.
     """
 
     def __init__(
@@ -173,11 +173,12 @@ class LockstepEventLoop(LinkEventLoop):
         self._clock: LockstepClock = clock
         self._stepping = selector
         self._scheduled_so_far = 0
+        self._read_clock = clock.read  # asyncio and the link ask a dozen times a step
         super().__init__(self._stepping)
 
     def time(self) -> float:
         """Vehicle time in s."""
-        return self._clock.read()
+        return self._read_clock()
 
     def call_at(
         self,
@@ -186,26 +187,27 @@ class LockstepEventLoop(LinkEventLoop):
         *args: *Arguments,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
-        """As every loop's, but timers due at the same time run in the order of scheduling.
+        """Schedule a timer; timers due at the same time run in the order of scheduling.
 
-        asyncio leaves the order of such timers to the shape of its heap, and that shape depends
-        on timers of the time before the first beacon, which was wall time.
+        In asyncio the order of such timers depends on the shape of its heap, and so on timers from
+        the time before the first beacon, when wall time counted.
         """
         self._scheduled_so_far += 1
         order = self._scheduled_so_far % _TIMERS_IN_ORDER * _TIMER_SPACING_S
-        early = _TIMERS_IN_ORDER * _TIMER_SPACING_S  # never later than asked: that is a step late
+        # A timer later than requested, even by a picosecond, would run a whole step late.
+        early = _TIMERS_IN_ORDER * _TIMER_SPACING_S
         return super().call_at(when - early + order, callback, *args, context=context)
 
     def advance(self, vehicle_time: float) -> bool:
-        """Move the clock to a beacon's time; false if that beacon was seen before."""
+        """Move the clock to a beacon's time, s; return False for a repeated beacon."""
         return self._clock.advance(vehicle_time)
 
     def settle(self, then: Callable[[], None]) -> None:
-        """Run all that is ready and due, without any I/O, and then `then`."""
+        """Run all that is ready and due, without I/O, and then call `then`."""
         self._stepping.settle(then)
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """Like `asyncio.run`, in vehicle time."""
+    """Run `main` like `asyncio.run`, in vehicle time."""
     with asyncio.Runner(loop_factory=LockstepEventLoop) as runner:
         return runner.run(main)

@@ -1,4 +1,4 @@
-"""Our half of the strict alternation with a vehicle in lockstep."""
+"""The program's side of lockstep: handles the vehicle's beacons."""
 
 import asyncio
 from collections.abc import Callable
@@ -7,13 +7,16 @@ from companion.mavlink.lockstep import LockstepEventLoop
 
 
 class LockstepClient:
-    """Our half of the strict alternation.
+    """Handles beacons: runs one step of this program for each, and answers.
 
     Args:
-        loop: The loop to drive.
-        process: Handles one step's frames, in order, after the clock was moved.
-        deliver: Hands the step's attitude sample, if any, to the control loop.
-        answer: Sends what closes the step `time_boot_ms`.
+        loop: The event loop to advance.
+        process: Handles the frames of one step, in order, after the clock has advanced.
+        deliver: Passes the attitude sample of the step, if any, to the control loop.
+        answer: Sends the answer that closes the step of `time_boot_ms`.
+
+    Attributes:
+        first_beacon: Done when the first beacon has come.
     """
 
     def __init__(
@@ -31,13 +34,13 @@ class LockstepClient:
 
     @property
     def step_ms(self) -> int | None:
-        """Vehicle time in ms of the step that is open, `None` while the vehicle has its turn."""
+        """Vehicle time of the open step, ms; `None` between an answer and the next beacon."""
         return self._step_ms
 
     def beacon(self, time_boot_ms: int) -> None:
-        """Take a beacon: start the step, or answer again if that answer got lost."""
+        """Take a beacon: start a step, or answer a repeated beacon again."""
         if self._step_ms is not None:
-            return  # repeated while we are still at it; the answer is on its way
+            return  # a beacon repeated during the step, whose answer will follow
         if not self._loop.advance(time_boot_ms / 1000.0):
             self._answer(time_boot_ms)
             return

@@ -1,10 +1,9 @@
-"""An asyncio event loop that runs some readers without the loop's own detour.
+"""An asyncio event loop that calls the readers of the link with less delay.
 
-Between the kernel saying "readable" and a plain `add_reader` callback, asyncio builds and runs a
-handle: some 15 to 20 us at 250 Hz, when the caches are cold. The selector here calls a hot
-reader itself, the moment it sees it; everything else of asyncio follows after. (Measured by
-`companion bench link`. The stock datagram transport is slower still: it reads every packet into
-a fresh 256 KiB buffer.)
+When a socket is readable, asyncio first builds and runs a handle for its `add_reader` callback:
+15 to 20 us at 250 Hz, when the caches are cold. The selector here calls a "hot" reader directly,
+before asyncio handles anything else. asyncio's own datagram transport is slower still: it reads
+every packet into a new 256 KiB buffer. `companion bench link` measures this.
 """
 
 import asyncio
@@ -21,10 +20,10 @@ Ready = list[tuple[selectors.SelectorKey, int]]
 
 
 class HotSelector(selectors.DefaultSelector):
-    """A selector that serves some file descriptors on the spot.
+    """A selector that calls the readers of some ("hot") file descriptors itself.
 
-    It polls the hot descriptors and one nested selector that holds all other descriptors. So
-    hot descriptors skip asyncio's bookkeeping.
+    It polls the hot descriptors, and one nested selector that holds all others. So hot descriptors
+    skip asyncio's bookkeeping.
     """
 
     def __init__(self) -> None:
@@ -39,12 +38,12 @@ class HotSelector(selectors.DefaultSelector):
         self._hot[fd] = callback
 
     def release(self, fd: int) -> None:
-        """Serve `fd` no more."""
+        """Stop serving `fd`."""
         self._poll.unregister(fd)
         del self._hot[fd]
 
     def select(self, timeout: float | None = None) -> Ready:
-        """Wait as every selector does; hot descriptors are served before this returns."""
+        """Wait for I/O; hot readers are called before this returns."""
         others = False
         # Rounded up: a timer that is woken early would only poll again.
         for fd, _ in self._poll.poll(None if timeout is None else ceil(timeout * 1e3)):
@@ -57,10 +56,10 @@ class HotSelector(selectors.DefaultSelector):
 
 
 class LinkEventLoop(asyncio.SelectorEventLoop):
-    """A selector loop with hot readers.
+    """A selector event loop with hot readers.
 
-    A hot callback runs between two iterations of the loop, where it may do what any callback
-    may (send, set futures, `call_soon`). It must not raise and must not block.
+    A hot callback runs between two iterations of the loop. Like any callback it may send, set
+    futures or use `call_soon`. It must not raise and must not block.
     """
 
     def __init__(self, selector: HotSelector | None = None) -> None:
@@ -68,7 +67,7 @@ class LinkEventLoop(asyncio.SelectorEventLoop):
         super().__init__(self._hot_selector)
 
     def add_hot_reader(self, fd: int, callback: Callable[[], None]) -> None:
-        """Watch `fd`, and call back the moment it is readable."""
+        """Call `callback` as soon as `fd` is readable."""
         self._hot_selector.serve(fd, callback)
 
     def remove_hot_reader(self, fd: int) -> None:
@@ -77,7 +76,7 @@ class LinkEventLoop(asyncio.SelectorEventLoop):
 
 
 def watch(loop: asyncio.AbstractEventLoop, fd: int, callback: Callable[[], None]) -> None:
-    """Watch `fd` the fastest way this loop knows."""
+    """Call `callback` when `fd` is readable, in the fastest way that the loop has."""
     if isinstance(loop, LinkEventLoop):
         loop.add_hot_reader(fd, callback)
     else:
@@ -93,10 +92,10 @@ def unwatch(loop: asyncio.AbstractEventLoop, fd: int) -> None:
 
 
 def run(main: Coroutine[Any, Any, T]) -> T:
-    """Like `asyncio.run`, on a `LinkEventLoop`.
+    """Run `main` like `asyncio.run`, on a `LinkEventLoop`.
 
-    What exists by now, modules above all, lives as long as the program: the garbage collector is
-    told not to walk through it again, which it would do in the middle of a control step.
+    Objects that exist now, mostly modules, live as long as the program. They are frozen, so that
+    the garbage collector does not walk through them in the middle of a control step.
     """
     gc.collect()
     gc.freeze()

@@ -1,7 +1,7 @@
 """Messages by name and number, and their payloads decoded and encoded by pymavlink.
 
-The dialect holds MAVLink common and the estimator status of one autopilot besides. It lacks
-CURRENT_MODE, which is defined here, and the events, whose payloads are passed on undecoded.
+The dialect holds MAVLink common and ArduPilot's estimator status. It lacks CURRENT_MODE, which is
+defined here, and the events, whose payloads are passed on undecoded.
 """
 
 import struct
@@ -24,9 +24,9 @@ class CurrentModeMessage:
     """The flight mode, sent at once when it changes. Source: MAVLink's `development` dialect.
 
     Attributes:
-        standard_mode: MAV_STANDARD_MODE; 0 for a mode that is none of these.
-        custom_mode: The mode, in the autopilot's own numbers.
-        intended_custom_mode: The mode that the user commanded last; differs in a failsafe.
+        standard_mode: MAV_STANDARD_MODE; 0 for a mode that is not a standard mode.
+        custom_mode: Number of the mode, specific to the autopilot.
+        intended_custom_mode: The mode that the user commanded last; it differs in a failsafe.
     """
 
     msgname = "CURRENT_MODE"
@@ -49,7 +49,7 @@ _CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMess
 """Message classes by number."""
 
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
-"""Messages of MAVLink common that pymavlink's dialects lack: only their payloads are passed on."""
+"""Messages of MAVLink common that pymavlink lacks; only their payloads are passed on."""
 
 MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in _CLASSES.items()}
 CRC_EXTRA: dict[int, bytes] = {

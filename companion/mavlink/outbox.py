@@ -1,4 +1,4 @@
-"""Frames we send: numbered, signed, sent at once or not at all."""
+"""Sends frames: numbers and signs them, and sends them at once or not at all."""
 
 import asyncio
 from math import inf
@@ -16,8 +16,8 @@ class Outbox:
     """Numbers, signs and sends frames. A frame that cannot be sent now is dropped.
 
     Attributes:
-        transport: The open connection, if there is one.
-        setpoint_at: Loop time of the last setpoint, s.
+        transport: The open connection; None while there is none.
+        setpoint_at: Event-loop time of the last setpoint, s; −inf before the first.
     """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, tap: Tap | None) -> None:
@@ -37,22 +37,31 @@ class Outbox:
         self.setpoint_at = -inf
 
     def setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
-        """Send SET_ATTITUDE_TARGET now; false if it could not leave.
+        """Send SET_ATTITUDE_TARGET now; return False if it could not be sent.
+
+        Args:
+            time_boot_ms: Time stamp of the sample to which it responds, ms.
+            rates: Body rates, rad/s (FRD).
+            thrust: Collective thrust, 0..1.
 
         Raises:
-            InvalidSetpoint: Nothing was sent.
+            InvalidSetpoint: A value must not reach the vehicle; nothing was sent.
         """
-        left = self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
+        sent = self._send(self._setpoints.frame(self._sequence, time_boot_ms, rates, thrust))
         self.setpoint_at = self._loop.time()
-        return left
+        return sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
-        """Keep a setpoint as this lockstep step's answer; a later one of the step replaces it."""
-        self._setpoints.frame(0, time_boot_ms, rates, thrust)  # raises what cannot be sent
+        """Keep a setpoint as the answer of this lockstep step; a later one replaces it.
+
+        Raises:
+            InvalidSetpoint: A value must not reach the vehicle; nothing was kept.
+        """
+        self._setpoints.frame(0, time_boot_ms, rates, thrust)
         self._latched = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:
-        """End a lockstep step by its setpoint, or by a SYSTEM_TIME that is not recorded."""
+        """Close a lockstep step: send its setpoint, or a SYSTEM_TIME, which is not recorded."""
         latched, self._latched = self._latched, None
         if latched is not None:
             self.setpoint(*latched)
@@ -60,15 +69,15 @@ class Outbox:
             self._send(self._frame(SYSTEM_TIME, encode_system_time(time_boot_ms)), record=False)
 
     def message(self, message: Message) -> bool:
-        """Send a pymavlink message; false if it could not leave."""
+        """Send a pymavlink message; return False if it could not be sent."""
         return self.payload(message.get_msgId(), encode(message))
 
     def payload(self, message_id: int, payload: bytes) -> bool:
-        """Send a message given by its payload; false if it could not leave."""
+        """Send a message given by its payload; return False if it could not be sent."""
         return self._send(self._frame(message_id, payload))
 
     def forward(self, frame: bytes) -> bool:
-        """Send another node's whole frame as it is; false if it could not leave."""
+        """Send a whole frame of another node unchanged; return False if it could not be sent."""
         if self.transport is None or not self.transport.send(frame):
             return False
         self._stats.forwarded += 1
@@ -90,7 +99,7 @@ class Outbox:
     def _send(self, frame: bytes, *, record: bool = True) -> bool:
         if self._signing is not None:
             frame = self._signing.sign(frame)
-        if record:  # a step may be closed again, as the wall clock has it: that must not count
+        if record:  # how often a step is closed depends on wall time: it must not be counted
             self._sequence = (self._sequence + 1) & 0xFF
         if self.transport is None or not self.transport.send(frame):
             self._stats.not_sent += 1

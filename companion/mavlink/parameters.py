@@ -1,7 +1,7 @@
-"""The PARAM protocol. Source: the MAVLink parameter protocol.
+"""Reads and writes parameters. Source: the MAVLink parameter protocol.
 
-PX4 sends integers bytewise: the four bytes of the float field hold the integer itself. Many such
-patterns are NaNs that a float would not carry faithfully, so the field is handled as bytes here.
+PX4 sends integers bytewise: the four bytes of the float field hold the integer. Some integers look
+like a NaN, which a float may not preserve, so the field is handled as bytes here.
 """
 
 import asyncio
@@ -47,11 +47,11 @@ class ParameterClient:
     """Reads and writes single parameters.
 
     Args:
-        settings: Where the vehicle is and who we are.
-        outbox: Takes the questions.
-        router: Brings the answers.
+        settings: System and component ids of the vehicle and of this program.
+        outbox: Sends the requests.
+        router: Delivers the answers.
         registry: Ends the waiting when the connection drops.
-        bytewise: Whether integers travel as bytes (PX4) rather than as a number in a float.
+        bytewise: Whether an integer is sent as its bytes (PX4) or as a float (ArduPilot).
     """
 
     def __init__(
@@ -70,25 +70,25 @@ class ParameterClient:
         router.subscribe("PARAM_ERROR", self._on_error)
 
     async def read(self, name: str, timeout_s: float, retries: int) -> float | int:
-        """Read one.
+        """Read a parameter.
 
         Raises:
-            UnansweredParameter: The autopilot never answers.
-            UnknownParameter: It says that it has none.
-            ParameterRefused: It says that it has, and does not tell.
-            LinkLost: The connection dropped meanwhile.
+            UnansweredParameter: The autopilot did not answer.
+            UnknownParameter: The autopilot answered that it has no such parameter.
+            ParameterRefused: The autopilot answered with another error.
+            LinkLost: The connection dropped while waiting.
         """
         self._check(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             return self._number(await self._ask(name, timeout_s, retries))
 
     async def write(self, name: str, value: float, timeout_s: float, retries: int) -> float | int:
-        """Write one, in the type that the autopilot has for it; return what it then holds.
+        """Write a parameter in the autopilot's own type; return the value that it then has.
 
         Raises:
             UnansweredParameter, UnknownParameter: As for `read`.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another.
-            LinkLost: The connection dropped meanwhile.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another value.
+            LinkLost: The connection dropped while waiting.
         """
         self._check(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
@@ -148,7 +148,7 @@ class ParameterClient:
             integer: int = struct.unpack(_INTEGERS[value.kind], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
-        # NaN and infinity are no integers; the caller gets them as they came.
+        # NaN and infinity cannot become integers; the caller gets them unchanged.
         return int(number) if value.kind in _INTEGERS and isfinite(number) else number
 
     def _bytes(self, name: str, value: float, kind: int) -> bytes:
@@ -159,7 +159,7 @@ class ParameterClient:
                 return struct.pack("<f", value)
             if value != int(value):
                 raise ParameterRefused(f"{name} is an integer and cannot hold {value}")
-            # Packed either way, so that the range of the integer type is checked either way.
+            # Packed also when not bytewise, so that the range of the integer type is checked.
             packed = struct.pack(_INTEGERS[kind], int(value))
             return packed if self._bytewise() else struct.pack("<f", value)
         except (struct.error, OverflowError, ValueError) as error:

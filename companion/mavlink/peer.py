@@ -1,4 +1,4 @@
-"""Who the peer is: whom the endpoint lets in, what makes a sender the peer, and for how long."""
+"""Which sender is the peer: who may send, what makes a sender the peer, and for how long."""
 
 import asyncio
 import ipaddress
@@ -14,10 +14,10 @@ from companion.mavlink.transport.endpoint import PeerAddress
 
 
 async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "NamedPeers":
-    """Look up the names of peers.
+    """Look up the addresses of the peers that the endpoint names.
 
     Raises:
-        EndpointError: A host is unknown.
+        EndpointError: A host name is unknown.
     """
     loop = asyncio.get_running_loop()
     admitted: set[tuple[str, int | None]] = set()
@@ -34,17 +34,17 @@ async def resolve(named: Sequence[PeerAddress], kind: socket.SocketKind) -> "Nam
 
 
 class NamedPeers:
-    """The senders that the endpoint lets in; all of them if it names none.
+    """The senders that may talk to the endpoint; everyone if the endpoint names none.
 
     Args:
-        admitted: IP address and port; port `None` is any.
+        admitted: IP address and port of each; a port of `None` is any port.
     """
 
     def __init__(self, admitted: frozenset[tuple[str, int | None]] = frozenset()) -> None:
         self._admitted = admitted
 
     def admit(self, address: Any) -> bool:
-        """Whether bytes from a socket address, (host, port, ...), are taken."""
+        """Whether a sender at this socket address, (host, port, ...), is admitted."""
         if not self._admitted:
             return True
         host, port = plain_host(address[0]), address[1]
@@ -61,20 +61,20 @@ def plain_host(host: str) -> str:
     return str(mapped or address)
 
 
-def spelled(address: Any) -> str:
+def host_and_port(address: Any) -> str:
     """A socket address as HOST:PORT."""
     host = plain_host(str(address[0]))
     return f"[{host}]:{address[1]}" if ":" in host else f"{host}:{address[1]}"
 
 
 PEER_NOTICE = "link.endpoint: "
-"""Each sentence about the peer begins so."""
+"""Beginning of each notice about the peer."""
 
 CLAIM_LASTS_S = 5.0
-"""A heartbeat comes every second. Without one for this long another sender may become the peer."""
+"""Another sender may become the peer after this time without a heartbeat of the peer, s."""
 
 _CONTROL_LASTS_S = 2.0
-"""After the last setpoint; until then the peer changes only if it is silent."""
+"""Time after the last setpoint during which the peer changes only if it is silent, s."""
 
 HEARTBEAT = 0
 _TYPE, _AUTOPILOT, _FIELDS = 4, 5, 6  # of a HEARTBEAT payload, which may lack trailing zeros
@@ -82,19 +82,19 @@ _AUTOPILOT_INVALID = 8
 
 
 class PeerRule:
-    """Decides who the peer is.
+    """Decides which sender is the peer.
 
     A sender becomes the peer by a claim: a HEARTBEAT of the configured system and component that
-    comes from an autopilot (not type GCS, not autopilot INVALID). Where signing is on, or in
-    lockstep, each accepted frame is a claim. On the ground a claim lapses after 5 s; while
-    setpoints are sent, and 2 s longer, it does not.
+    comes from an autopilot (not type GCS, not autopilot INVALID). With signing or in lockstep, each
+    accepted frame is a claim. A claim lapses after `CLAIM_LASTS_S`, except while setpoints are sent
+    and for 2 s after the last one.
 
     Args:
-        stats: Counts the changes.
-        notice: Is told of each change.
-        clock: Loop time, s.
-        every_frame_claims: Signing is on, or vehicle time drives the loop.
-        last_setpoint: Loop time of the last setpoint sent, s.
+        stats: Counts the changes of the peer.
+        notice: Called at each change, with a sentence for the user.
+        clock: Returns the event-loop time, s.
+        last_setpoint: Returns the event-loop time of the last setpoint, s.
+        every_frame_claims: Signing is on, or the link runs in lockstep.
     """
 
     def __init__(
@@ -122,11 +122,11 @@ class PeerRule:
         return fields[_AUTOPILOT] != _AUTOPILOT_INVALID and fields[_TYPE] != MAV_TYPE_GCS
 
     def renew(self) -> None:
-        """The peer has repeated its claim."""
+        """Note that the peer has repeated its claim."""
         self._claimed_at = self._clock()
 
     def lapsed(self) -> bool:
-        """Whether another sender may become the peer although this one still sends."""
+        """Whether another sender may become the peer although the present one still sends."""
         if self._every_frame_claims:
             return False
         now = self._clock()
@@ -134,20 +134,20 @@ class PeerRule:
             return False
         return now - self._claimed_at > CLAIM_LASTS_S
 
-    def fix(self, who: str) -> None:
-        """`who` is the peer from now on."""
+    def set_peer(self, who: str) -> None:
+        """Make `who` the peer."""
         before, self._peer = self._peer, who
         self.renew()
         if before is not None and before != who:
             self._stats.peers += 1
             self._notice(
                 f"{PEER_NOTICE}the vehicle's frames now come from {who}, before from {before}; "
-                f"name the vehicle's address if that is not wanted (?peer=ADDRESS)"
+                f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
             )
 
     def ignore(self, who: str) -> None:
-        """`who` sends, and is not among the peers that the endpoint names."""
+        """Tell the user that `who` sends but is not among the peers that the endpoint names."""
         self._notice(
-            f"{PEER_NOTICE}what {who} sends is ignored, as the endpoint names another peer; "
-            "correct ?peer= if that is the vehicle"
+            f"{PEER_NOTICE}frames from {who} are ignored, as the endpoint names another peer; "
+            f"if {who} is the vehicle, correct ?peer="
         )

@@ -1,4 +1,4 @@
-"""Answers that tasks wait for; when the connection drops, all waiting ends at once."""
+"""Answers for which tasks wait; when the connection drops, all waiting ends at once."""
 
 import asyncio
 from typing import Generic, TypeVar
@@ -9,9 +9,9 @@ T = TypeVar("T")
 
 
 class Pending(Generic[T]):
-    """A mailbox between a callback of the link and the task that waits for it.
+    """A queue of answers, from a callback of the link to the task that waits for them.
 
-    Use as a context manager. Answers are kept in order until they are taken.
+    Use as a context manager.
     """
 
     def __init__(self, registry: "PendingRegistry") -> None:
@@ -19,18 +19,18 @@ class Pending(Generic[T]):
         self._queue: asyncio.Queue[T | LinkLost] = asyncio.Queue()
 
     def put(self, answer: T) -> None:
-        """Leave an answer."""
+        """Add an answer."""
         self._queue.put_nowait(answer)
 
     def fail(self, error: LinkLost) -> None:
-        """End the waiting."""
+        """End the waiting: `next` raises `error`."""
         self._queue.put_nowait(error)
 
     async def next(self, timeout_s: float) -> T:
         """Wait for the next answer.
 
         Raises:
-            TimeoutError: None came in time.
+            TimeoutError: No answer came in time.
             LinkLost: The connection dropped.
         """
         async with asyncio.timeout(timeout_s):
@@ -48,21 +48,21 @@ class Pending(Generic[T]):
 
 
 class PendingRegistry:
-    """All mailboxes of a link at which a task waits."""
+    """All queues of a link at which a task waits."""
 
     def __init__(self) -> None:
-        # A dict, not a set: failing in a fixed order keeps flights repeatable.
+        # A dict has a fixed order, which keeps flights repeatable; a set has none.
         self._waiting: dict[int, Pending[object]] = {}
 
     def add(self, pending: Pending[T]) -> None:
-        """Register one."""
+        """Add a queue."""
         self._waiting[id(pending)] = pending  # type: ignore[assignment]
 
     def discard(self, pending: Pending[T]) -> None:
-        """Forget one."""
+        """Remove a queue."""
         self._waiting.pop(id(pending), None)
 
     def fail(self, reason: str) -> None:
-        """End all waiting with `LinkLost`."""
+        """End all waiting with `LinkLost`; its message names `reason`."""
         for pending in tuple(self._waiting.values()):
             pending.fail(LinkLost(f"the link dropped while waiting for an answer ({reason})"))

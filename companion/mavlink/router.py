@@ -18,8 +18,8 @@ Unsubscribe = Callable[[], None]
 class Router:
     """Calls the subscribers of a message, synchronously, in the order of their subscription.
 
-    A message nobody subscribed to is never decoded. An exception in a subscriber is reported to
-    `on_error` (the log, if that is not set) and does not spread.
+    A message without subscribers is not decoded. An exception in a subscriber is reported to
+    `on_error`, or logged if that is None, and does not reach other subscribers.
     """
 
     def __init__(self, stats: LinkStats) -> None:
@@ -29,7 +29,7 @@ class Router:
         self.on_error: Callable[[Exception], None] | None = None
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each decoded message of that name.
+        """Call `callback` with each decoded message of that name; return how to unsubscribe.
 
         Raises:
             UnknownMessage: The dialect has no such message.
@@ -37,11 +37,15 @@ class Router:
         return _add(self._decoded, message_id(name), callback)
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
-        """Call `callback` with each payload of that message, trailing zeros cut."""
+        """Call `callback` with each payload of that message, without trailing zeros.
+
+        Raises:
+            UnknownMessage: Neither the dialect nor `UNDECODED` has such a message.
+        """
         return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 
     def route(self, number: int, payload: bytes) -> None:
-        """Pass one message on."""
+        """Pass one message to its subscribers."""
         for raw_callback in tuple(self._raw.get(number, ())):
             self.guard(raw_callback, payload)
         callbacks = self._decoded.get(number)
@@ -56,14 +60,14 @@ class Router:
             self.guard(callback, message)
 
     def guard(self, callback: Callable[[T], None], argument: T) -> None:
-        """Call back and report what it raises."""
+        """Call `callback(argument)`, and report an exception that it raises."""
         try:
             callback(argument)
         except Exception as error:
             self.report(error)
 
     def report(self, error: Exception) -> None:
-        """Report an error in a callback."""
+        """Pass an error of a callback to `on_error`, or log it."""
         if self.on_error is None:
             _LOG.error("a callback of the link failed", exc_info=error)
             return

@@ -11,20 +11,20 @@ MAV_TYPE_GCS = 6
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """Where the vehicle is and who we are.
+    """The endpoint, and the ids of the vehicle and of this program.
 
     Attributes:
         endpoint: See `companion.mavlink.transport.endpoint`.
-        target_system: The only system listened to and commanded.
-        target_component: Its component; 1 is the autopilot.
-        source_system: Our system id; companions share the vehicle's.
-        source_component: Our component id.
-        heartbeat_type: MAV_TYPE of our heartbeat. PX4 sends its STATUSTEXTs only on links where
-            it hears type GCS (6).
-        heartbeat_rate_hz: Rate of our heartbeat. No setpoint depends on it.
-        signing: Signs what we send and refuses what is not signed; `None`: neither.
+        target_system: System id of the vehicle; frames of other systems are ignored.
+        target_component: Component id of the vehicle; 1 is the autopilot.
+        source_system: System id of this program; a companion computer has that of its vehicle.
+        source_component: Component id of this program.
+        heartbeat_type: MAV_TYPE in the heartbeats that are sent. PX4 sends its STATUSTEXTs only on
+            links where it receives heartbeats of type GCS (6).
+        heartbeat_rate_hz: Rate of the heartbeats that are sent, Hz. No setpoint depends on it.
+        signing: Signs frames that are sent and checks those received; `None`: no signing.
         lockstep: Vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`.
-        first_beacon_timeout_s: Lockstep: wall time to wait for the vehicle when opening.
+        first_beacon_timeout_s: Wall time to wait for the first beacon in lockstep, s.
     """
 
     endpoint: str

@@ -1,7 +1,7 @@
-"""MAVLink 2 message signing: signs our frames, checks theirs, and keeps the newest time stamps.
+"""MAVLink 2 message signing: signs frames, checks signatures, and keeps the newest time stamps.
 
 Source: the MAVLink message-signing guide. A signature is the first 48 bits of
-SHA-256(key + frame + link id + time stamp); the stamp counts 10 us since 2015-01-01 UTC.
+SHA-256(key + frame + link id + time stamp); the time stamp counts 10 us since 2015-01-01 UTC.
 """
 
 import hashlib
@@ -26,22 +26,26 @@ _ID_AT = slice(7, 10)  # of a version 2 frame
 _PAYLOAD_AT = 10
 _TIMESYNC_ID = 111
 _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
-_QUESTIONS = 16
+_REQUESTS_KEPT = 16
 
 PERIOD_S = 10.0
-"""Between two writes, s. The guide asks for once a minute; less is lost if we are killed."""
+"""Time between two writes of the stamps, s. The guide demands one a minute."""
 _RESERVE = 15 * TICKS_PER_S
-"""While the link is open, the file holds stamps this far ahead, more than a period. So after a kill
-our stamps still rise, and no older frame is accepted again. The vehicle is refused, too, until its
-stamps are past that, for 15 s at most."""
+"""How far ahead of the newest stamps the file is written while the link is open, ticks.
+
+It is longer than a period. If this program is killed, the stamps that it sends later are still
+newer, and no older frame is accepted again. In that case the vehicle's frames are also refused
+until their stamps are newer than those in the file, for 15 s at most.
+"""
 _LAST_WRITE_S = 2.0
+"""Time allowed for the last write, s."""
 
 
 def key_from_hex(text: str) -> bytes:
-    """A key from 64 hexadecimal digits.
+    """The key that 64 hexadecimal digits spell.
 
     Raises:
-        SigningError: The text is anything else.
+        SigningError: The text is not 64 hexadecimal digits.
     """
     if not re.fullmatch(r"[0-9a-fA-F]{64}", text.strip()):
         raise SigningError("a signing key is 64 hexadecimal digits (32 bytes)")
@@ -49,7 +53,7 @@ def key_from_hex(text: str) -> bytes:
 
 
 def key_from_passphrase_file(path: Path) -> bytes:
-    """SHA-256 of the file's first line, as ground stations make a key from a passphrase.
+    """The key from a passphrase, as ground stations make it: SHA-256 of the file's first line.
 
     Raises:
         SigningError: The file cannot be read or its first line is empty.
@@ -64,19 +68,19 @@ def key_from_passphrase_file(path: Path) -> bytes:
 
 
 class Signing:
-    """Signs our frames and judges theirs.
+    """Signs frames that are sent, and checks the signatures of frames received.
 
     Args:
         key: 32 bytes shared with the vehicle.
-        link_id: Number of this link in our signatures, 0..255.
-        clock: Unix time in s, read once; see `StampJudge`.
-        elapsed: Monotonic time in s. Our stamps only ever rise.
+        link_id: Link id in the signatures that are sent, 0..255.
+        clock: Returns Unix time in s; called once, see `StampJudge`.
+        elapsed: Returns monotonic time in s; the stamps sent rise with it.
         file: Keeps the newest stamps from one run to the next; `None` keeps nothing.
 
     Attributes:
-        file: As given.
-        remarks: Sentences about time stamps for the user; the reader removes them.
-        changed: Set when `stamps` must be written soon.
+        file: The argument `file`.
+        remarks: Sentences about time stamps for the user; whoever shows them removes them.
+        changed: Set when the time stamps should be written to the file soon.
 
     Raises:
         SigningError: The key is not 32 bytes.
@@ -101,22 +105,22 @@ class Signing:
         if trouble is not None:
             self.remarks.append(trouble)
         self._stamp = kept.sent
-        self._asked: deque[bytes] = deque(maxlen=_QUESTIONS)
-        self._unproven = 0
+        self._requests: deque[bytes] = deque(maxlen=_REQUESTS_KEPT)
+        self._unproven_stamp = 0
 
     def sign(self, frame: bytes) -> bytes:
-        """Add the signature to a frame built with `signed=True`."""
+        """Append the signature to a frame built with `signed=True`."""
         self._stamp = max(self._stamp + 1, self._judge.date())
         if frame[_ID_AT] == _TIMESYNC:
-            answer_at, question = _timesync(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
+            answer_at, question = _timesync_fields(frame[_PAYLOAD_AT : _PAYLOAD_AT + frame[1]])
             if not any(answer_at):
-                self._asked.append(question)
+                self._requests.append(question)
         tail = self._link + self._stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
     def check(self, frame: Frame) -> SignatureResult:
-        """Check a frame; only a good one updates its stream."""
-        self._unproven = 0
+        """Check the signature of a frame; only a good one updates the stamps of its stream."""
+        self._unproven_stamp = 0
         if not frame.signed:
             return SignatureResult.UNSIGNED
         signature = frame.raw[-SIGNATURE_LENGTH:]
@@ -124,49 +128,49 @@ class Signing:
             return SignatureResult.WRONG_KEY
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
-        verdict = self._judge.judge(stream, stamp, answers=self._answers(frame))
+        verdict = self._judge.judge(stream, stamp, answers=self._answers_timesync(frame))
         if verdict is SignatureResult.GOOD:
             self._stamp = max(self._stamp, stamp)
         elif verdict is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
-            # The vehicle would not answer a request with an older stamp than it knows.
+            # The vehicle would ignore a request with a stamp older than those it has seen.
             self._stamp = max(self._stamp, stamp)
-            self._unproven = stamp
+            self._unproven_stamp = stamp
         return verdict
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because our TIMESYNC request is unanswered."""
-        return self._unproven != 0
+        """Whether the last frame was refused for lack of an answer to a TIMESYNC request."""
+        return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
-        """What this run adds to the kept stamps; called by another thread."""
+        """The stamps of this run, to be kept in the file; called by another thread."""
         return Stamps(self._judge.date(), self._stamp, self._judge.streams())
 
-    def _answers(self, frame: Frame) -> bool:
-        """Whether it answers a TIMESYNC request of this run, which no recording can contain."""
+    def _answers_timesync(self, frame: Frame) -> bool:
+        """Whether a frame answers a TIMESYNC request of this run; no recording can contain that."""
         if frame.message_id != _TIMESYNC_ID:
             return False
-        answer_at, question = _timesync(frame.payload)
-        return any(answer_at) and any(question) and question in self._asked
+        answer_at, question = _timesync_fields(frame.payload)
+        return any(answer_at) and any(question) and question in self._requests
 
     def _hash(self, data: bytes) -> bytes:
         return hashlib.sha256(self._key + data).digest()[:_HASH_BYTES]
 
 
-def _timesync(payload: bytes) -> tuple[bytes, bytes]:
-    """tc1, zero in a request, and ts1, the sender's time, which the answer repeats."""
+def _timesync_fields(payload: bytes) -> tuple[bytes, bytes]:
+    """Fields tc1 and ts1 of TIMESYNC; tc1 is zero in a request, and an answer repeats ts1."""
     whole = payload.ljust(16, b"\0")
     return whole[:8], whole[8:16]
 
 
 class StampKeeper:
-    """A thread that writes every 10 s, at a new stream, and at the end.
+    """A thread that writes the stamps every 10 s, when a new stream is heard, and at the end.
 
-    The event loop never waits for a disk. A failure is told once, in `Signing.remarks`.
+    So the event loop never waits for a disk. A failure is reported once, in `Signing.remarks`.
 
     Args:
-        signing: Holds the stamps to write.
-        file: Takes them.
+        signing: Holds the stamps.
+        file: The file to which they are written.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:
@@ -175,11 +179,11 @@ class StampKeeper:
         self._thread = threading.Thread(target=self._run, name="time stamps", daemon=True)
 
     def start(self) -> None:
-        """Write now and from now on."""
+        """Start writing; the first write is now."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Write the last stamps; a disk that does not answer is left after 2 s."""
+        """Write the last stamps; wait 2 s at most for the disk."""
         if self._thread.ident is None:
             return  # not started
         self._ended = True
@@ -189,7 +193,7 @@ class StampKeeper:
     def _run(self) -> None:
         while not self._ended:
             self._signing.changed.clear()
-            self._write(_ahead(self._signing.stamps()))
+            self._write(_with_reserve(self._signing.stamps()))
             if not self._ended:
                 self._signing.changed.wait(PERIOD_S)
         self._write(self._signing.stamps())
@@ -203,14 +207,14 @@ class StampKeeper:
             if not self._failed:
                 self._failed = True
                 self._signing.remarks.append(
-                    f"the time stamps of signatures cannot be kept in {self._file.path} "
+                    f"the time stamps of signatures cannot be written to {self._file.path} "
                     f"({error.strerror}), so after the next start a recording of this flight may "
-                    "be taken for the vehicle; make room there, or set XDG_STATE_HOME to a "
+                    "be accepted as the vehicle; free space there, or set XDG_STATE_HOME to a "
                     "directory that can be written"
                 )
 
 
-def _ahead(stamps: Stamps) -> Stamps:
+def _with_reserve(stamps: Stamps) -> Stamps:
     streams = {
         stream: tuple(min(stamp + _RESERVE, MOST_TICKS) for stamp in newest)
         for stream, newest in stamps.streams.items()

@@ -1,6 +1,6 @@
-"""The newest signature time stamps on disk: one file for each key, which does not reveal the key.
+"""The newest signature time stamps on disk, one file for each key.
 
-Source: the MAVLink message-signing guide, which asks that the stamps outlive the program.
+Source: the MAVLink message-signing guide, which demands that stamps are kept between runs.
 """
 
 import hashlib
@@ -15,14 +15,14 @@ from companion.mavlink.stamps import MOST_TICKS, Stamps, Stream
 
 _FOLDER = Path("mavlink-companion", "signing")
 _MOST_BYTES = 1_000_000
-"""More than 65536 streams of one vehicle take; a larger file is not ours."""
+"""Largest file read, bytes; 65536 streams of one vehicle need less."""
 
 
 class StampFile:
     """Time stamps in the user's state directory ($XDG_STATE_HOME, or ~/.local/state), mode 0600.
 
     Args:
-        key: The signing key; the file's name is a hash of it.
+        key: The signing key; the file's name is a hash of it, which does not reveal the key.
 
     Attributes:
         path: The file.
@@ -36,7 +36,10 @@ class StampFile:
         self.path = _state_directory() / _FOLDER / f"{name}.json"
 
     def load(self) -> tuple[Stamps, str | None]:
-        """The kept stamps, and a sentence for the user if they cannot be read. Never raises."""
+        """The kept stamps, and a sentence for the user if they cannot be read.
+
+        No file counts as no stamps. Never raises.
+        """
         try:
             with self.path.open("rb") as file:
                 return _parsed(file.read(_MOST_BYTES)), None
@@ -46,15 +49,15 @@ class StampFile:
             reason = error.strerror if isinstance(error, OSError) else "it is damaged"
             return Stamps(), (
                 f"the time stamps of signatures in {self.path} cannot be read ({reason}), so a "
-                "recording of an earlier flight may be taken for the vehicle; delete that file "
+                "recording of an earlier flight may be accepted as the vehicle; delete that file "
                 "once this computer's clock is right"
             )
 
     def save(self, stamps: Stamps) -> None:
-        """Replace the file as a whole.
+        """Replace the whole file.
 
         Raises:
-            OSError: It cannot be written; the old one is as it was.
+            OSError: The file cannot be written; the old one is unchanged.
         """
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         text = json.dumps(
@@ -69,24 +72,24 @@ class StampFile:
 
 def _state_directory() -> Path:
     named = Path(os.environ.get("XDG_STATE_HOME", ""))
-    if named.is_absolute():  # the standard: any other is to be ignored
+    if named.is_absolute():  # the XDG standard: a relative path is ignored
         return named
     try:
         return Path.home() / ".local" / "state"
     except RuntimeError:
         raise SigningError(
-            "time stamps of signatures have no place: there is no home directory; set "
-            "XDG_STATE_HOME to a directory that can be written"
+            "the time stamps of signatures cannot be kept, because there is no home directory; "
+            "set XDG_STATE_HOME to a directory that can be written"
         ) from None
 
 
 def _parsed(text: bytes) -> Stamps:
-    told = json.loads(text)
+    kept = json.loads(text)
     streams = {
         _stream(name): tuple(_ticks(stamp) for stamp in stamps)
-        for name, stamps in told["streams"].items()
+        for name, stamps in kept["streams"].items()
     }
-    return Stamps(_ticks(told["date"]), _ticks(told["sent"]), streams)
+    return Stamps(_ticks(kept["date"]), _ticks(kept["sent"]), streams)
 
 
 def _stream(name: str) -> Stream:

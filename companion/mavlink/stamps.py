@@ -1,8 +1,9 @@
-"""Which signature time stamps are believed, and which date we assume.
+"""Which signature time stamps are accepted, and which date this program assumes.
 
-Source: the MAVLink message-signing guide, "Timestamp handling": stamps of a stream must rise, a new
-stream may be a minute behind, the newest stamp is kept on disk, and it starts at the later of clock
-and disk. The guide believes every stamp with a right key; here the future is bounded.
+Source: the MAVLink message-signing guide, "Timestamp handling". The stamps of a stream must rise. A
+new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at the
+later of clock and disk. The guide accepts every stamp with the right key; here, stamps too far in
+the future are refused.
 """
 
 import time
@@ -12,16 +13,17 @@ from enum import Enum
 from threading import Event
 
 EPOCH_UNIX_S = 1420070400
-"""Stamps count 10 us since 2015-01-01 UTC."""
+"""2015-01-01 UTC as Unix time, s; time stamps count 10 us since then."""
 TICKS_PER_S = 100_000
 _DAY = 86_400 * TICKS_PER_S
 _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
-"""2026-09-01. A right clock never says less; raise it with a release."""
+"""2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
 _FURTHEST = 5 * 365 * _DAY
+"""A stamp further ahead of the date is refused, ticks."""
 
 MOST_TICKS = 2**48 - 2 * _FURTHEST
-"""Our date is never later (2094), so no stamp exceeds its 48 bits."""
+"""Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
 
 Stream = tuple[int, int, int]
 """System, component and link id."""
@@ -32,11 +34,11 @@ SET_CLOCK = "set this computer's clock (NTP, or by hand)"
 class SignatureResult(Enum):
     """Result of checking a frame's signature and its time stamp."""
 
-    GOOD = "signed with our key, and newer than all before it on its stream"
+    GOOD = "signed with the configured key, and newer than all before it on its stream"
     UNSIGNED = "not signed"
     WRONG_KEY = "signed with another key"
-    REPLAYED = "not newer than what came before: repeated on the way, or a recording"
-    AHEAD = "signed with our key, but dated further in the future than is believed"
+    REPLAYED = "not newer than an earlier frame: repeated by the link, or a recording"
+    AHEAD = "signed with the configured key, but dated too far in the future"
 
 
 @dataclass(frozen=True)
@@ -44,10 +46,10 @@ class Stamps:
     """The stamps kept from one run of the program to the next, in ticks of 10 us.
 
     Attributes:
-        date: Our own date at the end.
-        sent: The newest stamp that we used.
-        streams: The newest stamps accepted of each stream: one in our own time, and one of a date
-            that only the vehicle gave.
+        date: This program's date when the stamps were written.
+        sent: The newest stamp that was sent.
+        streams: The newest stamps accepted on each stream: one near this program's date, and one
+            far ahead of it, if the vehicle proved that date (see `StampJudge`).
     """
 
     date: int = 0
@@ -56,27 +58,27 @@ class Stamps:
 
 
 class StampJudge:
-    """Judges the time stamps of signatures whose key is right.
+    """Judges the time stamps of signatures made with the right key.
 
-    Our date is the computer's clock at the start, or what is kept on disk, or the program's own
-    date, whichever is latest. From then on it goes with the monotonic clock: no NTP step in flight
-    makes a good stamp bad.
+    The date of this program is the latest of three: the computer's clock at the start, the date
+    kept on disk, and the date of the release. From then on it follows the monotonic clock, so that
+    an NTP step in flight makes no good stamp bad.
 
-    - Up to a day ahead of our date: must be newer than all before it on its stream, on disk too; a
-      stream not heard in this run may be a minute behind.
-    - Up to 5 years ahead: the computer's clock may be behind (no battery), or it is a recording, or
-      somebody's clock is wrong. Refused until the signer has answered a TIMESYNC question that we
-      asked in this run: no recording can do that. Kept apart from the others, so it never makes
-      stamps of our own time look old.
-    - Further ahead: refused, and nothing follows from it.
+    - A stamp up to a day ahead of the date must be newer than all before it on its stream,
+      including those on disk. On a stream not yet heard in this run it may be a minute older.
+    - A stamp up to 5 years ahead may have three causes: this computer's clock is behind (no
+      battery), the frame is a recording, or the vehicle's clock is wrong. It is refused until the
+      vehicle has answered a TIMESYNC request of this run, which no recording can do. Such stamps
+      are kept apart, so that they do not make stamps near the date look old.
+    - A stamp further ahead is refused.
 
     Args:
-        kept: From the last run.
-        clock: Unix time in s, read once.
-        elapsed: Monotonic time in s.
+        kept: The stamps kept by the last run.
+        clock: Returns Unix time in s; called once.
+        elapsed: Returns monotonic time in s.
 
     Attributes:
-        remarks: Sentences for the user; the reader removes them.
+        remarks: Sentences for the user; whoever shows them removes them.
         changed: Set at the first frame of a stream in this run.
     """
 
@@ -88,10 +90,10 @@ class StampJudge:
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()
-        self._said: set[str] = set()
+        self._told: set[str] = set()
         self._elapsed = elapsed
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-        self._doubt_clock(start, kept.date)
+        self._check_clock(start, kept.date)
         self._start = min(max(start, kept.date, _PROGRAM_DATE), MOST_TICKS)
         self._started = elapsed()
         self._limit = self._start + _DAY
@@ -101,14 +103,14 @@ class StampJudge:
         self._answered = False
 
     def date(self) -> int:
-        """Our date now, ticks."""
+        """The date of this program now, ticks."""
         return self._start + int((self._elapsed() - self._started) * TICKS_PER_S)
 
     def awaits_answer(self, stamp: int) -> bool:
-        """Whether `stamp` would be believed if it answered a TIMESYNC request of ours."""
+        """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
         in_reach = date + _DAY < stamp <= date + _FURTHEST
-        # Once a signer in our own time was heard, no other changes our date.
+        # Once a signer near the date was heard, no other changes the date.
         return in_reach and not self._answered and not self._newest[False]
 
     def judge(self, stream: Stream, stamp: int, *, answers: bool) -> SignatureResult:
@@ -116,33 +118,33 @@ class StampJudge:
 
         Args:
             stream: The signer's stream.
-            stamp: Ticks.
-            answers: Whether the frame answers a question that we asked in this run.
+            stamp: The time stamp, ticks.
+            answers: Whether the frame answers a TIMESYNC request of this run.
         """
         date = self.date()
         ahead = stamp > date + _DAY
         if stamp > date + _FURTHEST:
-            self._remark_ahead(stamp - date, f"and not believed; {SET_CLOCK}, or the vehicle's")
+            self._remark_ahead(stamp - date, f"and refused; {SET_CLOCK}, or the vehicle's")
             return SignatureResult.AHEAD
-        if stamp <= self._oldest(stream, ahead, date):
+        if stamp <= self._lower_bound(stream, ahead, date):
             if date - stamp > _MINUTE and not self._newest[ahead]:
                 self._remark(
-                    f"signatures are dated {_days(date - stamp)} before our date, and refused; "
-                    "that is a recording, or the vehicle lacks its date (GPS), or this computer's "
-                    "clock is ahead"
+                    f"the vehicle's signatures are dated {_days(date - stamp)} before this "
+                    "computer's date, and refused; this is a recording, or the vehicle has no date "
+                    f"yet (GPS), or this computer's clock is ahead: {SET_CLOCK}"
                 )
             return SignatureResult.REPLAYED
         if ahead and not self._answered:
             if not answers:
                 self._remark_ahead(
                     stamp - date,
-                    f"and refused until the vehicle answers a question of ours; {SET_CLOCK}",
+                    f"and refused until the vehicle answers a TIMESYNC request; {SET_CLOCK}",
                 )
                 return SignatureResult.AHEAD
             self._answered = True
             self._remark(
-                f"this computer's clock is not to be trusted: it is {_days(stamp - date)} behind "
-                f"the vehicle, which has our key and answers us, so its date is taken; {SET_CLOCK}"
+                f"this computer's clock is wrong: it is {_days(stamp - date)} behind the vehicle, "
+                f"which has the right key and answers, so its date is used; {SET_CLOCK}"
             )
         if (stream, ahead) not in self._heard:
             self.changed.set()
@@ -151,48 +153,52 @@ class StampJudge:
         return SignatureResult.GOOD
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
-        """The newest stamps of each stream heard in this run."""
+        """The newest stamps of each stream heard in this run, ticks."""
         heard = dict(self._heard)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:
-            floors = (
-                heard.get((stream, ahead), self._floor(stream, ahead)) for ahead in (False, True)
+            stamps = (
+                heard.get((stream, ahead), self._kept_stamp(stream, ahead))
+                for ahead in (False, True)
             )
-            newest[stream] = tuple(floor for floor in floors if floor)
+            newest[stream] = tuple(stamp for stamp in stamps if stamp)
         return newest
 
-    def _oldest(self, stream: Stream, ahead: bool, date: int) -> int:
-        """Lower bound: the next stamp must be newer than this."""
+    def _lower_bound(self, stream: Stream, ahead: bool, date: int) -> int:
+        """Lower bound of the next stamp of this stream, exclusive, ticks."""
         heard = self._heard.get((stream, ahead))
         if heard is not None:
             return heard
         newest = self._newest[ahead] if ahead else max(self._newest[ahead], date)
-        return max(self._floor(stream, ahead), newest - _MINUTE)
+        return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
-    def _floor(self, stream: Stream, ahead: bool) -> int:
-        """The newest stamp on disk of that stream, in our own time or ahead of it."""
+    def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
+        """The newest stamp of a stream on disk, among those too far `ahead` or not; 0: none."""
         stamps = (s for s in self._kept.get(stream, ()) if (s > self._limit) == ahead)
         return max(stamps, default=0)
 
-    def _doubt_clock(self, start: int, kept: int) -> None:
+    def _check_clock(self, start: int, kept: int) -> None:
         if start < kept - _MINUTE and kept > _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is not to be trusted: it says {_date(start)}, but "
-                f"{_date(kept)} has passed, and counts; {SET_CLOCK}; if it was ahead before, "
-                "delete the file of time stamps (docs/signing.md)"
+                f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
+                f"at {_date(kept)}, and that date is used; {SET_CLOCK}; if the clock was ahead "
+                "then, delete the file of time stamps (docs/signing.md)"
             )
         elif start < _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is not to be trusted: it says {_date(start)}, before this "
-                f"program was made, so {_date(_PROGRAM_DATE)} counts; {SET_CLOCK}"
+                f"this computer's clock is wrong: it says {_date(start)}, before this program was "
+                f"released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
             )
 
     def _remark_ahead(self, ticks: int, what: str) -> None:
-        self._remark(f"signatures are dated {_days(ticks)} ahead of our date, {what}")
+        days = _days(ticks)
+        self._remark(
+            f"the vehicle's signatures are dated {days} ahead of this computer's date, {what}"
+        )
 
     def _remark(self, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
+        if text not in self._told:
+            self._told.add(text)
             self.remarks.append(text)
 
 

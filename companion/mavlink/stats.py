@@ -1,4 +1,4 @@
-"""Counters of a link, and the bookkeeping of sequence numbers."""
+"""Counters of a link, and the tracking of sequence numbers."""
 
 from dataclasses import dataclass, field
 
@@ -7,7 +7,7 @@ SOME_LOST = 0.02
 
 
 def share_lost(frames: int, lost: int) -> float:
-    """Share of the sent messages that were lost, from those received and those missing."""
+    """Share of the sent frames that were lost, from the numbers received and lost."""
     return lost / max(1, lost + frames)
 
 
@@ -17,26 +17,26 @@ class LinkStats:
 
     Attributes:
         frames: Accepted from the vehicle.
-        lost: Missing in the vehicle's running numbers.
-        repeated: Came twice or late.
-        bad_crc: Candidates with a wrong checksum.
-        unknown: Of messages the dialect does not know.
+        lost: Missing in the vehicle's sequence numbers.
+        repeated: Received twice or late.
+        bad_crc: Bytes that begin like a frame and have a wrong checksum.
+        unknown: Frames of messages that the dialect does not know.
         bad_signature: Unsigned, wrongly signed or replayed while signing is on.
-        ignored_foreign: From systems or components we do not listen to.
-        unclaimed: With the vehicle's ids, from a sender that is not the peer (see `peer.PeerRule`).
+        ignored_foreign: Frames of other systems or components than the vehicle's.
+        unclaimed: Frames with the vehicle's ids, from a sender that is not the peer (`PeerRule`).
         non_finite: Messages refused for a NaN or infinity.
         outdated: Positions refused because one with the same or a later time stamp had come.
         stamped_ahead: Positions refused because they were stamped ahead of the vehicle's clock.
-        malformed: Messages whose fields make no sense.
-        sent: Handed to the kernel.
-        forwarded: Of other nodes, handed to the kernel as they came.
-        not_sent: Could not leave (no peer, buffer full, connection down) and were dropped.
+        malformed: Messages that could not be decoded or whose values are impossible.
+        sent: Passed to the kernel.
+        forwarded: Frames of other nodes that were passed to the kernel unchanged.
+        not_sent: Could not be sent (no peer, buffer full, connection down) and were dropped.
         reconnects: How often the connection was opened again.
-        peers: How often the peer changed to another address or port, or to another TCP client,
-            after the first. A peer that comes back at its address and port is no new one; a serial
-            port or a TCP connection that we open again counts in `reconnects` alone.
+        peers: How often the peer changed to another address or port, or to another TCP client. A
+            peer that returns at the same address and port does not count. A serial port or TCP
+            connection that this program opens again counts only in `reconnects`.
         by_message: Accepted frames for each message id.
-        foreign_sources: (system, component) of those that are ignored.
+        foreign_sources: (system, component) of frames that are ignored.
     """
 
     frames: int = 0
@@ -61,13 +61,13 @@ class LinkStats:
 
 
 class SequenceTracker:
-    """Counts the gaps in one sender's running numbers (0..255, wrapping)."""
+    """Counts the gaps in one sender's sequence numbers (0..255, wrapping)."""
 
     def __init__(self) -> None:
         self._last: int | None = None
 
     def missing(self, sequence: int) -> int:
-        """Frames missing before this one; -1 if it came twice or late (by up to 127)."""
+        """Number of frames missing before this one; −1 if it came twice or up to 127 late."""
         if self._last is None:
             self._last = sequence
             return 0
@@ -83,10 +83,10 @@ class SequenceTracker:
 
 
 class FrameCounter:
-    """Counts the vehicle's accepted frames and the gaps in its running numbers.
+    """Counts the vehicle's accepted frames and the gaps in its sequence numbers.
 
     Args:
-        stats: Holds the counts.
+        stats: Takes the counts.
     """
 
     def __init__(self, stats: LinkStats) -> None:
@@ -101,7 +101,7 @@ class FrameCounter:
         if missing < 0:
             stats.repeated += 1
         else:
-            # A message that the dialect does not know has a number too; it came, and is no loss.
+            # A frame of an unknown message has a sequence number too. It came, so it is not lost.
             explained = min(missing, stats.unknown - self._explained)
             self._explained += explained
             stats.lost += missing - explained

@@ -1,22 +1,25 @@
-"""STATUSTEXT: pieces joined, PX4's trailing tab cut."""
+"""STATUSTEXT: joins the pieces of received texts, and makes frames of texts for a log."""
 
 from collections import deque
 from typing import NamedTuple
 
-from companion.mavlink.messages import Message
+from companion.files.ascii_text import ascii_for
+from companion.mavlink.framing import build_frame
+from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
+_MOST_ID = 0xFFFF
 _KEPT = 100
 _SAME_WITHIN_S = 1.0
 
 
 class StatusText(NamedTuple):
-    """What the autopilot said.
+    """A text of the autopilot.
 
     Attributes:
-        time: Event-loop time of arrival (of the last piece), s.
+        time: Event-loop time at which the last piece arrived, s.
         severity: MAV_SEVERITY, 0 emergency to 7 debug.
-        text: The words.
+        text: The whole text.
     """
 
     time: float
@@ -27,8 +30,8 @@ class StatusText(NamedTuple):
 class TextAssembler:
     """Joins the pieces of long texts. The newest 100 texts are kept in `texts`.
 
-    An incomplete text is kept as far as it came, once the next one begins. What comes both as a
-    text and as an event is kept once.
+    If a text begins before the last one is complete, the incomplete one is kept as it is. A text
+    that PX4 sends both as STATUSTEXT and as event is kept once.
     """
 
     def __init__(self) -> None:
@@ -39,14 +42,20 @@ class TextAssembler:
         self._events: deque[StatusText] = deque(maxlen=_KEPT)
 
     def take_event(self, severity: int, words: str, now: float) -> None:
-        """Take the words of an event."""
-        if not _told(self.texts, words, now):
+        """Take the text of an event.
+
+        Args:
+            severity: MAV_SEVERITY.
+            words: The text.
+            now: Event-loop time, s.
+        """
+        if not _recent(self.texts, words, now):
             event = StatusText(now, severity, words)
             self.texts.append(event)
             self._events.append(event)
 
     def take(self, message: Message, now: float) -> None:
-        """Take one STATUSTEXT."""
+        """Take one STATUSTEXT at the event-loop time `now`, s."""
         text: str = message.text
         if message.id == 0:
             self._finish(now)
@@ -57,11 +66,11 @@ class TextAssembler:
             self._id = message.id
         self._severity = message.severity
         self._parts.append(text)
-        if len(text) < _CHUNK_CHARACTERS:  # a zero byte ended it, so this was the last piece
+        if len(text) < _CHUNK_CHARACTERS:  # a shorter piece is the last one
             self._finish(now)
 
     def since(self, start: float) -> tuple[str, ...]:
-        """The words of all texts that came at `start` or later."""
+        """All texts that came at the event-loop time `start` (s) or later."""
         return tuple(entry.text for entry in self.texts if entry.time >= start)
 
     def _finish(self, now: float) -> None:
@@ -71,10 +80,52 @@ class TextAssembler:
 
     def _keep(self, now: float, severity: int, text: str) -> None:
         words = text.rstrip("\t ").strip()
-        if words and not _told(self._events, words, now):
+        if words and not _recent(self._events, words, now):
             self.texts.append(StatusText(now, severity, words))
 
 
-def _told(told: deque[StatusText], words: str, now: float) -> bool:
-    """Whether these words came within the last second."""
-    return any(one.text == words for one in told if one.time >= now - _SAME_WITHIN_S)
+def _recent(texts: deque[StatusText], words: str, now: float) -> bool:
+    """Whether `texts` has the same words from the last second."""
+    return any(one.text == words for one in texts if one.time >= now - _SAME_WITHIN_S)
+
+
+class TextFrames:
+    """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
+
+    Their component is MAV_COMP_ID_LOG. With the component id of the frames that are sent, their
+    sequence numbers would look as if frames had been lost.
+
+    Args:
+        system: system id of the frames.
+    """
+
+    def __init__(self, system: int) -> None:
+        self._system = system
+        self._sequence = self._id = 0
+
+    def frames(self, words: str) -> list[bytes]:
+        """The frames of a text, in ASCII, with at most 50 characters each, in order."""
+        text = ascii_for(words)
+        pieces = [
+            text[at : at + _CHUNK_CHARACTERS] for at in range(0, len(text) + 1, _CHUNK_CHARACTERS)
+        ]
+        # A piece with a zero byte ends a text; a text of one piece has no number.
+        number = 0
+        if len(pieces) > 1:
+            number = self._id = self._id % _MOST_ID + 1
+        return [self._frame(piece, number, order) for order, piece in enumerate(pieces)]
+
+    def _frame(self, piece: str, number: int, order: int) -> bytes:
+        message = dialect.MAVLink_statustext_message(
+            dialect.MAV_SEVERITY_INFO, piece.encode("ascii"), number, order
+        )
+        kind = message.get_msgId()
+        self._sequence = (self._sequence + 1) & 0xFF
+        return build_frame(
+            kind,
+            encode(message),
+            CRC_EXTRA[kind],
+            sequence=self._sequence,
+            system=self._system,
+            component=dialect.MAV_COMP_ID_LOG,
+        )

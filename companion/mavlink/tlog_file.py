@@ -1,7 +1,7 @@
-"""Reading a `.tlog`, ours or another program's: the frames in it, with their messages.
+"""Reads a `.tlog` of this or another program: the frames in it, with their messages.
 
-A record is the time in microseconds since 1970, 8 bytes big endian, then one frame as it was on
-the wire.
+A record is the time in microseconds since 1970 (8 bytes, big endian) and then one frame as it was
+sent.
 """
 
 from collections.abc import Iterator, Set
@@ -16,12 +16,12 @@ _V1_OVERHEAD, _V2_OVERHEAD, _SIGNATURE = 8, 12, 13
 
 
 def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
-    """The intact frames of these messages, in the order in which they were recorded.
+    """The intact frames of the messages with these names, in the order of the log.
 
     An incomplete record at the end is left out.
 
     Raises:
-        LogError: the file cannot be read, or is not a `.tlog`.
+        LogError: the file cannot be read, is damaged, or is not a `.tlog`.
     """
     wanted = {MESSAGE_IDS[name] for name in names}
     scanner = FrameScanner(CRC_EXTRA)
@@ -32,7 +32,7 @@ def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
 
 
 def _records(path: Path) -> Iterator[bytes]:
-    """The frames as bytes, without their stamps."""
+    """The frames as bytes, without their time stamps."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -47,10 +47,10 @@ def _records(path: Path) -> Iterator[bytes]:
         elif at == _STAMP_BYTES:
             break
         else:
-            raise LogError(f"{path}: damaged after {at} bytes; no MAVLink frame stands there")
+            raise LogError(f"{path}: damaged after {at} bytes: no MAVLink frame begins there")
         yield data[at:end]
         at = end + _STAMP_BYTES
     if at == _STAMP_BYTES:
         raise LogError(
-            f"{path}: not a .tlog; expected MAVLink frames, each behind 8 bytes of its time"
+            f"{path}: not a .tlog; expected MAVLink frames, each after 8 bytes with its time"
         )

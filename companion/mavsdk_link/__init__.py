@@ -1,1 +1,1 @@
-"""The same link through MAVSDK, for users of its stack; needs the extra `mavsdk`."""
+"""The link through MAVSDK (`link.backend: mavsdk`); needs the extra `mavsdk`."""

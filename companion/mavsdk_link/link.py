@@ -1,11 +1,10 @@
-"""The same link to the same vehicle, by way of MAVSDK.
+"""A link to the vehicle whose connection MAVSDK holds.
 
-Setpoints do not go by MAVSDK's offboard plugin. That repeats the last one 20 times a second, from a
-thread of its own, until it is told to stop. Whatever is to tell it can come too late: a process
-that was stopped in flight and goes on sent old body rates once more before any thread of ours ran,
-and PX4, whose failsafe was landing by then, took that for a wish to be in offboard and obeyed. So
-setpoints go as all other frames do: ours, each sent once, in answer to a fresh sample. What repeats
-nothing needs nobody who ends it.
+Setpoints are not sent by MAVSDK's offboard plugin. The plugin repeats the last setpoint 20 times a
+second, in its own thread, until it is told to stop, which can be too late. Measured: a process was
+stopped in flight and resumed, and the plugin sent old body rates before any other thread ran. PX4,
+whose failsafe was landing, took them for a request for offboard, and obeyed them. So each setpoint
+is one frame of this program, sent once, in answer to a fresh sample.
 """
 
 import logging
@@ -22,20 +21,20 @@ _LOG = logging.getLogger(__name__)
 
 
 class MavsdkLink(Link):
-    """A link whose connection is MAVSDK's.
+    """A `Link` whose connection MAVSDK holds.
 
-    All that is said and heard is as in `Link`, for MAVSDK forwards it; so samples carry the
-    vehicle's time, which MAVSDK's own telemetry does not give. What the vehicle answers to MAVSDK's
-    own questions does not come here, and counts as lost in `stats`.
+    MAVSDK forwards all frames unchanged, so samples carry the vehicle's time stamps, which MAVSDK's
+    own telemetry does not give. The vehicle's answers to MAVSDK's own requests do not arrive here,
+    and count as lost in `stats`.
 
     Args:
-        settings: As of `Link`.
-        tap: As of `Link`.
-        notice: As of `Link`.
+        settings: See `Link`.
+        tap: See `Link`.
+        notice: See `Link`.
 
     Raises:
-        EndpointError: The endpoint's notation is wrong.
-        LinkError: Lockstep or signing is asked for, which MAVSDK cannot do.
+        EndpointError: The endpoint cannot be parsed.
+        LinkError: The settings demand lockstep or signing, which MAVSDK cannot do.
     """
 
     def __init__(

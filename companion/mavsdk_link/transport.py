@@ -1,10 +1,10 @@
-"""MAVSDK as a transport: it holds the connection to the vehicle, frames pass through it whole.
+"""MAVSDK as a transport: it holds the connection to the vehicle, and forwards frames unchanged.
 
-MAVSDK forwards between its connections. One is the vehicle's; the other is of its kind `raw`, which
-is this process itself. So each side sees each frame as the other sent it, time stamp included.
+MAVSDK forwards frames between its two connections: one to the vehicle, and one of its type `raw` to
+this process. So each side gets each frame as the other sent it, with its time stamp.
 
-MAVSDK hands what we send to a thread of its own; it reaches the kernel 0.1 ms later. MAVSDK does
-not say whether the frame left, and it queues what a serial line or a TCP connection does not take.
+MAVSDK sends a frame from a thread of its own, so it reaches the kernel 0.1 ms later. MAVSDK does
+not report whether it was sent. It queues frames that a serial port or TCP connection cannot take.
 """
 
 import asyncio
@@ -34,15 +34,15 @@ from companion.mavlink.transport.endpoint import (
 
 
 def connection_url(endpoint: str) -> str:
-    """What `Mavsdk.add_any_connection` takes for one of our endpoints.
+    """Convert an endpoint to the URL that `Mavsdk.add_any_connection` takes.
 
     Raises:
-        EndpointError: With the reason and how to mend it.
+        EndpointError: The endpoint cannot be parsed, or MAVSDK cannot do what it demands.
     """
     where = parse_endpoint(endpoint)
     if isinstance(where, UdpIn | TcpServer) and where.peers:
         raise EndpointError(
-            f"endpoint {endpoint!r}: MAVSDK hears every sender; leave ?peer= out, or use "
+            f"endpoint {endpoint!r}: MAVSDK accepts every sender; remove ?peer=, or use "
             "link.backend: direct"
         )
     return f"{_scheme(where)}://{_address(where)}"
@@ -69,7 +69,7 @@ def _address(where: Endpoint) -> str:
 
 
 _MOST_WAITING = 1000
-"""Frames kept for an event loop that does not come to read them; then the oldest are lost."""
+"""Largest number of frames that wait for the event loop; beyond it the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
 _REASONS = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
@@ -82,27 +82,27 @@ class MavsdkTransport:
     """A running MAVSDK. It opens a dropped TCP connection or serial port again by itself.
 
     Args:
-        settings: Where the vehicle is and who we are. MAVSDK itself is the component above ours:
-            what is addressed to it alone, it would not forward.
-        receive: Called in the event loop for each frame but those of MAVSDK's own.
-        speaks_first: Whether a frame can leave before one was heard; over UDP in, where to is not
-            known before.
+        settings: The endpoint and ids. MAVSDK itself uses the component id above
+            `source_component`, because it does not forward frames that are addressed to itself.
+        receive: Called in the event loop for each frame except MAVSDK's own.
+        speaks_first: Whether frames can be sent before one has been received. A listening UDP
+            endpoint does not know the vehicle's address before.
 
     Raises:
-        EndpointError: With the reason.
+        EndpointError: MAVSDK cannot open the endpoint; the message says why.
     """
 
     reconnects = False
 
     def __init__(self, settings: LinkSettings, receive: Receive, *, speaks_first: bool) -> None:
-        log_subscribe(lambda *_: True)  # it would print to standard output
+        log_subscribe(lambda *_: True)  # otherwise MAVSDK logs to standard output
         component = settings.source_component % 255 + 1
         self._own = bytes((settings.source_system, component))
         self._receive = receive
         self._has_peer = speaks_first
         self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
-        self._bell = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._mavsdk = Mavsdk(Configuration.create_manual(settings.source_system, component, True))
         try:
             self._connect("raw://")
@@ -110,33 +110,33 @@ class MavsdkTransport:
             self._connect(connection_url(settings.endpoint))
         except MavsdkError as error:
             self._mavsdk.destroy()
-            os.close(self._bell)
-            raise EndpointError(_why(settings.endpoint, str(error))) from error
-        watch(self._loop, self._bell, self._read)
+            os.close(self._wakeup)
+            raise EndpointError(_open_error(settings.endpoint, str(error))) from error
+        watch(self._loop, self._wakeup, self._read)
 
     def send(self, frame: bytes) -> bool:
-        """Have MAVSDK forward one frame to the vehicle, once; false if there is no peer yet."""
+        """Have MAVSDK forward one frame, once; return False if the vehicle was not heard yet."""
         if not self._has_peer:
             return False
         self._mavsdk.pass_received_raw_bytes(frame)
         return True
 
     def close(self) -> None:
-        """End MAVSDK, with all its threads."""
-        unwatch(self._loop, self._bell)
+        """Stop MAVSDK with all its threads."""
+        unwatch(self._loop, self._wakeup)
         self._mavsdk.destroy()
-        os.close(self._bell)
+        os.close(self._wakeup)
 
     def _connect(self, url: str) -> None:
         self._mavsdk.add_any_connection_with_handle_and_forwarding(url, ForwardingOption.ON)
 
     def _on_frame(self, frame: bytes) -> None:
-        """In MAVSDK's thread: only hand over."""
+        """Pass a frame to the event loop; called in MAVSDK's thread."""
         self._waiting.append((frame, perf_counter_ns()))
-        os.eventfd_write(self._bell, 1)
+        os.eventfd_write(self._wakeup, 1)
 
     def _read(self) -> None:
-        os.eventfd_read(self._bell)
+        os.eventfd_read(self._wakeup)
         while self._waiting:
             frame, received_ns = self._waiting.popleft()
             if frame[0] != V2 or frame[_SOURCE] != self._own:
@@ -144,6 +144,6 @@ class MavsdkTransport:
                 self._receive(frame, received_ns)
 
 
-def _why(endpoint: str, words: str) -> str:
+def _open_error(endpoint: str, words: str) -> str:
     known = (reason for name, reason in _REASONS.items() if name in words)
     return f"{endpoint} cannot be opened by MAVSDK: {next(known, words)}"

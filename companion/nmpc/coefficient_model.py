@@ -1,4 +1,4 @@
-"""The prediction model that flies: the linear response of the acceleration coefficients."""
+"""The prediction model used in flight: the linear response of the acceleration coefficients."""
 
 from collections.abc import Callable
 from math import cos, hypot, pi, sin
@@ -19,9 +19,9 @@ from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
 _LEAST_SQUARE = 0.01
-"""Lower bound of cos²(tilt) in the prediction: a Newton step may tilt beyond 90°."""
+"""Lower bound of cos²(tilt) in the prediction, since a Newton step may tilt beyond 90°."""
 _SIDE_PAIRS = 6
-"""Pairs of opposite sides of the polygon that approximates a disc: a corner every 30°."""
+"""Number of pairs of opposite sides of the polygon that approximates a disc: a corner each 30°."""
 
 
 def coefficient_model(settings: Settings) -> Model:
@@ -31,11 +31,11 @@ def coefficient_model(settings: Settings) -> Model:
     V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, τ·c̈ + ċ = p·(c_d − c); the heading
     responds in first order.
 
-    Limits: |c_d| ≤ sin(max_tilt), or |c| at the start where that is larger; the tilt rate of
-    p·(c_d − c) within W_M; the heading rate within its own limit. Polygons inside the discs make
-    the constraints linear in the control: a single iteration from anywhere keeps them, and no
-    quadratic program is infeasible. The dead time is not part of the model: `prediction` integrates
-    the motion past it.
+    Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
+    p·(c_d − c) is within W_M; the heading rate is within its own limit. Polygons inside the discs
+    make the constraints linear in the control, so that a single iteration from any start satisfies
+    them, and every quadratic program is feasible. The dead time is not part of the model:
+    `prediction` integrates the motion to its end.
     """
     symbols = Symbols(size=11, own_constants=1)
     speed, turning = symbols.state[9:11], symbols.turning(settings)
@@ -50,8 +50,8 @@ def coefficient_model(settings: Settings) -> Model:
             symbols.translation(settings), speed, turning[2], (turning[0:2] - speed) / settings.lag
         ),
         bounded=ca.vertcat(
-            _across_sides(symbols.control[0:2], longest),
-            _across_sides(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
+            _polygon_terms(symbols.control[0:2], longest),
+            _polygon_terms(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
             turning[2] / settings.max_yaw_rate,
         ),
         constants_of=constants_of,
@@ -62,7 +62,7 @@ class Symbols:
     """Symbols of a model whose control is a target of coefficients.
 
     Args:
-        size: of the state, which begins with p, v, c and heading.
+        size: size of the state, which begins with p, v, c and heading.
         own_constants: number of constants besides `Conditions`.
     """
 
@@ -74,7 +74,7 @@ class Symbols:
         self.heading = self.state[8]
 
     def turning(self, settings: Settings) -> ca.SX:
-        """(3,), the commanded rates p·(c_d − c), 1/s, and of the heading, rad/s."""
+        """(3,), commanded speed p·(c_d − c) of the coefficients, 1/s, and of the heading, rad/s."""
         return ca.vertcat(
             settings.gain * (self.control[0:2] - self.c),
             settings.yaw_gain * (self.control[2] - self.heading),
@@ -93,7 +93,7 @@ class Symbols:
         bounded: ca.SX,
         constants_of: Callable[[Conditions, Motion], Floats],
     ) -> Model:
-        """A `Model` of these symbols."""
+        """The `Model` of these symbols with the given terms; see `Model`."""
         aim, size = ca.SX.sym("aim", 4), self.state.numel()
         return Model(
             state=self.state,
@@ -122,9 +122,9 @@ def _aim_of(node: Node) -> Floats:
 
 
 def _tilt_rate(c: ca.SX, speed: ca.SX) -> ca.SX:
-    """(2,) in rad/s, as long as the tilt rate that belongs to a speed (2,) of the coefficients.
+    """(2,), a vector whose length is the tilt rate, rad/s, at a speed (2,) of the coefficients.
 
-    The thrust axis moves on a sphere: its speed squared is |ċ|² + (c·ċ)²/cos²(tilt).
+    The thrust axis moves on a sphere: its squared speed is |ċ|² + (c·ċ)²/cos²(tilt).
     """
     cosine = _cos_tilt(c)
     rate: ca.SX = speed + c * ca.dot(c, speed) / (cosine * (1.0 + cosine))
@@ -135,8 +135,8 @@ def _cos_tilt(c: ca.SX) -> ca.SX:
     return ca.sqrt(ca.fmax(1.0 - ca.sumsqr(c), _LEAST_SQUARE))
 
 
-def _across_sides(vector: ca.SX, radius: Any) -> ca.SX:
-    """(6,), a (2,) vector across each pair of sides; inside the polygon all lie in [−1, 1]."""
+def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
+    """Component of a vector (2,) normal to each pair of sides, (6,): 1 or −1 on a side."""
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]
     across = (cos(angle) * vector[0] + sin(angle) * vector[1] for angle in angles)
     sides: ca.SX = ca.vertcat(*across) / (cos(0.5 * pi / _SIDE_PAIRS) * radius)

@@ -10,7 +10,7 @@ from companion.guidance.trajectory.sample import Vector
 from companion.nmpc.reference import Start
 
 READY = b"ready"
-"""First message of the solver's process, once it takes requests."""
+"""First message of the solver's process, sent when it can take requests."""
 
 _HEAD = struct.Struct("<q24d")
 _INPUT = struct.Struct("<5d")
@@ -21,13 +21,13 @@ class Vehicle(NamedTuple):
     """State of the vehicle.
 
     Attributes:
-        time: to which the state belongs, s.
+        time: time of the state, s.
         position: m, NED.
         velocity: m/s, NED.
         q: attitude, body → world; must be a unit quaternion.
         body_rates: rad/s, FRD.
-        disturbance: acceleration by wind and whatever else is not modelled, m/s², NED.
-        drag: as estimated so far.
+        disturbance: acceleration by wind and other unmodelled forces, m/s², NED.
+        drag: estimated drag.
     """
 
     time: float
@@ -40,13 +40,13 @@ class Vehicle(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Control input of the vehicle from a time on, by predictive control or by linear guidance.
+    """A control input, commanded by predictive control or by linear guidance.
 
     Attributes:
         time: when it was commanded, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
-        heading: rad.
-        thrust: specific, m/s².
+        heading: heading of the target, rad.
+        thrust: specific thrust, m/s².
     """
 
     time: float
@@ -60,12 +60,12 @@ class Request(NamedTuple):
     """A problem to solve.
 
     Attributes:
-        number: of the request; its answer has the same.
-        vehicle: its state.
-        at: time along the trajectory that belongs to `vehicle.time`, s.
-        start: of the trajectory.
-        inputs: the latest, in order of time. They must reach back by dead time plus lead; before
-            the first one, the same input is assumed.
+        number: number of the request; its answer has the same number.
+        vehicle: state of the vehicle.
+        at: time along the trajectory at `vehicle.time`, s.
+        start: start of the trajectory.
+        inputs: latest control inputs, in order of time. They must cover the last dead time plus
+            lead; the first one is assumed to have been in force before.
     """
 
     number: int
@@ -80,25 +80,25 @@ class Status(IntEnum):
 
     SOLVED = 0
     FAILED = 1
-    """The solver gave no plan."""
+    """The solver found no plan."""
     TILTED_TOO_FAR = 2
-    """The vehicle is tilted further than the models cover."""
+    """The tilt is larger than the models allow."""
 
 
 class Answer(NamedTuple):
     """Answer to a request.
 
     Attributes:
-        number: of the request.
-        status: the rest is meaningful only if it is `SOLVED`.
-        given_at: when it was computed, on the machine's monotonic clock, s.
-        time: when to use it, on the clock of `Vehicle.time`, s.
+        number: number of the request.
+        status: how the solve ended; unless it is `SOLVED`, the other fields mean nothing.
+        given_at: when the answer was computed, on the computer's monotonic clock, s.
+        time: when to use the answer, on the clock of `Vehicle.time`, s.
         north, east: coefficients of the target.
-        heading: rad, in (−π, π].
-        thrust: specific, m/s².
-        seconds: computing time, prediction and reference included.
+        heading: heading of the target, rad, in (−π, π].
+        thrust: specific thrust, m/s².
+        seconds: computing time, including prediction and reference, s.
         solving: processor time of the solver alone, s.
-        iterations: of the SQP.
+        iterations: number of SQP iterations.
     """
 
     number: int

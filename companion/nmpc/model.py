@@ -1,4 +1,4 @@
-"""A prediction model in CasADi symbols, and what all models share: translation, integration."""
+"""A prediction model in CasADi symbols; translation and integration, which all models share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -38,10 +38,10 @@ class Motion(NamedTuple):
 
 
 class Conditions(NamedTuple):
-    """What acts on the vehicle besides thrust and gravity, constant over the horizon.
+    """Wind and drag on the vehicle, constant over the horizon.
 
     Attributes:
-        w_n, w_e, w_d: acceleration by wind and whatever else is not modelled, m/s², NED.
+        w_n, w_e, w_d: acceleration by wind and other unmodelled forces, m/s², NED.
         linear_drag, quadratic_drag: `Drag`, 1/s and 1/m.
     """
 
@@ -54,23 +54,27 @@ class Conditions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """ẋ = f(x, u), the terms of the cost, and the conversions of numbers; CasADi symbols.
+    """A model ẋ = f(x, u) in CasADi symbols, with the terms of the cost.
+
+    The functions `state_of`, `constants_of`, `aim_of` and `control_of` compute the numbers for the
+    symbols.
 
     Attributes:
         state: (n,), begins with position and velocity.
         control: (m,), ends with the specific thrust.
         constants: (c,), constant over the horizon; begins with `Conditions`.
         derivative: (n,), ẋ.
-        aim: (k,), the reference of a node in the terms of this model.
-        heading_error: of `state` against `aim`, rad.
+        aim: (k,), the values of the reference at a node to which heading and attitude rate are
+            compared.
+        heading_error: heading of `state` minus that of `aim`, rad.
         turning_error: commanded attitude rate minus that of `aim`.
-        target: (4,), coefficients, tilt-yaw heading and specific thrust that make the planner do
-            what the control says.
-        bounded: terms that must lie between −1 and 1 at every control.
+        target: (4,), coefficients, tilt-yaw heading and specific thrust to send to the planner for
+            `control`.
+        bounded: terms that must be between −1 and 1 at every control.
         state_of: a motion → `state`.
         constants_of: the conditions and the motion at the start of the horizon → `constants`.
         aim_of: a node of the reference → `aim`.
-        control_of: a node of the reference → the `control` that stays on it.
+        control_of: a node of the reference → the `control` that keeps the vehicle on the reference.
     """
 
     state: ca.SX
@@ -89,7 +93,7 @@ class Model:
 
 
 def constants_symbols(own: int = 0) -> ca.SX:
-    """(5 + own,), `Conditions` and as many constants of the model's own."""
+    """(5 + own,), symbols of `Conditions` and of `own` further constants of the model."""
     return ca.SX.sym("constants", len(Conditions._fields) + own)
 
 
@@ -105,14 +109,14 @@ def translation(
 
     Args:
         velocity: (3,), NED, m/s.
-        thrust: specific, m/s².
+        thrust: specific thrust, m/s².
         axis: (3,), coefficients north and east, and cos(tilt).
-        constants: begins with `Conditions`.
-        settings: for gravity.
+        constants: symbols that begin with `Conditions`.
+        settings: settings, which contain gravity.
     """
     lift = thrust * ca.vertcat(axis[0], axis[1], -axis[2])
     weight = ca.vertcat(0.0, 0.0, settings.gravity)
-    symbols: list[Any] = ca.vertsplit(constants)  # for mypy: the symbols of numbers
+    symbols: list[Any] = ca.vertsplit(constants)  # typed so that mypy takes symbols as numbers
     conditions = Conditions(*symbols[: len(Conditions._fields)])
     drag = Drag(conditions.linear_drag, conditions.quadratic_drag)
     moving: list[Any] = ca.vertsplit(velocity)

@@ -1,4 +1,4 @@
-"""Where the vehicle will be when an answer takes effect: earlier inputs still act until then."""
+"""Predicts the motion to the time when an answer takes effect; until then earlier inputs act."""
 
 from collections.abc import Sequence
 from math import hypot, sin, sqrt
@@ -12,20 +12,20 @@ from companion.nmpc.model import Conditions, Motion, integrator
 from companion.nmpc.settings import Settings
 
 _LEAST_COSINE = 0.2
-"""cos(tilt) of the largest tilt that the models cover: 78°."""
+"""cos(tilt) of the largest tilt that the models allow, 78°."""
 _LONGEST_COEFFICIENTS = sqrt(1.0 - _LEAST_COSINE**2)
-"""|c| at that tilt."""
+"""|c| at the largest tilt that the models allow."""
 
 _LONGEST_STEP = 0.02
-"""s; inputs change at most this often."""
+"""Longest integration step, s."""
 
 
 class TiltedTooFarError(Exception):
-    """The vehicle is tilted further than the models cover."""
+    """The tilt is larger than the models allow."""
 
 
 def motion_of(vehicle: Vehicle) -> Motion:
-    """The motion in the terms of the models.
+    """The vehicle's state as the `Motion` of the models.
 
     Raises:
         InvalidQuaternionError: the attitude is not a unit quaternion.
@@ -48,10 +48,10 @@ def motion_of(vehicle: Vehicle) -> Motion:
 
 
 class Predictor:
-    """Integrates the motion under the inputs that are still to act, by the `coefficient_model`.
+    """Integrates the motion to a later time by `coefficient_model`, with the inputs until then.
 
     Args:
-        settings: the vehicle.
+        settings: settings of the vehicle.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -60,11 +60,11 @@ class Predictor:
         self._advance = integrator(self._model)
 
     def predict(self, vehicle: Vehicle, inputs: Sequence[Input], until: float) -> Motion:
-        """The motion at the time `until`; an input acts one dead time after its own time.
+        """The motion at the time `until`, s; an input takes effect one dead time after its `time`.
 
         Raises:
-            InvalidQuaternionError: as `motion_of`.
-            TiltedTooFarError: the tilt exceeds 78° now, or will at that time.
+            InvalidQuaternionError: the attitude is not a unit quaternion.
+            TiltedTooFarError: the tilt exceeds 78° now, or at the time `until`.
         """
         motion = motion_of(vehicle)
         time = vehicle.time

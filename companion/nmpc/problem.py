@@ -24,7 +24,7 @@ _SQP: dict[str, Any] = {
     "print_iteration": False,
     "print_status": False,
     "print_time": False,
-    "show_eval_warnings": False,  # a plan that is not finite is refused; nobody reads our output
+    "show_eval_warnings": False,  # a plan that is not finite is refused anyway
 }
 
 
@@ -33,10 +33,10 @@ class Program(NamedTuple):
 
     Attributes:
         unknown: w, (x_0, u_0, x_1, u_1, …, x_N).
-        parameters: p; `parameters_of` fills it.
+        parameters: p; `parameters_of` gives its numbers.
         residual: r.
-        constraints: g, for each step the gap to the next state and then the bounds of the model:
-            the order that HPIPM requires.
+        constraints: g: for each step the gap to the next state, then the bounded terms of the
+            model. HPIPM requires this order.
         lower, upper: bounds on w; the caller sets the first n to the state at the start.
         g_lower, g_upper: bounds on g.
     """
@@ -52,7 +52,7 @@ class Program(NamedTuple):
 
 
 def transcribe(model: Model, settings: Settings) -> Program:
-    """Write the problem of this model out over the horizon."""
+    """Formulate the optimal control problem of this model over the horizon."""
     node = ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
     advance = integrator(model)
     running = ca.Function(
@@ -109,7 +109,7 @@ def _running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
 
 
 def _final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
-    """Contribution of the state x at the end of the horizon."""
+    """Contribution of the state x at the end of the horizon to the residual r."""
     weights = settings.weights
     residual: ca.SX = ca.vertcat(
         sqrt(weights.final * weights.position) * (x[0:3] - node[0:3]),
@@ -139,9 +139,9 @@ class Solution(NamedTuple):
 
     Attributes:
         unknown: (x_0, u_0, x_1, …, x_N), as `Program.unknown`.
-        solved: whether the plan may be flown, if it is finite.
+        solved: whether the plan may be flown, provided that it is finite.
         converged: whether the iterations reached the tolerance.
-        iterations: of the SQP.
+        iterations: number of SQP iterations.
     """
 
     unknown: Floats
@@ -151,10 +151,10 @@ class Solution(NamedTuple):
 
 
 class SqpSolver:
-    """CasADi's SQP with HPIPM for the quadratic programs; nothing is compiled.
+    """CasADi's SQP with HPIPM for the quadratic programs; no code is compiled.
 
     Args:
-        model: predicts the motion.
+        model: the prediction model.
         settings: horizon, cost and iterations.
     """
 
@@ -164,11 +164,11 @@ class SqpSolver:
         self._solver = _sqp_function(self._program, settings.iterations)
 
     def solve(self, guess: Floats, parameters: Floats) -> Solution:
-        """Solve from a guess, whose first state is kept: the vehicle starts there.
+        """Solve from a guess; its first state is the start of the plan and stays.
 
         Args:
-            guess: as `Program.unknown`.
-            parameters: as `parameters_of` makes them.
+            guess: first guess, in the order of `Program.unknown`.
+            parameters: numbers from `parameters_of`.
         """
         program, start = self._program, self._start
         program.lower[:start] = program.upper[:start] = guess[:start]
@@ -208,9 +208,9 @@ def _sqp_function(program: Program, iterations: int) -> ca.Function:
         "max_iter": iterations,
         "max_iter_ls": 0 if single else 10,  # line search in every iteration
         "qpsol_options": {
-            # A single iteration needs no quadratic program to the last digit: a fifth longer.
+            # In a single iteration the full accuracy, which takes a fifth longer, is of no use.
             "hpipm": {"mode": "speed_abs" if single else "speed"},
-            # HPIPM knows no infinite bound, so CasADi passes large ones. Its default, 1e8, loses
+            # HPIPM has no infinite bounds, so CasADi passes large numbers. Its default, 1e8, loses
             # so many digits that ten times as many iterations are needed.
             "inf": 1e4,
             "error_on_fail": False,

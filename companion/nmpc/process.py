@@ -1,7 +1,7 @@
-"""The flight's side of the solver's process: sends requests and takes the answers.
+"""The flight's interface to the solver's process: sends requests and takes the answers.
 
-Nothing here blocks or computes: a busy thread in our own process would delay the control loop by
-milliseconds.
+Nothing here blocks or computes, and the solver runs in another process: a busy thread in the
+flight's process would delay the control loop by milliseconds.
 """
 
 import os
@@ -27,7 +27,7 @@ from companion.realtime import schedule_as_usual
 
 _LARGEST_MESSAGE = 4096
 _EXIT_TIME = 0.02
-"""Time allowed to a process to exit after its socket has closed, s; usually well below 1 ms."""
+"""Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _TOLERANCE = 0.02
 """Share by which an answer may exceed a limit through rounding."""
 
@@ -49,9 +49,9 @@ class _Pending(NamedTuple):
     """The request that has no answer yet.
 
     Attributes:
-        number: of the request.
-        at: when it was sent, on the machine's monotonic clock, s.
-        longest: largest |c| that an answer may have.
+        number: number of the request.
+        at: when it was sent, on the computer's monotonic clock, s.
+        longest: largest |c| that its answer may have.
     """
 
     number: int
@@ -62,17 +62,17 @@ class _Pending(NamedTuple):
 class Solver:
     """Starts the process, sends requests, returns answers that may be flown.
 
-    An answer that is late, failed or absurd is reported and not returned. The death of the process
-    is reported at the next call; watch `fileno` to learn of it at once.
+    An answer that is late, failed or implausible is reported and not returned. The end of the
+    process is reported at the next call; watch `fileno` to notice it at once.
 
     Args:
         settings: vehicle, horizon and solver.
-        trajectory: the one to follow; it is pickled.
+        trajectory: the trajectory to follow; it is pickled.
         report: called for each trouble, from within the method that notices it.
 
     Attributes:
-        alive: False once the process was closed or found dead.
-        pid: of the process.
+        alive: False after the process was closed or has ended.
+        pid: process id of the solver.
 
     Raises:
         MissingExtraError: CasADi is not installed.
@@ -86,7 +86,8 @@ class Solver:
         self._ready = False
         self._ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._ours.setblocking(False)
-        # Files, not pipes: the process reads late, and its output is read only after it ended.
+        # Files instead of pipes, which could fill up: the process reads its input late, and its
+        # output is read only after it has ended.
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by close()
         with theirs, tempfile.TemporaryFile() as job:
             pickle.dump((settings, trajectory), job)
@@ -100,24 +101,27 @@ class Solver:
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
-        schedule_as_usual(self.pid)  # it computes all the time: not with our real-time priority
+        schedule_as_usual(self.pid)  # it computes all the time, so not with real-time priority
         self.alive = True
 
     @property
     def ready(self) -> bool:
-        """Whether the process is warmed up and takes requests."""
+        """Whether the process has started and takes requests."""
         if not self._ready and self.alive:
             self._ready = self._receive() == READY
         return self._ready and self.alive
 
     def fileno(self) -> int:
-        """Readable when an answer has come or the process has ended; call `take` then."""
+        """File descriptor that is readable when an answer has come or the process has ended.
+
+        Call `take` then.
+        """
         return self._ours.fileno()
 
     def request(self, request: Request) -> None:
-        """Send a request without waiting. An earlier one without an answer counts as late.
+        """Send a request without waiting; an earlier request without an answer counts as late.
 
-        Nothing is sent to a process that is not `ready`.
+        If the process is not `ready`, the request is dropped.
         """
         if not self.ready:
             return
@@ -134,10 +138,11 @@ class Solver:
             self._pending = _Pending(request.number, monotonic(), longest)
 
     def take(self, wait: float = 0.0) -> Answer | None:
-        """The answer to the last request, once, if it has come and may be flown.
+        """The answer to the last request if it has come and may be flown; it is returned once.
 
         Args:
-            wait: time to wait for it, s. With 0, as in real time, this call never blocks.
+            wait: longest time to wait for the answer, s. With 0, as in real time, this call does
+                not block.
         """
         until = monotonic() + wait
         while self.ready:
@@ -183,7 +188,7 @@ class Solver:
             reason = answer.status.name.lower().replace("_", " ")
             words = f"request {pending.number} was not solved: {reason}"
             self._report(Trouble.FAILED, words)
-        elif absurd := _absurdity(answer, pending.longest, self._settings):
+        elif absurd := _why_implausible(answer, pending.longest, self._settings):
             self._report(Trouble.ABSURD, f"the answer to request {pending.number} has {absurd}")
         else:
             return answer
@@ -196,7 +201,7 @@ class Solver:
             self._pending = None
 
     def _handle_exit(self) -> None:
-        """The socket was closed by the process: report how it ended."""
+        """Report how the process ended, after it has closed its socket."""
         with suppress(subprocess.TimeoutExpired):  # if it hangs, `close` kills it
             self._process.wait(_EXIT_TIME)
         code = self._process.returncode
@@ -208,8 +213,8 @@ class Solver:
         self._report(Trouble.DIED, f"the solver {how}" + (f": {words[-1]}" if words else ""))
 
 
-def _absurdity(answer: Answer, longest: float, settings: Settings) -> str | None:
-    """Why no vehicle can fly this answer; None if it can."""
+def _why_implausible(answer: Answer, longest: float, settings: Settings) -> str | None:
+    """Why an answer is implausible; None if it is plausible."""
     values = (answer.north, answer.east, answer.heading, answer.thrust, answer.time)
     if not all(isfinite(value) for value in values):
         return "a number that is not finite"

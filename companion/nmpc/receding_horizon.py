@@ -1,4 +1,4 @@
-"""Receding horizon: solves again and again, each time from the previous plan, shifted in time."""
+"""Receding horizon: each solve starts from the previous plan, shifted in time."""
 
 from collections.abc import Callable, Sequence
 from math import floor
@@ -18,12 +18,12 @@ class Plan(NamedTuple):
     """The first control of a solve.
 
     Attributes:
-        solved: whether the plan may be flown; the rest is meaningless if not.
+        solved: whether the plan may be flown; if not, the other fields mean nothing.
         converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
-        iterations: of the SQP.
-        seconds: processor time of the solver itself.
-        north, east, heading: the target for the planner: coefficients, rad.
-        thrust: specific, m/s².
+        iterations: number of SQP iterations.
+        seconds: processor time of the solver alone, s.
+        north, east, heading: target for the planner: coefficients, and heading in rad.
+        thrust: specific thrust, m/s².
     """
 
     solved: bool
@@ -40,10 +40,10 @@ _NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class RecedingHorizon:
-    """Plans again and again, each time starting from the previous plan.
+    """Solves the optimal control problem at each request, starting from the previous plan.
 
-    The cost is the same for all models: errors of position, velocity and heading, and attitude rate
-    and thrust against those of the reference; see `Weights`.
+    The cost is the same for all models: deviations of position, velocity, heading, attitude rate
+    and thrust from the reference; see `Weights`.
 
     Args:
         settings: vehicle, horizon and solver.
@@ -69,10 +69,10 @@ class RecedingHorizon:
         """Plan from `motion` on.
 
         Args:
-            time: of `motion`, s; it tells by how much the previous plan is shifted.
-            motion: at the start of the horizon.
-            nodes: the reference at the ends of the steps, (steps + 1).
-            conditions: constant over the horizon.
+            time: time of `motion`, s; the previous plan is shifted to it.
+            motion: motion at the start of the horizon.
+            nodes: the reference at the steps + 1 nodes.
+            conditions: wind and drag.
         """
         model = self._model
         start = np.array(model.state_of(motion))
@@ -104,12 +104,12 @@ class RecedingHorizon:
 
 
 def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
-    """A plan shifted forward by `steps` of its horizon; past its end the last values are repeated.
+    """A plan shifted forward by `steps` of its horizon; beyond its end the last values repeat.
 
     Args:
         model: the model of the plan.
         plan: (x_0, u_0, …, x_N).
-        steps: not negative; between two nodes the plan is interpolated.
+        steps: number of steps, not negative; the plan is interpolated between nodes.
     """
     n = model.state.numel()
     stages = plan[:-n].reshape(-1, n + model.control.numel())
@@ -118,7 +118,7 @@ def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
 
 
 def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -> Floats:
-    """A plan that is on its reference from the start, its thrust within the limits."""
+    """The plan that follows the reference from the start, with its thrust within the limits."""
     states = [model.state_of(_motion_of(node)) for node in nodes]
     controls = np.array([model.control_of(node) for node in nodes[:-1]])
     controls[:, -1] = controls[:, -1].clip(settings.min_thrust, settings.max_thrust)

@@ -1,4 +1,4 @@
-"""Attitude and thrust that keep the vehicle on its trajectory: the reference of the horizon."""
+"""The reference of the horizon: attitude and thrust that keep the vehicle on its trajectory."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from companion.drag import Drag
 from companion.guidance.trajectory.sample import Sample, Vector
 
 _LEAST_LIFT = 0.2
-"""Least upward part of the reference thrust, share of gravity, however fast the descent."""
+"""Smallest upward part of the reference thrust, as a share of gravity."""
 
 
 class Node(NamedTuple):
@@ -19,8 +19,8 @@ class Node(NamedTuple):
         velocity: m/s, NED.
         north, east: acceleration coefficients.
         speed_north, speed_east: their time derivative, 1/s.
-        thrust: specific, m/s².
-        heading: tilt-yaw heading, rad; unwrapped, so that neighbouring nodes stay close.
+        thrust: specific thrust, m/s².
+        heading: tilt-yaw heading, rad; unwrapped, so that it does not jump between nodes.
         heading_rate: rad/s.
     """
 
@@ -36,11 +36,12 @@ class Node(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a trajectory begins, and by how much it is turned.
+    """Where a trajectory begins, and the rotation of its headings.
 
     Attributes:
-        position: where it begins, m, NED.
-        turned: added to its headings, rad: the initial heading for a trajectory that holds it.
+        position: position where it begins, m, NED.
+        turned: angle added to its headings, rad; for a trajectory that holds its heading, this
+            heading.
     """
 
     position: Vector
@@ -57,12 +58,12 @@ def node_of(
     derivative.
 
     Args:
-        sample: of the trajectory.
-        start: of the trajectory.
-        near: the heading is given within π of this, rad.
-        drag: of the vehicle.
+        sample: sample of the trajectory.
+        start: start of the trajectory.
+        near: a heading, rad; that of the node is at most π from it.
+        drag: drag of the vehicle.
         gravity: m/s².
-        disturbance: w, acceleration by wind and whatever else is not modelled, m/s².
+        disturbance: w, acceleration by wind and other unmodelled forces, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
     slowed, growing = drag.deceleration(velocity), drag.growth(velocity, acceleration)

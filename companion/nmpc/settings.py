@@ -1,4 +1,4 @@
-"""What the predictive controller knows of the vehicle, and the weights of its cost."""
+"""Settings of the predictive controller: vehicle, horizon, and weights of the cost."""
 
 from dataclasses import dataclass, fields
 from math import isfinite, pi
@@ -14,12 +14,12 @@ class Weights:
     """Weights of the squared errors, each integrated over the horizon.
 
     Attributes:
-        position: 1/m².
-        velocity: s²/m².
-        heading: 1/rad².
-        turning: of the commanded attitude rate against that of the reference, s²/rad².
-        thrust: of the specific thrust against that of the reference, s⁴/m².
-        final: factor on position and velocity at the end of the horizon, s.
+        position: weight of the position error, 1/m².
+        velocity: weight of the velocity error, s²/m².
+        heading: weight of the heading error, 1/rad².
+        turning: weight of the commanded attitude rate minus that of the reference, s²/rad².
+        thrust: weight of the specific thrust minus that of the reference, s⁴/m².
+        final: factor on the weights of position and velocity at the end of the horizon, s.
     """
 
     position: float = 20.0
@@ -42,19 +42,19 @@ class Settings:
         gain: p of the planner that flies the targets, 1/s.
         yaw_gain: heading gain of that planner, 1/s.
         lag: τ of its response τ·c̈ + ċ = p·(c_d − c), s.
-        dead_time: from the use of an answer to the first response of the vehicle, s.
+        dead_time: time from sending a target to the first response of the vehicle, s.
         gravity: m/s².
         max_tilt: tilt limit of the planner, rad.
         max_tilt_rate: tilt rate limit W_M of the planner, rad/s.
         max_yaw_rate: yaw rate limit of the planner, rad/s.
-        min_thrust, max_thrust: specific thrust, m/s².
-        weights: of the cost.
+        min_thrust, max_thrust: limits of the specific thrust, m/s².
+        weights: weights of the cost.
         horizon: length of the prediction, s.
-        steps: of the horizon; the control is constant over each.
-        iterations: SQP iterations per solve at most; 1 is the real-time iteration.
-        lead: from the time of a request to the time at which its answer is used, s.
+        steps: number of steps of the horizon; the control is constant in each.
+        iterations: largest number of SQP iterations per solve; 1 is the real-time iteration.
+        lead: time from a request to the use of its answer, s.
         deadline: time allowed for an answer, s.
-        niceness: of the solver's process relative to ours, 0 to 19.
+        niceness: niceness of the solver's process relative to the flight's, 0 to 19.
 
     Raises:
         ValueError: a value is out of range, or `lag` is too short for the step of the horizon.

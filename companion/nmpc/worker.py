@@ -33,20 +33,20 @@ from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
 
 _WARM_UP = 5
-"""Solves before the first that counts: they fill caches and allocate memory."""
+"""Number of solves before the first request, which fill caches and allocate memory."""
 _LARGEST_MESSAGE = 65536
 
 
 class Worker:
     """Answers requests about one trajectory.
 
-    The dead time is not part of the problem: the motion is predicted past it with the inputs that
-    are still to act, and the plan starts there. So the prediction works for every model.
+    The dead time is not part of the problem. The motion is predicted to the end of the dead time,
+    with the inputs that take effect until then, and the plan starts there.
 
     Args:
         settings: vehicle, horizon and solver.
-        trajectory: the one to follow.
-        make_model: makes the prediction model of the problem; only studies use another one.
+        trajectory: the trajectory to follow.
+        make_model: makes the prediction model; only studies use another one than the default.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class Worker:
         self.forget()
 
     def forget(self) -> None:
-        """Start the next solve from its reference instead of the previous plan."""
+        """Start the next solve from the reference instead of the previous plan."""
         self._horizon.forget()
 
     def answer(self, request: Request) -> Answer:
-        """Solve for the time at which the answer is used."""
+        """Compute the answer to a request, for the time at which it will be used."""
         began = perf_counter()
         use = request.vehicle.time + self._settings.lead
         try:
@@ -107,7 +107,7 @@ class Worker:
         return self._horizon.solve(until, motion, nodes, conditions)
 
     def _nodes(self, request: Request, heading: float) -> list[Node]:
-        """The reference over the horizon; its headings are unwrapped from the vehicle's."""
+        """The reference over the horizon; its headings do not jump from `heading` on."""
         settings, nodes = self._settings, list[Node]()
         for k in range(settings.steps + 1):
             sample = self._trajectory.at(request.at + self._ahead + k * settings.step)
@@ -129,15 +129,16 @@ def _no_answer(request: Request, status: Status, use: float, seconds: float) -> 
 
 
 def main() -> None:
-    """Answer one request after the other."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is meant for the flight, which closes us
+    """Answer requests, one after the other, until the socket is closed."""
+    # Ctrl-C reaches this process too, but the flight handles it and then closes the socket.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     connection = socket.socket(fileno=int(sys.argv[1]))
-    settings, trajectory = pickle.load(sys.stdin.buffer)  # from our own parent
+    settings, trajectory = pickle.load(sys.stdin.buffer)  # trusted: the parent process wrote it
     os.nice(settings.niceness)
     worker = Worker(settings, trajectory)
     worker.warm_up()
     gc.freeze()
-    gc.disable()  # nothing here makes reference cycles, and a collection would delay an answer
+    gc.disable()  # a collection would delay an answer, and nothing here makes reference cycles
     try:
         connection.send(READY)
         while message := _newest_request(connection):
@@ -147,7 +148,7 @@ def main() -> None:
 
 
 def _newest_request(connection: socket.socket) -> bytes:
-    """Wait for a request and skip to the newest; empty once the other end is closed."""
+    """Wait for requests and return the newest; empty after the other end has closed."""
     message = connection.recv(_LARGEST_MESSAGE)
     while message:
         try:

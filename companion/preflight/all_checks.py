@@ -33,6 +33,7 @@ CHECKS: tuple[Check, ...] = (
     offboard_loss,
     configuration_checks.planner,
     configuration_checks.dead_time,
+    configuration_checks.doubtful,
     configuration_checks.accepted,
 )
 
@@ -41,6 +42,7 @@ ONCE: tuple[Check, ...] = (
     offboard_loss,
     configuration_checks.planner,
     configuration_checks.dead_time,
+    configuration_checks.doubtful,
     configuration_checks.accepted,
 )
 """Checks that a flight runs once only: their result depends on nothing but the configuration."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from companion.attitude.planner import FIRST_ORDER
 from companion.config import Config
+from companion.config.doubts import doubts
 from companion.config.guidance import AUTO
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
@@ -63,6 +64,13 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
         fix,
         str(folder),
     )
+
+
+def doubtful(config: Config, _: Evidence) -> Iterator[Finding]:
+    """Values that are most likely not meant, or not measured on this vehicle."""
+    for doubt in doubts(config):
+        key = Key.IDENTIFIED if doubt.key == Key.IDENTIFIED else Key.UNITS
+        yield Finding(key, INEFFECTIVE, doubt.found, doubt.because, doubt.fix, doubt.key)
 
 
 def accepted(config: Config, _: Evidence) -> Iterator[Finding]:

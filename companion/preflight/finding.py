@@ -49,6 +49,9 @@ class Key(StrEnum):
     PLANNER = "planner.name"
     DEAD_TIME = "vehicle.dead_time_ms"
     ACCEPT = "flight.accept"
+    IDENTIFIED = "vehicle.identified"
+    UNITS = "configuration.units"
+    RESPONSE = "planner.gain_per_s"
 
 
 class Change(NamedTuple):

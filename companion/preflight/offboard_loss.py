@@ -9,7 +9,14 @@ from companion.config.known_drag import least_drag
 from companion.drag import Drag
 from companion.guidance import ManeuverSequence, Pose, Reference
 from companion.guidance.fence import Fence
-from companion.guidance.offboard_loss import Flown, Loss, Reach, path_thrust, reach, tilted_thrust
+from companion.guidance.offboard_loss import (
+    LossFailsafe,
+    MotionAtLoss,
+    Reach,
+    path_thrust,
+    reach,
+    tilted_thrust,
+)
 from companion.guidance.reference import Vector
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
@@ -71,7 +78,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, brakes: bool) -> Worst:
-    """The largest reach over the maneuvers; `held` and `brakes` as of `Loss`."""
+    """The largest reach over the maneuvers; `held` and `brakes` as of `LossFailsafe`."""
     limits, safety = config.limits, config.safety
     fence = Fence(
         limits.fence_radius_m,
@@ -84,7 +91,7 @@ def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, bra
     )
     drag = least_drag(config)
     max_tilt_rate = limits.max_tilt_rate
-    loss, worst = Loss(held, brakes, drag, max_tilt_rate, fence), Worst()
+    loss, worst = LossFailsafe(held, brakes, drag, max_tilt_rate, fence), Worst()
     for time, flown in _flown(config, maneuvers, drag):
         there = reach(flown, loss)
         breach, at = worst.breach, worst.time
@@ -122,7 +129,7 @@ def _breach(config: Config, offset: Vector, there: Reach, fence: Fence) -> str |
 
 def _flown(
     config: Config, maneuvers: ManeuverSequence, drag: Drag
-) -> Iterator[tuple[float, Flown]]:
+) -> Iterator[tuple[float, MotionAtLoss]]:
     """The flown states over the maneuvers; open-loop steps follow the attitude law."""
     gain = config.planner.gain_per_s
     period = max(_PERIOD, maneuvers.duration / _MOST)
@@ -139,12 +146,12 @@ def _flown(
             turn = tuple((b - a) / _AHEAD for a, b in zip(thrust, later, strict=True))
             size = hypot(*thrust)
             tilt = (thrust[0] / size, thrust[1] / size)
-            yield time, Flown(place, velocity, thrust, (turn[0], turn[1], turn[2]))
+            yield time, MotionAtLoss(place, velocity, thrust, (turn[0], turn[1], turn[2]))
             continue
         rates, tilt_after = _answer(told, tilt, gain, period)
         thrust = tilted_thrust(*tilt)
         turn_north, turn_east = (hypot(*thrust) * rate for rate in rates)
-        yield time, Flown(place, velocity, thrust, (turn_north, turn_east, 0.0))
+        yield time, MotionAtLoss(place, velocity, thrust, (turn_north, turn_east, 0.0))
         tilt = tilt_after
         north, east, _ = tilted_thrust(*tilt)
         slowed = drag.deceleration(velocity)

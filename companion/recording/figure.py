@@ -1,4 +1,4 @@
-"""A flight as a picture: response, straightness and tracking; needs the extra `plot`."""
+"""A flight as a picture: response, straightness, ground track and history; extra `plot`."""
 
 import json
 from collections.abc import Callable
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.extras import require
+from companion.recording.history import HEIGHTS, Marks, draw_history, marks_of
 from companion.recording.response import first_order
 from companion.recording.second_order import StepRun, nearest_second_order, step_runs
 
@@ -21,8 +22,8 @@ Floats = NDArray[np.float64]
 # Readable by the colour-blind.
 _MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
 _STYLES = ("-", "--", ":")
-_COLUMNS = 7
-"""Of each table that is drawn."""
+_WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
+"""Of the picture, of its upper panels and of its history, inches."""
 _LARGEST = 1e9
 """No time in s and no distance in m of a flight is larger."""
 _FOR_LEGEND = 0.2
@@ -47,23 +48,22 @@ def draw_flight(folder: Path, out: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    response, tracking = _rows(folder / "response.csv"), _rows(folder / "tracking.csv")
-    panels: list[Callable[[Axes], None]] = []
-    runs = [] if response is None else step_runs(response)
-    if runs:
-        gain = _gain(folder)
-        panels += [lambda axes: _draw_steps(axes, runs, gain), lambda axes: _draw_plane(axes, runs)]
-    if tracking is not None:
-        track = tracking
-        panels.append(lambda axes: _draw_ground(axes, track))
-    if not panels:
+    panels, motion = _panels(folder), _rows(folder / "motion.csv", 6)
+    if not panels and motion is None:
         raise FigureError(f"{folder}: no flight with anything to draw is recorded there")
-    figure, grid = plt.subplots(
-        1, len(panels), figsize=(4.5 * len(panels), 4.2), layout="constrained", squeeze=False
-    )
+    marks = Marks() if motion is None else _marks(folder)
+    above, below = bool(panels) * _HEIGHT, 0.0 if motion is None else _HISTORY_HEIGHT
+    heights = [height for height in (above, below) if height]
+    figure = plt.figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
     try:
-        for axes, draw in zip(grid[0], panels, strict=True):
-            draw(axes)
+        parts = iter(figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
+        if panels:
+            grid = next(parts).subplots(1, len(panels), squeeze=False)
+            for axes, draw in zip(grid[0], panels, strict=True):
+                draw(axes)
+        if motion is not None:
+            grid = next(parts).subplots(len(HEIGHTS), 1, sharex=True, height_ratios=HEIGHTS)
+            draw_history(grid, motion, marks)
         figure.savefig(out, dpi=120)
     except ValueError as error:  # an ending that matplotlib does not know
         raise FigureError(f"{out}: {error}") from error
@@ -71,8 +71,21 @@ def draw_flight(folder: Path, out: Path) -> None:
         plt.close(figure)
 
 
-def _rows(path: Path) -> Floats | None:
-    """The (N, 7) numbers of a CSV file; None where the flight wrote none.
+def _panels(folder: Path) -> "list[Callable[[Axes], None]]":
+    """What draws each of the upper panels."""
+    response, tracking = _rows(folder / "response.csv", 7), _rows(folder / "tracking.csv", 7)
+    panels: list[Callable[[Axes], None]] = []
+    runs = [] if response is None else step_runs(response)
+    if runs:
+        gain = _gain(_summary(folder), folder)
+        panels += [lambda axes: _draw_steps(axes, runs, gain), lambda axes: _draw_plane(axes, runs)]
+    if tracking is not None:
+        panels.append(lambda axes: _draw_ground(axes, tracking))
+    return panels
+
+
+def _rows(path: Path, columns: int) -> Floats | None:
+    """The (N, columns) numbers of a CSV file; None where the flight wrote none.
 
     Raises:
         FigureError: the file is not as `FlightTrace.save` writes it.
@@ -86,24 +99,43 @@ def _rows(path: Path) -> Floats | None:
         rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
     except ValueError as error:
         raise FigureError(f"{path}: not as a flight writes it: {error}") from error
-    if rows.shape[1] != _COLUMNS:
+    if rows.shape[1] != columns:
         raise FigureError(
-            f"{path}: not as a flight writes it: {rows.shape[1]} columns instead of {_COLUMNS}"
+            f"{path}: not as a flight writes it: {rows.shape[1]} columns instead of {columns}"
         )
-    # NaN stands for a reference that there was not; nothing else is that large.
+    # NaN stands for what there was not; nothing else is that large.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
         raise FigureError(f"{path}: not as a flight writes it: a number is above {_LARGEST:g}")
     return rows
 
 
-def _gain(folder: Path) -> float:
+def _summary(folder: Path) -> Any:
+    path = folder / "summary.json"
     try:
-        summary: Any = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
+
+
+def _gain(summary: Any, folder: Path) -> float:
+    try:
         gain = float(summary["gain_per_s"])
         if not 0.0 < gain < inf:
             raise ValueError(f"gain_per_s is {gain:g}")
         return gain
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:
+        raise FigureError(
+            f"{folder / 'summary.json'}: not as a flight writes it: {error}"
+        ) from error
+
+
+def _marks(folder: Path) -> Marks:
+    """The marks of the history; none where the flight wrote no summary."""
+    if not (folder / "summary.json").is_file():
+        return Marks()
+    try:
+        return marks_of(_summary(folder))
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise FigureError(
             f"{folder / 'summary.json'}: not as a flight writes it: {error}"
         ) from error
@@ -130,7 +162,7 @@ def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:
     )
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + _FOR_LEGEND * (high - low))
-    axes.legend(loc="upper center", fontsize="small", ncols=2)
+    axes.legend(loc="upper center", fontsize="small", ncols=2, handlelength=1.4, columnspacing=1.0)
     axes.grid(alpha=0.3)
 
 
@@ -141,8 +173,8 @@ def _draw_plane(axes: "Axes", runs: list[StepRun]) -> None:
         north, east = run.measured.T
         axes.plot(east, north, style, color=_MEASURED, label=_direction(run))
         axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET, markersize=4)
-    axes.set(title="Straightness", xlabel="east: $a_E$", ylabel="north: $a_N$")
-    axes.set_aspect("equal")
+    axes.set(title="Straightness of all steps", xlabel="east: $a_E$", ylabel="north: $a_N$")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="upper right", fontsize="small")
     axes.grid(alpha=0.3)
 
@@ -156,9 +188,10 @@ def _direction(run: StepRun) -> str:
 
 def _draw_ground(axes: "Axes", tracking: Floats) -> None:
     """The ground track beside its reference; open-loop steps have none."""
-    axes.plot(tracking[:, 2], tracking[:, 1], "--", color=_IDEAL, label="reference")
+    if not np.isnan(tracking[:, 1]).all():
+        axes.plot(tracking[:, 2], tracking[:, 1], "--", color=_IDEAL, label="reference")
     axes.plot(tracking[:, 5], tracking[:, 4], color=_MEASURED, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="center", fontsize="small")
     axes.grid(alpha=0.3)

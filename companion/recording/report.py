@@ -6,30 +6,39 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from companion.recording.closing_words import ClosingWords
 from companion.recording.dead_time import AxisDeadTime
 from companion.recording.summary import PredictiveFigures, Summary
 
 
 def flight_table(summary: Summary) -> RenderableType:
     """All tables and notes of a flight."""
-    parts: list[RenderableType] = [_verdict(summary)]
+    parts: list[RenderableType] = []
     if len(summary.trace.response):
         parts.append(_response(summary))
-    if len(summary.trace.tracking):
+    if summary.maneuvers():
         parts.append(_tracking(summary))
     if len(summary.trace.rates):
         parts += _dead_times(summary)
     if summary.predictive is not None:
         parts.append(_predictive_words(summary.predictive))
     if summary.counts.setpoints:
-        parts += [_loop(summary), _loop_words(summary)]
+        if not summary.course.lockstep:  # there the vehicle waits for us
+            parts.append(_loop(summary))
+        parts.append(_loop_words(summary))
     return Group(*parts)
 
 
-def _verdict(summary: Summary) -> Text:
-    ok = summary.result == "ok"
-    words = "flight ok" if ok else f"flight ended in `{summary.phase}`: {summary.result}"
-    return Text(words, style="bold green" if ok else "bold red")
+def words_text(words: ClosingWords) -> Text:
+    """The closing words as they are shown."""
+    style = "green" if words.good else "yellow" if words.flown else "red"
+    text = Text(words.headline, style=f"bold {style}")
+    for line in words.lines:
+        text.append(f"\n{line}", style="yellow" if line.startswith("!") else "not bold default")
+    if words.next_command is not None:
+        text.append("\nNext: ", style="not bold default")
+        text.append(words.next_command, style="bold default")
+    return text
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -65,7 +74,7 @@ def _response(summary: Summary) -> RenderableType:
 
 
 def _dead_times(summary: Summary) -> list[RenderableType]:
-    """Measured and configured dead times, and a warning where they differ."""
+    """Measured and configured dead times."""
     found = summary.dead_times
     if not found.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
@@ -80,8 +89,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
             f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms",
             "",
         )
-    warning = found.warning()
-    return [table] if warning is None else [table, Text(warning, style="bold yellow")]
+    return [table]
 
 
 def _measured(axis: AxisDeadTime) -> str:
@@ -95,14 +103,19 @@ def _milliseconds(value: float | None) -> str:
 
 
 def _tracking(summary: Summary) -> RenderableType:
-    tracking = summary.tracking()
-    table = _table("Tracking", "RMS", "largest")
-    table.add_row(
-        "position",
-        _number(tracking["position_rms_m"], "m", 2),
-        _number(tracking["position_max_m"], "m", 2),
-    )
-    table.add_row("height", _number(tracking["height_rms_m"], "m", 2), "")
+    """Level and height errors of each maneuver."""
+    table = _table("Tracking by maneuver", "level RMS", "largest", "height RMS", "largest")
+    for flown in summary.maneuvers():
+        level = (
+            ("open loop", f"{flown.drift:.2f} m away")
+            if flown.open_loop
+            else (
+                _number(flown.level_rms, "m", 2),
+                _number(flown.level_max, "m", 2),
+            )
+        )
+        heights = _number(flown.height_rms, "m", 2), _number(flown.height_max, "m", 2)
+        table.add_row(flown.name, *level, *heights)
     return table
 
 
@@ -132,9 +145,10 @@ def _loop_words(summary: Summary) -> Text:
         f"{count} {name.replace('_', ' ')}" for name, count in counts.unanswered.items() if count
     ]
     unanswered = f"\nunanswered samples: {', '.join(reasons)}" if reasons else ""
+    missed = "" if summary.course.lockstep else f"{counts.missed_deadlines} missed deadlines, "
     return Text(
         f"{counts.setpoints} setpoints for {counts.samples} samples, {counts.rate_hz:.0f} Hz "
-        f"in the maneuver\n{counts.missed_deadlines} missed deadlines, {counts.stale} too old, "
+        f"in the maneuver\n{missed}{counts.stale} too old, "
         f"{counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )

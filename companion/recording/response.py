@@ -26,6 +26,7 @@ class StepResponse:
     Attributes:
         time_constant_north_s: of the first-order model that fits a_N best (least squares), s.
         time_constant_east_s: the same for a_E.
+        step_size: largest target, the sine of the tilt.
         cross_axis_max: straightness: largest distance from the line of a step.
         model_deviation_max: largest distance from the ideal model ċ = p·(c_d − c).
         second_order: the second-order model with a dead time that comes nearest.
@@ -34,6 +35,7 @@ class StepResponse:
 
     time_constant_north_s: float
     time_constant_east_s: float
+    step_size: float
     cross_axis_max: float
     model_deviation_max: float
     second_order: SecondOrderFit
@@ -54,6 +56,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     return StepResponse(
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
+        step_size=max(float(np.hypot(*run.target.T).max()) for run in runs),
         cross_axis_max=max(_from_line(step) for run in runs for step in run.steps()),
         model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
         second_order=second_order,

@@ -9,9 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from companion.recording.course import Course
 from companion.recording.dead_time import DeadTimes
+from companion.recording.maneuver_figures import ManeuverFigures, measure_maneuvers
 from companion.recording.response import StepResponse, measure_response
 from companion.recording.trace import FlightTrace
+from companion.recording.verdict import checks, is_good
+
+_EXTENT = ("height_max_m", "speed_max_m_s", "tilt_max_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,7 @@ class Summary:
         dead_times: measured and configured.
         predictive: counts of predictive control; None where it did not fly.
         realtime: each real-time request to the operating system: "granted", or the reason why not.
+        course: phases, how it ended, and the circumstances.
     """
 
     result: str
@@ -89,6 +95,7 @@ class Summary:
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
     realtime: dict[str, str] = field(default_factory=dict)
+    course: Course = field(default_factory=Course)
 
     def response(self) -> StepResponse | None:
         """The measured step response, or None where no step was flown."""
@@ -119,9 +126,30 @@ class Summary:
             "height_rms_m": _rms(error[:, 2]),
         }
 
+    def maneuvers(self) -> tuple[ManeuverFigures, ...]:
+        """The figures of each maneuver that was flown, in order."""
+        return self._maneuvers
+
+    @cached_property
+    def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
+        trace = self.trace
+        return measure_maneuvers(trace.tracking_rows(), trace.maneuvers, self.course.began)
+
+    def extent(self) -> dict[str, float]:
+        """The largest height (m), speed (m/s) and tilt (°), and the time under control (s)."""
+        rows, tracked = self.trace.motion.rows(), self.trace.tracking_rows()
+        largest = [column[~np.isnan(column)].max(initial=-math.inf) for column in rows[:, 2:5].T]
+        return {
+            **{
+                key: float(value) if math.isfinite(value) else math.nan
+                for key, value in zip(_EXTENT, largest, strict=True)
+            },
+            "under_control_s": float(tracked[-1, 0] - tracked[0, 0]) if len(tracked) else 0.0,
+        }
+
     def as_dict(self) -> dict[str, Any]:
         """What `--json` prints; values that were not measured are null."""
-        return {
+        figures = {
             "result": self.result,
             "phase": self.phase,
             "planner": self.planner,
@@ -137,12 +165,17 @@ class Summary:
             "response": _response_as_dict(self.response()),
             "dead_time_s": _dead_times_as_dict(self.dead_times),
             "tracking": _without_nan(self.tracking()),
+            "maneuvers": [figures.as_dict() for figures in self.maneuvers()],
+            "extent": _without_nan(self.extent()),
             "nmpc": None if self.predictive is None else self.predictive.as_dict(),
             "realtime": self.realtime,
             "link": self.link,
+            **self.course.as_dict(),
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
             "log": None if self.log is None else str(self.log),
         }
+        judged = [check._asdict() for check in checks(figures)]
+        return {**figures, "verdict": {"good": is_good(figures), "checks": judged}}
 
     def as_json(self) -> str:
         """`as_dict` on one line."""
@@ -153,6 +186,7 @@ def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:
     if response is None:
         return {
             "time_constant_s": dict.fromkeys(("north", "east")),
+            "step_size": None,
             "cross_axis_max": None,
             "model_deviation_max": None,
             "second_order": dict.fromkeys(
@@ -164,6 +198,7 @@ def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:
         "time_constant_s": _without_nan(
             {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
         ),
+        "step_size": response.step_size,
         "cross_axis_max": response.cross_axis_max,
         "model_deviation_max": response.model_deviation_max,
         "second_order": {

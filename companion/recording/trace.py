@@ -1,6 +1,8 @@
 """Record of control, sample by sample, for the measurements after the flight."""
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,21 @@ _RATES = (
     *(f"measured_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")),
     "age_s",
 )
+_MOTION = ("time_s", "vehicle_time_s", "height_m", "speed_m_s", "tilt_deg", "error_m")
+
+
+class ManeuverMark(NamedTuple):
+    """The beginning of a maneuver, or the end of the last one.
+
+    Attributes:
+        time: s on our clock.
+        vehicle_time: s.
+        name: None: from here on no maneuver is flown.
+    """
+
+    time: float
+    vehicle_time: float
+    name: str | None
 
 
 class FlightTrace:
@@ -42,6 +59,9 @@ class FlightTrace:
             offboard control is active by its heartbeats.
         latencies_ns: sample in → setpoint out inside this process, ns.
         newest_latency_ns: the newest of them; 0 before the first.
+        motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
+            °, distance from the reference m), ten times a second in all phases; NaN: unknown.
+        maneuvers: when each maneuver began and the last one ended.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -51,6 +71,8 @@ class FlightTrace:
         self.rates = Series(_RATES, self._spool, kept=_KEPT_RATES)
         self.newest_latency_ns = 0
         self.latencies_ns = Series(("latency_ns",), self._spool)
+        self.motion = Series(_MOTION, self._spool)
+        self.maneuvers: list[ManeuverMark] = []
 
     def add_response(self, vehicle_time: float, q: Quaternion, target: Target) -> None:
         """Record an attitude sample that was answered during a step."""
@@ -82,8 +104,16 @@ class FlightTrace:
         self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
+    def add_motion(self, row: Iterable[float]) -> None:
+        """Record a row of `motion`."""
+        self.motion.add(list(row))
+
+    def begin_maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
+        """Record that a maneuver begins (None: that the last one ends), as `ManeuverMark`."""
+        self.maneuvers.append(ManeuverMark(time, vehicle_time, name))
+
     def save(self, folder: Path) -> None:
-        """Write `response.csv`, `tracking.csv` and `rates.csv`, those that have rows.
+        """Write `response.csv`, `tracking.csv`, `rates.csv` and `motion.csv`, if they have rows.
 
         Raises:
             OSError: a file cannot be written.
@@ -92,6 +122,7 @@ class FlightTrace:
             ("response.csv", self.response),
             ("tracking.csv", self.tracking),
             ("rates.csv", self.rates),
+            ("motion.csv", self.motion),
         ):
             if len(series):
                 header = ",".join(series.columns)

@@ -1,4 +1,4 @@
-"""The actions that a breach leads to, and the exits by which a flight can end early."""
+"""The actions that a breach causes, and the ways in which a flight can end early."""
 
 from enum import Enum
 
@@ -9,13 +9,13 @@ class Action(Enum):
     WARN = "warn"
     """Report the breach once and fly on."""
     HOLD = "hold"
-    """Give up the maneuver and hold here, still in offboard."""
+    """Give up the maneuver and hold the present position, still in offboard."""
     HAND_BACK = "hand_back"
-    """Ask the autopilot to hold, and leave it holding."""
+    """Command the autopilot to hold, and end offboard control."""
     LAND = "land"
-    """Hand back, and ask the autopilot to land."""
+    """Command the autopilot to land, and end offboard control."""
     RELEASE = "release"
-    """Stop sending: the pilot or the autopilot's failsafe flies the vehicle."""
+    """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 
     @property
     def severity(self) -> int:
@@ -38,15 +38,15 @@ EXITS = {
     Action.LAND: Exit.LAND,
     Action.RELEASE: Exit.RELEASE,
 }
-"""The exit for each action that ends a flight."""
+"""The exit of each action that ends a flight."""
 
 
 class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops early ends
     """Ends the flight before its maneuvers do.
 
     Attributes:
-        reason: shown to the user.
-        exit: what the flight does with the vehicle; None: what the running phase says.
+        reason: why the flight ended, shown to the user.
+        exit: what the flight does with the vehicle; None: the exit of the running phase.
     """
 
     def __init__(self, reason: str, exit: Exit | None = None) -> None:
@@ -56,5 +56,5 @@ class FlightEnded(Exception):  # noqa: N818 - it is how every flight that stops 
 
 
 def internal(error: Exception) -> str:
-    """The message for an unexpected exception in our own code."""
+    """The message for an unexpected exception, a bug in this program."""
     return f"internal error: {error!r}"

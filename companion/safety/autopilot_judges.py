@@ -12,12 +12,12 @@ HORIZONTAL = 0x8 | 0x10
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
-    """The vehicle disarmed in flight, not by our command."""
+    """The vehicle is disarmed although `companion` did not command it."""
     return None if snapshot.autopilot.armed else "the vehicle disarmed in flight"
 
 
 def landed(snapshot: Snapshot, _: bool) -> str | None:
-    """The autopilot reports landed under our thrust: its land detector or our thrust is wrong."""
+    """The autopilot reports landed in offboard: its land detector or the thrust sent is wrong."""
     return "the autopilot says that it has landed" if snapshot.autopilot.landed else None
 
 
@@ -27,18 +27,18 @@ def failsafe(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def battery(least: float) -> Judge:
-    """The battery's remaining share is below `least` (0..1), or is not reported any more."""
+    """The battery's remaining charge is below `least` (0..1), or is not reported any more."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        told = snapshot.autopilot.battery
-        if told is None:
+        newest = snapshot.autopilot.battery
+        if newest is None:
             return None
-        if outdated(told.received, snapshot.now):  # the battery may have become empty meanwhile
+        if outdated(newest.received, snapshot.now):  # the battery may have become empty meanwhile
             return "the battery's state is not reported any more"
-        if told.remaining is None or told.remaining >= least:
+        if newest.remaining is None or newest.remaining >= least:
             return None
         return (
-            f"battery at {100 * told.remaining:.0f} %, below "
+            f"battery at {100 * newest.remaining:.0f} %, below "
             f"limits.min_battery_percent {100 * least:.0f}"
         )
 
@@ -46,12 +46,12 @@ def battery(least: float) -> Judge:
 
 
 def gps(snapshot: Snapshot, _: bool) -> str | None:
-    """A vehicle that flew by GPS has lost its 3D fix, or does not report it any more."""
+    """A vehicle that had a 3D GPS fix has lost it, or does not report GPS any more."""
     return gps_fault(snapshot.autopilot.gps, snapshot.now) if snapshot.had_gps else None
 
 
 def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
-    """ESTIMATOR_STATUS lost flags that were set when control began, or does not come any more."""
+    """ESTIMATOR_STATUS lost flags that were set when control began, or is not received any more."""
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
@@ -66,13 +66,13 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset; references moved along, so a warning is enough."""
+    """The estimator was reset; the references moved with the estimate, so this only warns."""
     found = snapshot.resets
     if found.recent == 0:
         return None
     return (
         f"the estimator was reset: {found.shift:.1f} m and {degrees(found.turn):.0f}° of heading "
-        "in sum; the references moved along"
+        "in total; the references moved with it"
     )
 
 

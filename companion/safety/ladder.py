@@ -1,4 +1,4 @@
-"""The ladder: every monitor judges the same snapshot, and the most severe breach decides."""
+"""The ladder: every monitor judges the same snapshot; the most severe breach decides."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -25,26 +25,33 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    A hold that ends its breach is followed by a landing, because the maneuver is given up. A hold
-    that does not end it within `hold_time` is followed by the monitor's `then`.
-
-    Attributes:
-        note: takes a message for every transition.
+    The action HOLD gives up the maneuver. If the breach ends within `hold_time`, the vehicle lands.
+    Otherwise the monitor's action `then` follows.
 
     Args:
         monitors: the table; among equally severe breaches the first row decides.
-        hold_time: how long a hold may take to end its breach, s.
+        hold_time: time allowed for a hold to end its breach, s.
+
+    Attributes:
+        note: called with a message when an alarm is raised or over.
+        breaches: name of the monitor of each breach so far, by the breach in words.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:
         self.note: Callable[[str], None] = lambda _: None
+        self.breaches: dict[str, str] = {}
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
         self._held_at: float | None = None
         self._held_for = ""
 
+    @property
+    def raised(self) -> tuple[str, ...]:
+        """The names of the monitors whose alarm is raised now."""
+        return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
+
     def step(self, snapshot: Snapshot) -> Verdict | None:
-        """Judge one snapshot; returns the action to take now, or None."""
+        """Judge one snapshot; return the action to take now, or None."""
         raised = [alarm for alarm in self._alarms if alarm.step(snapshot) and self._report(alarm)]
         worst = max(raised, key=_severity, default=None)
         if worst is not None and worst.monitor.action.severity > Action.HOLD.severity:
@@ -57,7 +64,7 @@ class SafetyLadder:
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """The verdict once the hold has ended its breach or its time is over."""
+        """The verdict when the hold has ended its breach, or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
             return Verdict(Action.LAND, self._held_for)
@@ -67,11 +74,12 @@ class SafetyLadder:
         return _verdict(worst, worst.monitor.then)
 
     def _report(self, alarm: Alarm) -> bool:
-        """Report a transition; returns whether it raised the alarm."""
+        """Report that an alarm was raised or is over; return whether it was raised."""
         name = alarm.monitor.name
         if alarm.reason is None:
             self.note(f"safety: {name} is over")
         else:
+            self.breaches[alarm.reason] = name
             self.note(f"safety: {name}: {alarm.reason} → {alarm.monitor.action.value}")
         return alarm.reason is not None
 

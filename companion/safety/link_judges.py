@@ -5,14 +5,17 @@ from companion.safety.monitor import Judge, released, released_minimum
 from companion.safety.snapshot import Control, Snapshot
 
 _HEARD = 0.3
-"""Without any frame for this long we would not hear a takeover either, s."""
+"""If no frame came for this long, s, a takeover would not be noticed either."""
 
-_OUR_STALL = 0.5
-"""If our timer did not run for a larger share of the silence, this computer caused it."""
+_STALL_SHARE = 0.5
+"""If the timer stood still for a larger share of the silence, this computer caused it."""
 
 
 def silence(limit: float, *, heard: bool) -> Judge:
-    """No setpoint left for longer than `limit` s, while frames come (`heard`) or do not come."""
+    """No setpoint was sent for longer than `limit` s.
+
+    `heard`: judge only while frames come from the vehicle; else only while none come.
+    """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         now, control = snapshot.now, snapshot.control
@@ -24,8 +27,8 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
 
 def _silence_cause(now: float, control: Control, limit: float) -> str:
-    if control.stood_still > _OUR_STALL * (now - control.answered):
-        # Data that came during the stall were read late, so their age proves nothing.
+    if control.stood_still > _STALL_SHARE * (now - control.answered):
+        # Data that came during the stall were read late, so they only seem old.
         return f"this computer stood still for {control.stood_still:.1f} s"
     if now - control.sampled > limit:
         return f"no attitude from the vehicle for {now - control.sampled:.1f} s"
@@ -73,7 +76,7 @@ def round_trip(most: float) -> Judge:
 
 
 def deadlines(most: float) -> Judge:
-    """More than the share `most` of our answers misses deadman.deadline_ms."""
+    """More than the share `most` of the setpoints misses deadman.deadline_ms."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         missed = snapshot.health.missed
@@ -85,26 +88,26 @@ def deadlines(most: float) -> Judge:
 
 
 def starvation(most: float) -> Judge:
-    """CPU starvation: our timer is late by more than the share `most` of the time."""
+    """CPU starvation: the program's timer is late by more than the share `most` of the time."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         starved = snapshot.health.starved
         if starved is None or starved <= released(most, raised):
             return None
-        return f"CPU starvation: our timer is late by {100 * starved:.0f} % of the time"
+        return f"CPU starvation: the program's timer is late by {100 * starved:.0f} % of the time"
 
     return judge
 
 
 def gaps(most: int) -> Judge:
-    """The answers had more than `most` gaps within a few seconds."""
+    """The setpoints had more than `most` gaps within 5 s."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         found = snapshot.health.gaps
         if found <= most:
             return None
         return (
-            f"samples could not be answered {found} times within 5 s for longer than "
+            f"{found} times within 5 s no setpoint could be sent for longer than "
             "deadman.telemetry_stale_ms"
         )
 
@@ -112,13 +115,13 @@ def gaps(most: int) -> Judge:
 
 
 def answer_rate(least: float) -> Judge:
-    """Samples are answered at less than `least` Hz; bursts count as the pauses between them."""
+    """The effective rate of setpoints (`HeldRates`) is below `least` Hz."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.answer_rate
         if rate is None or rate >= released_minimum(least, raised):
             return None
-        return f"attitude is answered at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
+        return f"setpoints are sent at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
 
     return judge
 

@@ -1,4 +1,4 @@
-"""One monitor: a judge of snapshots, how long a breach must last, and the action it leads to."""
+"""One monitor: a judge of snapshots, how long a breach must last, and the action it causes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,20 +7,20 @@ from companion.safety.actions import Action
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""Returns the breach in words, or None. The flag says whether the alarm is raised already: a judge
-with a limit then uses `released`, so that it does not toggle at the limit."""
+"""Returns the breach in words, or None. The flag says whether the alarm is raised already. A judge
+with a limit then uses `released`, so that the alarm does not toggle at the limit."""
 
 HYSTERESIS = 0.9
 """A raised alarm is over only below this share of its limit."""
 
 
 def released(limit: float, raised: bool) -> float:
-    """The largest value that is no breach."""
+    """The largest value that is no breach of an upper `limit`, with hysteresis."""
     return HYSTERESIS * limit if raised else limit
 
 
 def released_minimum(limit: float, raised: bool) -> float:
-    """The smallest value that is no breach."""
+    """The smallest value that is no breach of a lower `limit`, with hysteresis."""
     return limit * (1.0 / HYSTERESIS) if raised else limit
 
 
@@ -29,12 +29,12 @@ class Monitor:
     """A row of the table.
 
     Attributes:
-        name: as in the documentation and in YAML.
+        name: name in the documentation and in messages.
         judge: see `Judge`; it has no clock and no memory.
-        action: what a breach leads to.
-        lasts: how long a breach must last before the alarm is raised, s.
-        calm: how long the breach must be absent before the alarm is over, s.
-        then: what follows a hold that does not end the breach.
+        action: action that a breach causes.
+        lasts: time that a breach must last before the alarm is raised, s.
+        calm: time without the breach before the alarm is over, s.
+        then: action that follows if a hold does not end the breach.
         mutes: whether setpoints stop at once, because their data cannot be trusted.
     """
 
@@ -61,7 +61,7 @@ class Alarm:
         self._since: float | None = None
 
     def step(self, snapshot: Snapshot) -> bool:
-        """Judge one snapshot; returns whether the alarm was raised or is over just now."""
+        """Judge one snapshot; return whether the alarm was raised or ended by it."""
         breach = self.monitor.judge(snapshot, self.reason is not None)
         if (breach is None) is (self.reason is None):
             self._since = None

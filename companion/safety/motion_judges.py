@@ -1,7 +1,7 @@
 """Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
 
-The braking judge stops the vehicle before it leaves the fence. It judges where the vehicle would
-come to a stop after the reaction time, with the deceleration that is certain (`Fence.stop`).
+The judge `braking` warns before the vehicle leaves the fence. It judges where the vehicle would
+stop after the reaction time, with the deceleration that it certainly reaches (`Fence.stop`).
 """
 
 from math import degrees, hypot
@@ -26,7 +26,7 @@ def tilt(limit: float) -> Judge:
 
 
 def body_rate(limit: float) -> Judge:
-    """The body turns faster than `limit` about any axis, rad/s."""
+    """The magnitude of the body rates exceeds `limit`, rad/s."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = hypot(*snapshot.motion.body_rates)
@@ -62,7 +62,7 @@ def tracking(limit: float) -> Judge:
 
 
 def thrust(lowest: float, highest: float) -> Judge:
-    """The thrust is at one of its limits (0..1), so that the height is not held any more."""
+    """The thrust is at one of its limits (0..1), so the height is not held any more."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         sent = snapshot.motion.thrust

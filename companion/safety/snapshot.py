@@ -1,4 +1,4 @@
-"""The snapshot that all monitors judge, taken at one time. SI; world NED, body FRD."""
+"""The snapshot that all monitors judge. SI units; world NED, body FRD."""
 
 from math import inf
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from companion.vehicle.records import Battery, Estimator, Gps
 
 
 class Autopilot(NamedTuple):
-    """The autopilot's status; None where it was not received."""
+    """The autopilot's status; None: not received."""
 
     armed: bool | None = True
     landed: bool = False
@@ -29,10 +29,10 @@ class Motion(NamedTuple):
         body_rates: rad/s.
         offset: position relative to where control began, m, or None.
         velocity: m/s.
-        height: above home, m, or None; as the autopilot reports it, resets included.
+        height: height above home, m, or None; in the autopilot's frame, with estimator resets.
         off_course: distance from the reference, m; None without a reference.
-        thrust: as last sent, 0..1, or None.
-        origin: where control began, or None where that is unknown.
+        thrust: thrust last sent, 0..1, or None.
+        origin: place where control began, or None if it is unknown.
     """
 
     q: Quaternion | None = None
@@ -46,18 +46,20 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When each stage of the sample path last ran, s on our clock, and what stops it.
+    """When data last arrived and a setpoint was last sent, and why none is sent now.
+
+    Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
 
     Attributes:
-        answered: last answered sample.
-        sampled: last attitude.
-        reason: why the newest attitude is unanswered, or None.
-        commanded: last command from guidance.
-        placed: last position that was newer than those before.
-        heard: last frame of any kind from the vehicle.
+        answered: arrival of the last answered sample.
+        sampled: arrival of the last attitude sample.
+        reason: why the newest sample is unanswered, or None.
+        commanded: when guidance made its last command.
+        placed: arrival of the last position that was newer than those before.
+        heard: arrival of the last frame of any kind from the vehicle.
         position_fresh: whether the newest position is fresh.
         clock_change: how the vehicle's clock jumped or restarted since control began, or None.
-        stood_still: how long our timer did not run since the last answer, s.
+        stood_still: time for which this program stood still since the last answer, s.
     """
 
     answered: float = inf
@@ -72,15 +74,15 @@ class Control(NamedTuple):
 
 
 class Health(NamedTuple):
-    """Link and computer over the last second; None where unknown.
+    """Link and computer over the last second; None: unknown.
 
     Attributes:
         lost: share of the vehicle's frames that were lost.
-        round_trip: of TIMESYNC, s.
-        missed: share of answers that missed their deadline.
-        starved: share of the time by which our timer was late.
-        answer_rate: rate of setpoints, Hz; bursts count as the pauses between them (`HeldRates`).
-        gaps: number of gaps in the answers within the last few seconds.
+        round_trip: round trip of TIMESYNC, s.
+        missed: share of setpoints that missed their deadline.
+        starved: share of the time by which the program's timer was late.
+        answer_rate: effective rate of setpoints, Hz (`HeldRates`).
+        gaps: number of gaps in the setpoints within the last 5 s.
         position_rate: rate of positions, Hz.
     """
 
@@ -113,7 +115,7 @@ class Snapshot(NamedTuple):
     """The state of vehicle, link and computer at one time.
 
     Attributes:
-        now: s on our clock.
+        now: time of the snapshot, s of event-loop time.
         had_gps: whether GPS has had a 3D fix.
         good_flags: ESTIMATOR_STATUS flags that were set when control began.
     """

@@ -1,4 +1,4 @@
-"""Builds the snapshots: newest telemetry, our counters, and shares of the last second."""
+"""Builds the snapshots from the newest telemetry and from counters over the last second."""
 
 from collections import deque
 from math import dist, inf
@@ -17,13 +17,13 @@ from companion.vehicle.link import Link
 _WINDOW = 1.0
 """Averaging time of shares and rates, s."""
 _EARLY = 0.9
-"""Shares are known once this part of the window is filled."""
+"""Share of the window that must be filled before shares and rates are known."""
 _LATE = 0.03
 """A longer interval between two calls of `listen` is a stall, s; the timer's period is 0.02 s."""
 _PLACE_LASTS = 1.0
-"""An older GLOBAL_POSITION_INT does not tell where control begins, s."""
+"""An older GLOBAL_POSITION_INT is not used as the place where control begins, s."""
 _GAPS_WITHIN = 5.0
-"""Gaps in the answers are counted over this time, s."""
+"""Gaps in the setpoints are counted over this time, s."""
 _RESETS_WITHIN = 30.0
 """Estimator resets are counted over this time, s."""
 
@@ -45,10 +45,10 @@ class SnapshotBuilder:
     """Collects the data that the monitors judge.
 
     Args:
-        link: to the vehicle.
-        loop: answers the samples.
-        guidance_loop: makes the commands.
-        real_time: whether deadlines count; in lockstep the vehicle waits for us.
+        link: link to the vehicle.
+        loop: the control loop, which answers the samples.
+        guidance_loop: makes the commands for the control loop.
+        real_time: whether deadlines count; in lockstep the vehicle waits, and they do not.
     """
 
     def __init__(
@@ -68,7 +68,10 @@ class SnapshotBuilder:
         self._timeline = 0
 
     def begin(self, now: float) -> None:
-        """Note that control begins: the fence is centred here, and earlier resets do not count."""
+        """Note that control begins at `now`, s of event-loop time.
+
+        The fence is centred at the present position, and earlier resets do not count.
+        """
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
         self._start = None if motion is None else motion.position_ned
@@ -81,11 +84,11 @@ class SnapshotBuilder:
 
     @property
     def origin_ned(self) -> Vector | None:
-        """Where control began, m, or None before."""
+        """Position where control began, m NED, or None before."""
         return self._start
 
     def listen(self, now: float) -> None:
-        """Take the counters at `now`; the watch calls this 50 times a second in every phase."""
+        """Take the counters at `now`; `flight.watch` calls this 50 times a second."""
         stats, loop, record = self._link.stats, self._loop, self._loop.record
         if stats.frames != self._frames:
             self._frames, self._heard_at = stats.frames, now
@@ -108,7 +111,7 @@ class SnapshotBuilder:
             counted.popleft()
 
     def snapshot(self, now: float) -> Snapshot:
-        """The snapshot at `now`, s on our clock; call `listen` before."""
+        """The snapshot at `now`, s of event-loop time; call `listen` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
         command = loop.command
@@ -141,7 +144,7 @@ class SnapshotBuilder:
         )
 
     def stood_still(self, since: float) -> float:
-        """How long our timer did not run since `since` (s on our clock), s."""
+        """Time for which this program stood still since `since` (s of event-loop time), s."""
         return sum(counted.late for counted in self._counted if counted.now > since)
 
     def _motion(self) -> Motion:
@@ -196,7 +199,7 @@ class SnapshotBuilder:
 
     def _place(self, now: float) -> Place | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
-        told = self._link.state.global_position
-        if told is None or now - told.received > _PLACE_LASTS:
+        newest = self._link.state.global_position
+        if newest is None or now - newest.received > _PLACE_LASTS:
             return None
-        return Place(told.latitude_deg, told.longitude_deg)
+        return Place(newest.latitude_deg, newest.longitude_deg)

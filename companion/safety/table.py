@@ -1,4 +1,4 @@
-"""The one table of monitors: judge, action, and how long a breach must last.
+"""The table of monitors: judge, action, and how long a breach must last.
 
 To add a monitor, write its judge beside the others (`*_judges.py`) and its row here.
 """
@@ -10,17 +10,17 @@ from companion.safety.actions import Action
 from companion.safety.monitor import Monitor
 
 _BACKLOG = 0.2
-"""After a stall the backlog is drained within this time, s; until then telemetry looks old."""
+"""After a stall, queued telemetry is read within this time, s; until then it looks old."""
 _GAPS = 2
-"""Gaps in the answers that are allowed within 5 s."""
+"""Number of gaps in the setpoints that are allowed within 5 s."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
 def monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors of a flight, the more severe ones first.
 
-    `companion.flight.watch` judges the pilot's takeover and an unknown mode in every phase that has
-    modes of its own. Both release control.
+    A takeover by the pilot and an unknown mode are not in this table: `companion.flight.watch`
+    judges them, and releases control.
     """
     return (*_fixed(config), *_autopilot(config), *_motion(config), *_link(config))
 
@@ -36,13 +36,13 @@ def _fixed(config: Config) -> tuple[Monitor, ...]:
         Monitor("clock", link_judges.clock_changed, _HAND_BACK, mutes=True),
         Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),
         Monitor("landed", autopilot_judges.landed, _LAND),
-        # A failsafe that changes the mode is seen as a takeover first. Some failsafes only report.
+        # This is for failsafes that do not change the mode: a change of mode is a takeover.
         Monitor("failsafe", autopilot_judges.failsafe, _HAND_BACK),
     )
 
 
 def _autopilot(config: Config) -> tuple[Monitor, ...]:
-    """Battery, GPS and estimator."""
+    """Monitors of battery, GPS and estimator."""
     safety = config.safety
     resets = autopilot_judges.estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
@@ -59,7 +59,7 @@ def _autopilot(config: Config) -> tuple[Monitor, ...]:
 
 
 def _motion(config: Config) -> tuple[Monitor, ...]:
-    """Envelope, fence and tracking."""
+    """Monitors of flight envelope, fence, tracking error and thrust."""
     safety, limits, fence = config.safety, config.limits, fence_of(config)
     tilt = motion_judges.tilt(limits.max_tilt + safety.tilt_margin)
     body_rate = motion_judges.body_rate(safety.max_body_rate)
@@ -80,21 +80,21 @@ def _motion(config: Config) -> tuple[Monitor, ...]:
 
 
 def _link(config: Config) -> tuple[Monitor, ...]:
-    """The link and this computer."""
+    """Monitors of the link and of this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
     trip = link_judges.round_trip(safety.max_round_trip)
     answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
     positions = link_judges.position_rate(config.link.min_position_rate_hz)
     return (
-        # The vehicle keeps turning at the last rate until the next answer. Rare answers cost a few
-        # degrees, which the next answer corrects; a gap of 0.4 s costs the whole tilt limit.
+        # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
+        # setpoints causes errors of a few degrees; a gap of 0.4 s exceeds the whole tilt limit.
         Monitor("answer gaps", link_judges.gaps(_GAPS), _HAND_BACK),
         Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
-        # Longer than the averaging window of 1 s: one stall of the computer is no breach.
+        # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.
         Monitor("deadlines", link_judges.deadlines(safety.max_missed), computer, lasts=1.5),
         Monitor("starvation", link_judges.starvation(safety.max_starved), computer, lasts=1.5),
     )

@@ -8,7 +8,7 @@ from companion.config import Config
 from companion.flight.assembly import Assembled, assemble
 from companion.flight.context import cancel
 from companion.flight.environment import Environment
-from companion.flight.observer import Observer
+from companion.flight.observer import EventRecorder, Observer
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.mavlink.framing import Frame
@@ -240,7 +240,7 @@ class ServedControl:
         self._assembled = assembled = assemble(
             self._config,
             self._link,
-            self._observer,
+            EventRecorder(self._observer, self._clock, lambda _: None),
             _decline,
             None,
             TakeoverPlan(source),

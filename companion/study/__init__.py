@@ -1,5 +1,5 @@
-"""The paper's experiments and our own: responses, figures, tables, and one page with all of them.
+"""The paper's experiments and further ones: figures, tables, and one page with all results.
 
 The studies fly the planners of `companion.attitude`, the same code that flies a vehicle. They need
-the extra `study`; `registry` lists them and checks that the extra is installed.
+the extra `study`. `registry` lists the studies and checks that the extra is installed.
 """

@@ -35,10 +35,10 @@ from companion.study.step import Floats, Response, fly, fly_loop
 
 
 def prepare(case_file: Path) -> Job:
-    """Read a case, ready to be flown.
+    """Read a case from a file, and return the job that flies it.
 
     Raises:
-        ConfigError: the file cannot be read, or the case does not make sense.
+        ConfigError: the file cannot be read, or the case is invalid.
     """
     case = yaml_file.load(case_file, Case)
     return Job(partial(_run, case), len(case.methods) * len(case.rates_hz))
@@ -104,7 +104,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
 def _samples(
     case: Case, method: Method, hz: float, response: Response
 ) -> Iterator[tuple[Cell, ...]]:
-    """Rows of one response: coefficients at a sample, and the body rates commanded there."""
+    """Rows of one response: coefficients and commanded body rates of each sample."""
     time = response.step.time
     for k, heading in enumerate(case.headings_deg):
         paths, rates = response.at(k), response.rates[:, :, k]
@@ -128,7 +128,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 
 
 def _reference(case: Case, rate_hz: float) -> Floats:
-    """First order, with the limit of equation 33 if the case says so."""
+    """(samples + 1, 2), the first-order reference; with the limit of equation 33 if configured."""
     model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
 

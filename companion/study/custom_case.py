@@ -13,7 +13,7 @@ Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
 
 MOST_STEPS = 5e6
-"""Steps of the planners or of the physics that need half a gigabyte and some minutes."""
+"""Largest number of steps; so many need half a gigabyte and some minutes."""
 
 
 class CaseLimits(Section):
@@ -26,7 +26,7 @@ class CaseLimits(Section):
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
-    """Which limit the proposed method uses; paper: equation 33, needs max_tilt_deg."""
+    """Form of the rate limit of first-order and exact; paper: equation 33, needs max_tilt_deg."""
 
 
 class Case(Section):
@@ -50,21 +50,21 @@ class Case(Section):
         tuple[Annotated[float, Field(ge=10.0, le=1000.0)], ...],
         Field(min_length=1, max_length=100),
     ] = (250.0,)
-    """Sample rates of the planner; with the inner loop each must divide 1000."""
+    """Sample rates of the planner; with inner_loop each must divide 1000."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=50.0)] = 5.0
     """p of every method and of the first-order reference."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=50.0)] = 2.0
     """Heading gain of first-order and exact; the others use gain_per_s, as in the paper."""
     seconds: Annotated[float, Field(ge=0.1, le=60.0)] = 2.0
-    """Length of the response."""
+    """Duration of the response."""
     limits: CaseLimits = CaseLimits()
     """Limits of the planners."""
     inner_loop: StrictBool = False
-    """Fly with the bundled vehicle's rate loop, rotors and rigid body, not ideal kinematics."""
+    """True: fly with the mock vehicle's rate loop, rotors and rigid body. False: ideal rates."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
-    """Divides every time of the inner loop; 1 responds as measured on a PX4."""
+    """Divisor of all times of the inner loop; 1 responds as measured on a PX4."""
     transport_delay_ms: Annotated[int, Field(ge=0, le=500)] = 0
-    """Transport delay of the setpoints, with the inner loop only."""
+    """Transport delay of the setpoints; needs inner_loop."""
 
     @model_validator(mode="after")
     def _step_makes_sense(self) -> "Case":
@@ -88,18 +88,18 @@ class Case(Section):
             raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
-                raise ValueError(f"{key} names one twice")
+                raise ValueError(f"{key} names a value twice")
         if self.steps_to_fly > MOST_STEPS:
             raise ValueError(
-                f"{self.steps_to_fly:.0f} steps to fly, at most {MOST_STEPS:.0f} fit the memory:"
-                " fewer headings_deg, methods, rates_hz or seconds"
+                f"{self.steps_to_fly:.0f} steps to fly, more than the {MOST_STEPS:.0f} that fit"
+                " into memory; reduce headings_deg, methods, rates_hz or seconds"
             )
         return self
 
     @model_validator(mode="after")
     def _inner_loop_makes_sense(self) -> "Case":
         if self.inner_loop and any((1000.0 / hz) % 1.0 > 1e-9 for hz in self.rates_hz):
-            raise ValueError("with inner_loop every one of rates_hz must divide 1000")
+            raise ValueError("with inner_loop, each of rates_hz must divide 1000")
         for key in ("transport_delay_ms", "quickness"):
             if not self.inner_loop and getattr(self, key) != type(self).model_fields[key].default:
                 raise ValueError(f"{key} needs inner_loop: true")
@@ -107,14 +107,14 @@ class Case(Section):
 
     @property
     def steps_to_fly(self) -> float:
-        """Steps of the planners, or of the physics with the inner loop, of the whole case."""
+        """Number of steps of the whole case: of the planners, or of the physics with inner_loop."""
         flown_s = len(self.headings_deg) * len(self.methods) * self.seconds
         if self.inner_loop:
             return flown_s * len(self.rates_hz) * 1000.0 * self.quickness
         return flown_s * sum(self.rates_hz)
 
     def step(self, rate_hz: float) -> Step:
-        """The step at one of the rates."""
+        """The step, flown at this sample rate."""
         return Step(
             Coefficients(*self.start),
             Coefficients(*self.target),
@@ -125,7 +125,7 @@ class Case(Section):
         )
 
     def planner_limits(self) -> Limits:
-        """The limits in SI."""
+        """The limits in SI units."""
         limits = self.limits
         return Limits(
             _radians(limits.max_tilt_deg),

@@ -1,4 +1,4 @@
-"""Shared by all figures: size, axes, and the lines of a method."""
+"""Drawing functions of all figures: size, axes, and the lines of a method."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,9 +11,9 @@ from companion.study.methods import REFERENCE, Line, Method
 from companion.study.step import Floats
 
 _MOST_POINTS = 400
-"""Of a line. With all points a page would have megabytes."""
+"""Largest number of points of a line; with all points a page would have megabytes."""
 
-STYLE: Any = {  # matplotlib types the keys as a literal of three hundred
+STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 names
     "font.size": 9.0,
     "axes.titlesize": 10.0,
     "axes.grid": True,
@@ -52,13 +52,13 @@ def draw_response(
 
 
 def label_response(north: Axes, east: Axes) -> None:
-    """Titles and units of the two panels of a response."""
+    """Set titles and units of the two panels of a response."""
     north.set(title="Response, north", xlabel="time, s", ylabel="$a_N$")
     east.set(title="Response, east", xlabel="time, s", ylabel="$a_E$")
 
 
 def label_tilt_rate(axes: Axes, title: str) -> None:
-    """Title and units of a panel of tilt rates."""
+    """Set title and units of a panel of tilt rates."""
     axes.set(title=title, xlabel="time, s", ylabel=r"$\sqrt{\omega_x^2+\omega_y^2}$, rad/s")
 
 
@@ -78,3 +78,17 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
     axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
     axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)
     axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")
+
+
+def say_magnified(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
+    """Say below the title of a panel that an axis is magnified beside another one.
+
+    Args:
+        axes: the panel.
+        axis: name of the axis.
+        span: range of values that the axis shows.
+        other: name of the axis that it is compared with.
+        other_span: range of values that the other axis shows.
+    """
+    share = other_span / span
+    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{share:.0f} of {other}")

@@ -1,8 +1,8 @@
-"""A planner flown with the complete inner loop (the paper's figure 5), in the physics of the mock.
+"""Flies a planner with the complete inner loop (the paper's figure 5), in the mock's physics.
 
-The planner commands the mock's multirotor: a PI rate loop with feed-forward and saturation, rotor
-lag, aerodynamic damping, and a rigid body with gyroscopic torque. There are no sensors; the planner
-sees the true attitude, so every deviation from the ideal response comes from the inner loop.
+The planner commands the mock's multirotor: a PI rate loop with feedforward and saturation, rotor
+lag, aerodynamic damping, and a rigid body with gyroscopic torque. There are no sensors: the planner
+gets the true attitude, so every deviation from the ideal response comes from the inner loop.
 """
 
 from collections import deque
@@ -22,7 +22,7 @@ from sitl_mock.physics.multirotor import Multirotor
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
-"""Setpoint step that measures the rate loop, rad/s. In 2 s it tilts the vehicle by 57°."""
+"""Step of the rate setpoint that measures the rate loop, rad/s; in 2 s the tilt reaches 57°."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class InnerLoopFlight:
         q: (n+1, 4), attitude (w, x, y, z), body → world (NED).
         body_rates: (n+1, 3), true rates of the vehicle.
         commanded: (n, 3), rates commanded at each sample, before any delay.
-        tilt_saturated: (n,), whether the rotors could not give the commanded roll and pitch torque
-            at some physics step of the sample.
+        tilt_saturated: (n,), whether the rotors could not produce the commanded roll and pitch
+            torque in a physics step of the sample.
         yaw_saturated: (n,), the same for the yaw torque.
     """
 
@@ -54,8 +54,8 @@ class InnerLoop:
     Attributes:
         airframe: body and rotors; by default those of PX4's simulated quadrotor.
         rate_loop: the body-rate controller; by default tuned to the measured response of PX4.
-        transport_delay: of every setpoint (rates and thrust) on top of the rate loop's own delay,
-            s, to the nearest physics step.
+        transport_delay: delay of every setpoint (rates and thrust) before the rate loop's own
+            delay, s, rounded to a physics step.
 
     Raises:
         ValueError: `transport_delay` is negative or not finite.
@@ -74,27 +74,28 @@ class InnerLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> InnerLoopFlight:
-        """Fly one target from rest; the rates are held from one planner sample to the next.
+        """Fly to one target from rest; the rates are held from one planner sample to the next.
 
-        The thrust holds height at the tilt of each sample (`specific_thrust`, as in flight). It
-        has no effect on the coefficients, but decides at which torque the rotors saturate.
+        The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight). It
+        has no effect on the coefficients, but determines at which torque the rotors saturate.
 
         Args:
-            planner: any of `companion.attitude`; it is not reset.
-            start: attitude at the start, at rest, the rotors turning steadily.
-            target: held for the whole flight.
-            seconds: length of the flight, to the nearest sample.
+            planner: any planner of `companion.attitude`; it is not reset.
+            start: attitude at the start; the vehicle is at rest, and the rotors turn steadily.
+            target: target for the whole flight.
+            seconds: duration of the flight, rounded to a sample.
             rate_hz: samples of the planner per second; must divide the physics rate.
 
         Raises:
             InvalidQuaternionError: `start` is not a unit quaternion.
             InvalidTargetError: `target` is not finite.
-            ValueError: `rate_hz` does not divide the physics rate, or no sample fits `seconds`.
+            ValueError: `rate_hz` does not divide the physics rate, or `seconds` is too short for a
+                sample.
         """
         physics_steps = self._physics_steps(rate_hz)
         samples = round(seconds * rate_hz) if isfinite(seconds) else 0
         if samples < 1:
-            raise ValueError(f"seconds must hold one sample at least, not {seconds}")
+            raise ValueError(f"seconds must be one sample period at least, not {seconds}")
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust(q))
         setpoints = self._setpoint_queue(multirotor.throttle(_thrust(q)))
@@ -124,10 +125,10 @@ class InnerLoop:
     def rate_step_63(self) -> float:
         """Seconds until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint, in hover.
 
-        It includes every delay; compare it with 1/p of a planner.
+        It includes all delays, and can be compared with 1/p of a planner.
 
         Raises:
-            ValueError: the roll rate does not reach it in 2 s.
+            ValueError: the roll rate does not reach 63 % in 2 s.
         """
         flight = self.fly(
             _Constant(ROLL_STEP),
@@ -141,13 +142,13 @@ class InnerLoop:
         after = int(np.argmax(roll >= goal))
         if after == 0:
             raise ValueError(
-                f"the roll rate gets to {roll.max():.3g} of {ROLL_STEP.roll} rad/s only"
+                f"the roll rate reaches only {roll.max():.3g} of {ROLL_STEP.roll} rad/s"
             )
         between = slice(after - 1, after + 1)
         return float(np.interp(goal, roll[between], flight.time[between]))
 
     def _physics_steps(self, rate_hz: float) -> int:
-        """Physics steps of one sample."""
+        """Number of physics steps in one sample."""
         physics_hz = self.airframe.physics_rate_hz
         steps = round(physics_hz / rate_hz) if rate_hz > 0.0 else 0
         if not isclose(steps * rate_hz, physics_hz):
@@ -158,7 +159,7 @@ class InnerLoop:
         return steps
 
     def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
-        """Setpoints within the transport delay, newest last; at the start zero rates."""
+        """Queue of the delayed setpoints, newest last; at the start they are zero rates."""
         length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
 
@@ -166,8 +167,8 @@ class InnerLoop:
 def quickened(factor: int) -> InnerLoop:
     """The default inner loop with all of its times divided by `factor`.
 
-    Inertia and rotor lag shrink, the torques stay: the response is the same in scaled time. The
-    physics run `factor` times as often.
+    Inertia and rotor lag are smaller and the torques the same, so the response is the same in
+    scaled time. The physics run `factor` times as often.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
     shrunk = {
@@ -202,10 +203,10 @@ class _Constant:
         return self._rates
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Not used."""
+        """Do nothing."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Nothing to forget."""
+        """Do nothing."""
 
 
 def _thrust(q: Quaternion) -> float:

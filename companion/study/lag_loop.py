@@ -1,4 +1,4 @@
-"""A rate loop as dead time and first-order lag, the same on every axis."""
+"""A rate loop of dead time and first-order lag, the same on every axis."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from companion.attitude.rotation import turned
 Floats = NDArray[np.float64]
 
 STEP_HZ = 1000
-"""Steps a second of the plant; dead times and samples are whole numbers of them."""
+"""Simulation steps per second; dead times and sample periods are whole numbers of steps."""
 
 
 class LagFlight(NamedTuple):
-    """q (samples + 1, 4) and the commanded body rates (samples, 3), rad/s."""
+    """A flight: attitudes q (samples + 1, 4), and commanded body rates (samples, 3), rad/s."""
 
     q: Floats
     commanded: Floats
@@ -29,8 +29,8 @@ class LagBody:
 
     Args:
         q: attitude at the start, at rest.
-        lag_ms: τ.
-        dead_time_ms: θ.
+        lag_ms: τ, ms.
+        dead_time_ms: θ, ms.
 
     Attributes:
         q: attitude, body → world.
@@ -45,7 +45,7 @@ class LagBody:
         self._delayed = deque([self.rates] * (dead_time_ms + 1))
 
     def turn(self, commanded: BodyRates, steps: int) -> None:
-        """Hold a command for this number of steps."""
+        """Simulate this number of steps with the body rates `commanded` (rad/s)."""
         kept, mean, (roll, pitch, yaw) = self._kept, self._mean, self.rates
         for _ in range(steps):
             self._delayed.append(commanded)
@@ -60,11 +60,11 @@ class LagBody:
 
 @dataclass(frozen=True)
 class LagLoop:
-    """A planner in front of a `LagBody`.
+    """The inner loop of a planner that commands a `LagBody`.
 
     Attributes:
-        lag_ms: τ.
-        dead_time_ms: θ.
+        lag_ms: τ, ms.
+        dead_time_ms: θ, ms.
     """
 
     lag_ms: int
@@ -73,10 +73,10 @@ class LagLoop:
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> LagFlight:
-        """Fly one target from rest; the rates are held from one planner sample to the next.
+        """Fly to one target from rest; the rates are held from one planner sample to the next.
 
         Raises:
-            ValueError: a sample is not a whole number of steps.
+            ValueError: the sample period is not a whole number of steps.
         """
         steps = round(STEP_HZ / rate_hz)
         if steps * rate_hz != STEP_HZ:

@@ -1,4 +1,4 @@
-"""How good a response is: the numbers in the tables, and the second-order model fitted to it."""
+"""Measures of a response for the tables, and the second-order model fitted to it."""
 
 from math import exp, log
 from typing import NamedTuple
@@ -45,7 +45,7 @@ def cross_track(response: Response) -> Floats:
 
 
 def time_to(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) s until no more than `share` of the step is left for good; inf if never."""
+    """(headings,) time after which no more than `share` of the step is ever left, s, or inf."""
     start, target = np.array(response.step.start), np.array(response.step.target)
     left = response.coefficients - target[:, None]
     beyond = np.hypot(left[:, 0], left[:, 1]) > share * np.hypot(*(target - start))
@@ -61,15 +61,15 @@ def largest_tilt_rate(response: Response) -> float:
 
 
 def heading_effect(response: Response) -> float:
-    """Largest difference between the paths at any two headings; 0 if heading has no effect."""
+    """Largest difference of a coefficient between two headings; 0 if heading has no effect."""
     c = response.coefficients
     return float((c.max(axis=2) - c.min(axis=2)).max())
 
 
 def best_and_worst(values: Floats) -> tuple[int, int]:
-    """Indices of the least and the largest of (headings,) values.
+    """Indices of the smallest and the largest of (headings,) values; of equal ones the first.
 
-    Opposite headings differ by rounding alone, so of equal values the first counts.
+    Values at opposite headings differ by rounding only, so they are rounded first.
     """
     ranked = np.round(values, 9)
     return int(ranked.argmin()), int(ranked.argmax())
@@ -80,7 +80,7 @@ class SecondOrderFit(NamedTuple):
 
     Attributes:
         model: frequency ω and damping ζ.
-        dead_time: the model begins to move this long after the step, s.
+        dead_time: time from the step until the model begins to move, s.
     """
 
     model: SecondOrderReference
@@ -88,7 +88,7 @@ class SecondOrderFit(NamedTuple):
 
     @property
     def cells(self) -> tuple[float, float, float]:
-        """The cells of a table under `FIT_COLUMNS`."""
+        """The table cells for `FIT_COLUMNS`."""
         return 1e3 * self.dead_time, self.model.frequency, self.model.damping
 
 
@@ -99,10 +99,10 @@ def second_order_path(step: Step, fit: SecondOrderFit, time: Floats) -> Floats:
 
 
 def fit_second_order(step: Step, path: Floats) -> SecondOrderFit:
-    """Least squares over frequency, damping and dead time.
+    """Fit frequency, damping and dead time to a response (least squares).
 
     Args:
-        step: what was flown.
+        step: the step that was flown.
         path: (samples + 1, 2) coefficients.
     """
     time, measured = step.time[::_THINNING], path[::_THINNING]

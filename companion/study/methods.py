@@ -6,14 +6,14 @@ from companion.attitude import Limits, make_planner
 from companion.attitude.planner import LawPlanner
 
 Line = dict[str, Any]
-"""Keywords of a line in matplotlib."""
+"""Keyword arguments of a line in matplotlib."""
 
 
 class Method(NamedTuple):
     """A planner with its label and line style.
 
-    The colours are Okabe and Ito's, made for colour-blind readers. Dashes tell the methods apart in
-    black and white; widths keep a curve visible below a narrower one.
+    The colours are those of Okabe and Ito, for colour-blind readers. Dashes distinguish the methods
+    in black and white. A wider curve stays visible below a narrower one.
     """
 
     planner: str
@@ -24,7 +24,7 @@ class Method(NamedTuple):
 
     @property
     def line(self) -> Line:
-        """Keywords for a line of this method."""
+        """Keyword arguments for a line of this method."""
         style = (0, self.dashes) if self.dashes else "-"
         return {"color": self.colour, "linestyle": style, "linewidth": self.width}
 
@@ -43,9 +43,9 @@ FOLLOWING = Method("model-following", "model-following", "#332288", width=2.2)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPERS = (QUATERNION, SO3, EULER, PROPOSED)
-"""The methods of the paper's comparison, in drawing order: broad lines first."""
+"""The methods of the paper's comparison, in drawing order: wide lines first."""
 BY_PLANNER = {method.planner: method for method in (*PAPERS, EXACT)}
-"""The method of every planner, in the same order."""
+"""The method of every planner without memory, in drawing order."""
 
 
 def planner_of(

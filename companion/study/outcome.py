@@ -1,4 +1,4 @@
-"""What a study returns: its figure, its tables, and its findings on the paper's claims."""
+"""The results of a study: figure, tables, and findings on the paper's claims."""
 
 import csv
 import io
@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from tabulate import tabulate
 
 Tick = Callable[[str], None]
-"""A study calls this before each of its parts, with the name of that part."""
+"""Progress callback: a study calls it before each of its parts, with the name of the part."""
 
 Cell = str | float | int
 
 Source = Literal["paper", "ours"]
-"""Of a finding: a claim of the paper, or our own statement about one of its claims."""
+"""Source of a statement: "paper" is a claim of the paper, "ours" a statement of this project."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class Table:
     """A table of results, written as CSV and Markdown and shown on the page.
 
     Attributes:
-        name: of its files, without the ending.
+        name: name of its files, without the ending.
         caption: one sentence.
-        columns: titles, with units.
-        rows: one cell for each column. CSV holds numbers in full; elsewhere they are rounded.
+        columns: titles with units.
+        rows: one cell for each column.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
     def as_csv(self) -> str:
-        """Comma-separated, numbers in full."""
+        """The table as comma-separated values, with all digits of numbers."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.columns)
@@ -44,11 +44,11 @@ class Table:
         return text.getvalue()
 
     def as_markdown(self) -> str:
-        """A pipe table, numbers to three digits."""
+        """Caption and table in Markdown, with numbers rounded to three digits."""
         return f"{self.caption}\n\n{self._formatted('pipe')}\n"
 
     def as_html(self) -> str:
-        """A table element, escaped, numbers to three digits."""
+        """The table as an escaped HTML element, with numbers rounded to three digits."""
         return self._formatted("html")
 
     def _formatted(self, table_format: str) -> str:
@@ -75,10 +75,10 @@ class Finding:
     """A statement, and whether the computed numbers support it.
 
     Attributes:
-        source: where the statement is from.
+        source: source of the statement.
         statement: one sentence that can be true or false.
         holds: whether the numbers support it.
-        evidence: the numbers, and the bound they were compared with.
+        evidence: the numbers, and the bound with which they were compared.
     """
 
     source: Source
@@ -92,15 +92,15 @@ class Outcome:
     """The results of one study.
 
     Attributes:
-        name: of its files.
-        title: headline on the page.
-        conditions: what was flown, in a sentence or two.
-        figure: written as SVG and PNG.
-        caption: what the figure shows.
-        tables: the numbers, on the page and in files.
-        findings: computed from the numbers of this run.
+        name: name of its files.
+        title: title on the page.
+        conditions: the flights, in one or a few sentences.
+        figure: the figure, written as SVG and PNG.
+        caption: description of the figure.
+        tables: tables on the page and in files.
+        findings: findings computed from the numbers of this run.
         series: further tables, written as CSV only.
-        rows: what `--json` prints, if the study prints JSON.
+        rows: rows that `--json` prints, if the study supports it.
     """
 
     name: str
@@ -118,8 +118,8 @@ class Job(NamedTuple):
     """A study that is ready to run.
 
     Attributes:
-        run: runs it; calls the tick before each part.
-        parts: how many times it calls the tick.
+        run: runs the study; calls the tick before each part.
+        parts: number of parts, and so of calls of the tick.
     """
 
     run: Callable[[Tick], Outcome]

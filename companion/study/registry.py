@@ -9,23 +9,24 @@ from typing import NamedTuple
 from companion.extras import require
 
 ALL = "all"
-"""On the command line: every study with `in_all`."""
+"""Name on the command line for all studies with `in_all`."""
 
 _PACKAGES = {"study": ("jinja2", "matplotlib", "tabulate"), "nmpc": ("casadi",)}
-"""What each extra must have installed. numba is left out: it only makes large batches quick."""
+"""Packages that each extra must have installed; numba only speeds up large batches."""
 
 
 class Study(NamedTuple):
     """One study.
 
     Attributes:
-        name: as typed on the command line; the names of its files begin with it.
+        name: name on the command line; the names of its files begin with it.
         summary: one line for `companion study --help`.
-        module: imported when the study runs. It has `run(tick) -> Outcome` and `PARTS`, the number
-            of times `run` calls its tick. With `takes_case` it has `prepare(case) -> Job` instead.
-        extra: the extra it needs beside `study`; empty for none.
-        in_all: whether `all` includes it. These studies take seconds, and their files are the same
-            on every machine.
+        module: module that is imported when the study runs. It has `run(tick) -> Outcome` and
+            `PARTS`, the number of times that `run` calls its tick. With `takes_case` it has
+            `prepare(case) -> Job` instead.
+        extra: extra that it needs besides `study`; empty: none.
+        in_all: whether `all` includes it. Such a study takes seconds, and its files are the same on
+            every computer.
         takes_case: whether it reads a case from `--case FILE`.
         prints_json: whether its outcome has rows for `--json`.
     """
@@ -79,19 +80,19 @@ STUDIES = {study.name: study for study in _ENTRIES}
 
 
 def chosen(name: str) -> tuple[Study, ...]:
-    """The studies that a name on the command line stands for."""
+    """The studies that a name on the command line selects."""
     if name == ALL:
         return tuple(study for study in STUDIES.values() if study.in_all)
     return (STUDIES[name],)
 
 
 def choices() -> tuple[str, ...]:
-    """Every name that the command line accepts."""
+    """All names that the command line accepts."""
     return (*STUDIES, ALL)
 
 
 def help_table() -> str:
-    """One line for each name that the command line accepts."""
+    """Help text with one line for each name that the command line accepts."""
     everything = ", ".join(study.name for study in chosen(ALL))
     lines = [(study.name, study.summary) for study in STUDIES.values()]
     return "\n".join(f"  {name:<8}{text}" for name, text in [*lines, (ALL, everything)])

@@ -1,4 +1,4 @@
-"""Writes the files of a study, and one page that opens offline in any browser."""
+"""Writes the files of a study, and an HTML page with all figures embedded."""
 
 import base64
 import io
@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from companion.study.outcome import Outcome
 
+_DPI = 130
+
 
 def write_outcome(outcome: Outcome, folder: Path) -> None:
     """Write the figure (SVG and PNG) and the tables (CSV and Markdown; series as CSV only).
@@ -18,6 +20,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
     Raises:
         OSError: a file cannot be written.
     """
+    _lay_out(outcome.figure)
     for ending in ("svg", "png"):
         _write(folder / f"{outcome.name}.{ending}", _image(outcome.figure, ending))
     for table in (*outcome.tables, *outcome.series):
@@ -30,7 +33,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
     """Write the page; the figures of `write_outcome` must be in its folder.
 
     Raises:
-        OSError: it cannot be written, or a figure is missing.
+        OSError: the page cannot be written, or a figure is missing.
     """
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("companion.study", "."),
@@ -52,11 +55,18 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
     _write(path, page.encode())
 
 
+def _lay_out(figure: Figure) -> None:
+    """Lay out the figure once; otherwise each `savefig` lays it out twice."""
+    figure.set_dpi(_DPI)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+
+
 def _image(figure: Figure, ending: str) -> bytes:
     """The content of a figure's file; the same figure gives the same bytes."""
     buffer = io.BytesIO()
     metadata = {"Date": None} if ending == "svg" else {"Software": None}
-    figure.savefig(buffer, format=ending, dpi=130, metadata=metadata)
+    figure.savefig(buffer, format=ending, dpi=_DPI, metadata=metadata)
     return buffer.getvalue()
 
 

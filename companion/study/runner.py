@@ -30,7 +30,7 @@ class Written(NamedTuple):
 
     Attributes:
         page: path of the page that shows all studies of the run.
-        rows: of all studies, for `--json`.
+        rows: rows of all studies, for `--json`.
     """
 
     page: Path
@@ -40,10 +40,16 @@ class Written(NamedTuple):
 def run(name: str, case_file: Path | None, out: Path, console: Console) -> Written:
     """Run one study of the registry, or `all`.
 
+    Args:
+        name: name of the study on the command line.
+        case_file: file of `--case`, or None.
+        out: folder for the results.
+        console: console for the progress bar.
+
     Raises:
         ConfigError: `out` or the case cannot be used, a case is missing, or the study takes none.
         OSError: a result cannot be written.
-        VehicleStoppedError: the bundled vehicle ended before its flight did.
+        VehicleStoppedError: the mock vehicle ended before its flight did.
     """
     jobs = {study.name: _job(study, case_file) for study in registry.chosen(name)}
     page = _prepared(out, "study" if name == registry.ALL else name)
@@ -80,7 +86,11 @@ def _job(study: Study, case_file: Path | None) -> Job:
 
 
 def _prepared(out: Path, name: str) -> Path:
-    """Make the folder, and check before the work starts that files can be written there."""
+    """Make the folder, and check that files can be written there; return the path of the page.
+
+    Raises:
+        ConfigError: nothing can be written there.
+    """
     page = out / f"{name}.html"
     try:
         out.mkdir(parents=True, exist_ok=True)

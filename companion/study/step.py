@@ -15,7 +15,7 @@ from companion.attitude.reference import FirstOrderReference
 Floats = NDArray[np.float64]
 
 ALL_HEADINGS = tuple(k * pi / 36.0 for k in range(-35, 37))
-"""Every π/36, as in the paper's figure 3; rad."""
+"""The headings of the paper's figure 3, every π/36; rad."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class Step:
         start, target: acceleration coefficients.
         gain: p of the planners and of the first-order reference, 1/s.
         rate_hz: sample rate of the planner.
-        seconds: length of the response.
-        headings: tilt-yaw headings, rad; each is held during the step.
+        seconds: duration of the response, s.
+        headings: tilt-yaw headings, rad; each flight holds one of them.
     """
 
     start: Coefficients
@@ -44,11 +44,11 @@ class Step:
 
     @property
     def time(self) -> Floats:
-        """(samples + 1,) s after the step."""
+        """(samples + 1,) time after the step, s."""
         return np.arange(self.samples + 1) / self.rate_hz
 
     def reference(self, model: FirstOrderReference | None = None) -> Floats:
-        """(samples + 1, 2) coefficients of the first-order reference; `gain` alone by default."""
+        """(samples + 1, 2) coefficients of `model`; by default it has `gain` and no limit."""
         model = model or FirstOrderReference(self.gain)
         return np.array([model.after(self.start, self.target, float(t)) for t in self.time])
 
@@ -84,16 +84,16 @@ class Response:
 
 
 class Flown(Protocol):
-    """A flight: q (samples + 1, 4), commanded body rates (samples, 3) in rad/s."""
+    """A flight at one heading."""
 
     @property
     def q(self) -> Floats:
-        """Attitudes w, x, y, z."""
+        """(samples + 1, 4) attitudes (w, x, y, z)."""
         ...
 
     @property
     def commanded(self) -> Floats:
-        """Body rates, rad/s."""
+        """(samples, 3) commanded body rates, rad/s."""
         ...
 
 
@@ -103,12 +103,12 @@ class Loop(Protocol):
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
     ) -> Flown:
-        """Fly one target from rest."""
+        """Fly to one target from rest; see `InnerLoop.fly`."""
         ...
 
 
 def fly(planner: LawPlanner, step: Step) -> Response:
-    """Fly a step with body rates that follow at once (the assumption of section 4)."""
+    """Fly a step with an ideal rate loop: body rates equal their commands (paper, section 4)."""
     starts = [attitude(step.start, heading) for heading in step.headings]
     targets = [(*step.target, heading, 0.0) for heading in step.headings]
     history = batch.simulate(
@@ -118,7 +118,7 @@ def fly(planner: LawPlanner, step: Step) -> Response:
 
 
 def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
-    """Fly a step with an inner loop between the body rates and the attitude."""
+    """Fly a step with an inner loop between commanded body rates and attitude."""
     flights = []
     for heading in step.headings:
         start = attitude(step.start, heading)

@@ -13,34 +13,41 @@ Nothing sleeps, no socket is opened, and equal inputs give equal flights to the 
         assert summary.tracking()["position_max_m"] < 1.0
         assert not vehicle.state()["crashed"]
 
-`MockVehicle` tells the true state and what setpoints it received, takes faults, and gives the
-pilot's sticks and another station's commands. `fly` takes a configuration and flies it; `run` runs
-any coroutine on the vehicle's clock, with links opened by `open_wire`. A program of your own flies
-inside `run` by `connect`, which gives it the same `Vehicle` as `companion.connect`.
+Each name below has its own page: `help(companion.testing.MockVehicle)`.
 
-`check_planner` and `check_guidance` tell whether a planner or guidance of your own may fly. In
-pytest the fixture `mock_vehicle` makes vehicles.
+Flights
+    MockVehicle         the vehicle: its true state, faults, the pilot, what it received
+    fly                 flies a configuration, as `companion fly` does; returns its summary
+    connect             the same `Vehicle` as `companion.connect`, inside `run`
+    run                 runs a coroutine on the vehicle's clock
+    session             a flight that can be interrupted, to be flown inside `run`
+    ReceivedSetpoint    a setpoint that reached the autopilot: `MockVehicle.setpoints`
+    Truth               the true state: `MockVehicle.state()`
+
+Judges of your own planner and guidance
+    check_planner       whether a planner may fly
+    check_guidance      whether guidance may fly
+
+Below them
+    VirtualEventLoop    the event loop whose time is the vehicle's
+    open_wire           opens a link inside `run`: `Link(settings, opener=open_wire)`
+    environment         what a flight inside `run` gets from the computer
+    UnseenError         a part of the program failed, and nothing took its error
+
+In pytest the fixture `mock_vehicle` makes vehicles.
 """
 
-from companion.testing.conformance import check_guidance, check_planner
-from companion.testing.flying import UnseenError, connect, environment, fly, run, session
-from companion.testing.vehicle import MockVehicle, ReceivedSetpoint
-from companion.testing.virtual_loop import VirtualEventLoop
-from companion.testing.wire import open_wire
-from sitl_mock.control_channel import Truth
-
-__all__ = [
-    "MockVehicle",
-    "ReceivedSetpoint",
-    "Truth",
-    "UnseenError",
-    "VirtualEventLoop",
-    "check_guidance",
-    "check_planner",
-    "connect",
-    "environment",
-    "fly",
-    "open_wire",
-    "run",
-    "session",
-]
+# Without `__all__`: see `companion.attitude`.
+from companion.testing.conformance import check_guidance as check_guidance
+from companion.testing.conformance import check_planner as check_planner
+from companion.testing.flying import UnseenError as UnseenError
+from companion.testing.flying import connect as connect
+from companion.testing.flying import environment as environment
+from companion.testing.flying import fly as fly
+from companion.testing.flying import run as run
+from companion.testing.flying import session as session
+from companion.testing.vehicle import MockVehicle as MockVehicle
+from companion.testing.vehicle import ReceivedSetpoint as ReceivedSetpoint
+from companion.testing.virtual_loop import VirtualEventLoop as VirtualEventLoop
+from companion.testing.wire import open_wire as open_wire
+from sitl_mock.control_channel import Truth as Truth

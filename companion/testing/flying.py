@@ -1,8 +1,9 @@
 """Flies a configuration against a mock vehicle in memory."""
 
 import asyncio
-from collections.abc import AsyncGenerator, Coroutine, Mapping
-from contextlib import asynccontextmanager
+import gc
+from collections.abc import AsyncGenerator, Coroutine, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -45,12 +46,24 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
         clock = VirtualClock(vehicle.time)
         return VirtualEventLoop(clock, wire_to(vehicle, clock))
 
-    with asyncio.Runner(loop_factory=make_loop) as runner:
+    with _without_collections(), asyncio.Runner(loop_factory=make_loop) as runner:
         runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
         result = runner.run(main)
     if unseen:
         raise UnseenError(unseen[0]["message"]) from unseen[0].get("exception")
     return result
+
+
+@contextmanager
+def _without_collections() -> Iterator[None]:
+    """Leave reference cycles until the end: to look for them costs 7 % of a flight's time."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def _loop_time_ns() -> int:

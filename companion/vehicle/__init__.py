@@ -1,1 +1,1 @@
-"""An autopilot as we see it: its link, its state, its clock, and its kind."""
+"""One vehicle, seen over MAVLink: its link, state, clock, and kind of autopilot."""

@@ -1,6 +1,6 @@
-"""What differs between autopilots, declared as data and commands behind one Protocol.
+"""The interface of an autopilot: what differs between autopilots, as data and commands.
 
-A further autopilot is a folder beside `px4` and `ardupilot`, and one line in `registry.py`.
+To add an autopilot, add a folder beside `px4` and `ardupilot`, and one line in `registry.py`.
 """
 
 from collections.abc import Mapping
@@ -20,10 +20,10 @@ class Role(Enum):
 
     TAKEOFF = "take-off"
     READY = "ready"
-    """The vehicle may be taken over from here."""
+    """Offboard control may begin in this mode."""
     HOLD = "hold"
     OFFBOARD = "offboard"
-    """The autopilot obeys our body rates."""
+    """The autopilot obeys the body rates that are sent."""
     LAND = "land"
 
 
@@ -44,19 +44,19 @@ class Readiness(NamedTuple):
 
 
 class ControlEntry(Enum):
-    """How an autopilot comes to obey our setpoints."""
+    """How an autopilot begins to obey setpoints."""
 
     BY_COMMAND = "a mode command, once setpoints have streamed for a second"
     BY_FIRST_SETPOINT = "the first setpoint; so none may be sent before the takeover"
 
 
 class OffboardLossFailsafe(NamedTuple):
-    """What the autopilot does when our setpoints stop.
+    """What the autopilot does when setpoints stop.
 
     Attributes:
         parameter: Name of the parameter that sets how long it holds the last rates, s.
         then: What it does after that, in words.
-        brakes: Whether it then stops the vehicle.
+        brakes: Whether it then brakes the vehicle to a stop.
     """
 
     parameter: str
@@ -76,32 +76,33 @@ FLIGHT_RATES: Mapping[str, float] = MappingProxyType(
         "GLOBAL_POSITION_INT": 5.0,
     }
 )
-"""Messages that a flight needs from any autopilot, with the rate to request, Hz."""
+"""Messages that a flight needs from every autopilot, with the rate to request, Hz."""
 
 
 class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
-    Every autopilot takes thrust as 0..1 of the collective; `parameters` checks that, and whether it
-    divides by cos(tilt) itself. Every autopilot holds the last rates for a while when setpoints
-    stop, and obeys a later setpoint unless a mode was commanded in between.
+    Every autopilot takes thrust as 0..1 of the collective. It either divides thrust by cos(tilt)
+    itself or not; rules in `parameters` check both. When setpoints stop it holds the last rates for
+    a while, and then obeys a later setpoint unless a mode was commanded in between.
 
     Attributes:
-        name: For people, such as `PX4`.
+        name: Name to show to users, such as `PX4`.
         mav_autopilot: MAV_AUTOPILOT number.
         modes: `custom_mode` of each mode that may be commanded, by name.
-        ready_mode: Name of the mode in which a pilot who armed hands the vehicle over to us.
-        offboard_mode: Name of the mode in which it obeys our setpoints.
-        control_entry: How it comes to obey them.
-        bytewise_parameters: Whether integer parameters travel as bytes.
-        wanted_rates: Messages the flight needs, with the rate to request, Hz.
-        interval_step_us: SET_MESSAGE_INTERVAL is rounded down to whole multiples of this.
-        rates_along_target: Whether it takes body rates along the axes of ATTITUDE_TARGET, an
-            attitude that turns before the body follows. Otherwise along the body's own axes.
+        ready_mode: Name of the mode from which a pilot who has armed hands control over.
+        offboard_mode: Name of the mode in which the autopilot obeys setpoints.
+        control_entry: How the autopilot begins to obey setpoints.
+        bytewise_parameters: Whether integer parameters are sent as bytes; see
+            `companion.mavlink.parameters`.
+        wanted_rates: Messages that a flight needs, with the rate to request, Hz.
+        interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
+        rates_along_target: True: body rates are taken along the axes of ATTITUDE_TARGET, which
+            turns before the body follows. False: along the axes of the body.
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
-        offboard_loss_failsafe: What it does when setpoints stop.
-        cannot_arm_in: Roles of the modes in which it cannot be armed once it stands disarmed.
+        offboard_loss_failsafe: What the autopilot does when setpoints stop.
+        cannot_arm_in: Roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: Rules for the parameters that matter to a flight by body rates.
     """
 
@@ -121,33 +122,33 @@ class Autopilot(Protocol):
     parameters: tuple[ParameterRule, ...]
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of the mode in a heartbeat; for an unknown mode its number."""
+        """Name of the mode in a heartbeat; an unknown mode is named by its number."""
 
     def roles(self, mode: str) -> frozenset[Role]:
         """Roles of the mode of that name (see `mode_name`); empty: the mode has none."""
 
     def set_mode(self, name: str) -> Command:
-        """Command that enters a mode of `modes`. Raises `KeyError` for any other."""
+        """Command that enters a mode of `modes`. Raises `KeyError` for any other mode."""
 
     def not_ready(self, readiness: Readiness) -> str | None:
-        """What is still missing before it can be armed and flown, or `None`."""
+        """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
 
     def arm(self) -> tuple[Command, ...]:
-        """Commands that prepare our take-off and arm it with all checks, in order."""
+        """Commands that enter the mode for take-off and arm with all checks, in order."""
 
     def disarm(self) -> Command:
         """Command that disarms on the ground."""
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
-        """Command that takes off from where it stands armed.
+        """Command by which the armed vehicle takes off from the ground.
 
         Args:
-            height_m: To reach, above home.
-            home_altitude_m: Of home, above mean sea level.
+            height_m: Height to reach, above home, m.
+            home_altitude_m: Altitude of home above mean sea level, m.
         """
 
     def hold(self) -> Command:
-        """Command by which it holds position by itself, without a pilot's sticks."""
+        """Command by which the autopilot holds position without a pilot."""
 
     def land(self) -> Command:
-        """Command by which it lands at the present place."""
+        """Command by which the vehicle lands at its present place."""

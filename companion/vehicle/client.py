@@ -22,18 +22,18 @@ from companion.vehicle.streams import StreamRate, measure, set_rates
 class VehicleClient:
     """The part of a link that sends requests and subscribes to messages.
 
-    Attributes:
-        settings: Where the vehicle is and who we are.
-        stats: Counters.
-        state: What is known of the vehicle.
-
     Args:
-        settings: As above.
+        settings: The endpoint, and the ids of the vehicle and of this program.
         outbox: Sends the requests.
-        router: Brings the messages received.
-        stats: As above.
-        clock: Event-loop time, s.
-        vehicle_clock: Tells how old a position is.
+        router: Delivers the messages received.
+        stats: Counters of the link.
+        clock: Returns the event-loop time, s.
+        vehicle_clock: Computes how old a position is.
+
+    Attributes:
+        settings: The argument `settings`.
+        stats: The argument `stats`.
+        state: The vehicle's telemetry.
     """
 
     def __init__(
@@ -58,13 +58,13 @@ class VehicleClient:
 
     @property
     def autopilot(self) -> Autopilot:
-        """How to speak to this autopilot. Raises `NotConnected` before its first heartbeat."""
+        """The vehicle's autopilot. Raises `NotConnected` before its first heartbeat."""
         if self.state.autopilot is None:
             raise NotConnected("no heartbeat yet; wait_connected() comes first")
         return self.state.autopilot
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each message of that name; call the result to end it.
+        """Call `callback` with each message of that name; call the result to unsubscribe.
 
         Raises:
             UnknownMessage: The dialect has no such message.
@@ -72,7 +72,7 @@ class VehicleClient:
         return self._router.subscribe(name, callback)
 
     def send(self, message: Message) -> bool:
-        """Send any pymavlink message now; false if it could not leave."""
+        """Send a pymavlink message now; return False if it could not be sent."""
         return self._outbox.message(message)
 
     async def command(
@@ -85,20 +85,21 @@ class VehicleClient:
         """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
 
         Raises:
-            CommandRefused: With the result and the autopilot's own words.
-            CommandTimeout: No answer after `retries` repetitions.
-            LinkLost: The connection dropped meanwhile.
+            CommandRefused: The autopilot refused; the error has its result and its texts.
+            CommandTimeout: No answer came after `retries` repetitions.
+            LinkLost: The connection dropped while waiting.
         """
         await self._commands.send(command, params, timeout_s, retries)
 
     async def request_message(self, name: str, *, timeout_s: float = 1.0) -> Message:
-        """Ask once for a message and return it.
+        """Request one message and return it.
 
         Raises:
             UnknownMessage: The dialect has no such message.
-            CommandRefused: The autopilot does not give it.
-            LinkTimeout: It was promised but did not come.
-            LinkLost: The connection dropped meanwhile.
+            CommandRefused: The autopilot refused the request.
+            CommandTimeout: The autopilot did not answer the request.
+            LinkTimeout: The autopilot accepted the request, but the message did not come.
+            LinkLost: The connection dropped while waiting.
         """
         with Pending[Message](self._registry) as answers:
             unsubscribe = self._router.subscribe(name, answers.put)
@@ -106,7 +107,10 @@ class VehicleClient:
                 await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
                 return await answers.next(timeout_s)
             except TimeoutError:
-                raise LinkTimeout(f"{name} was promised but did not come") from None
+                raise LinkTimeout(
+                    f"{name} did not come within {timeout_s:g} s, although the autopilot accepted "
+                    "the request"
+                ) from None
             finally:
                 unsubscribe()
 
@@ -116,37 +120,37 @@ class VehicleClient:
         """Read a parameter of the autopilot.
 
         Raises:
-            NotConnected: No heartbeat yet, so its parameter encoding is unknown.
-            UnansweredParameter: It never answered; some do not answer for unknown names.
-            UnknownParameter: It says that it has none of that name.
-            ParameterRefused: It has it, and refuses to send it.
-            LinkLost: The connection dropped meanwhile.
+            NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
+            UnansweredParameter: No answer came; some autopilots do not answer for unknown names.
+            UnknownParameter: The autopilot answered that it has no such parameter.
+            ParameterRefused: The autopilot answered with another error.
+            LinkLost: The connection dropped while waiting.
         """
         return await self._parameters.read(name, timeout_s, retries)
 
     async def write_parameter(
         self, name: str, value: float, *, timeout_s: float = 1.0, retries: int = 3
     ) -> float | int:
-        """Write a parameter, in its own type, and return what the autopilot then holds.
+        """Write a parameter in its own type, and return the value that it then has.
 
         Raises:
-            NotConnected: No heartbeat yet, so its parameter encoding is unknown.
-            UnknownParameter: It has none of that name.
-            ParameterRefused: It cannot hold that value, or keeps another.
-            LinkLost: The connection dropped meanwhile.
+            NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
+            UnknownParameter: The autopilot has no such parameter, or did not answer.
+            ParameterRefused: The value does not fit the type, or the autopilot keeps another value.
+            LinkLost: The connection dropped while waiting.
         """
         return await self._parameters.write(name, value, timeout_s, retries)
 
     async def set_rates(
         self, rates: Mapping[str, float], *, window_s: float = 1.0
     ) -> dict[str, StreamRate]:
-        """Ask for message rates in Hz (0 stops one) and count what comes for `window_s`.
+        """Request message rates in Hz (0 stops a message), then count arrivals for `window_s`.
 
         Raises:
-            NotConnected: The autopilot was not heard yet.
-            UnknownMessage: A name is not in the dialect; nothing was sent then.
+            NotConnected: No heartbeat has come yet.
+            UnknownMessage: A name is not in the dialect; nothing was sent.
             CommandTimeout: The autopilot did not answer a request.
-            LinkLost: The connection dropped meanwhile.
+            LinkLost: The connection dropped while waiting.
         """
         step_us = self.autopilot.interval_step_us
         return await set_rates(self._commands, self.stats, rates, window_s, step_us)

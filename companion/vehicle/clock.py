@@ -1,7 +1,8 @@
-"""The vehicle's clock as we know it: how old a sample is, and how the clock itself changed.
+"""The vehicle's clock, compared with the event loop's: ages of samples, and jumps of the clock.
 
-Each attitude sample tells the offset between the vehicle's clock and ours, less the time that the
-sample was under way: the quickest sample is the least late. TIMESYNC tells how late that one is.
+Each attitude sample gives the offset, vehicle time minus event-loop time, less the delay of the
+sample. The largest offset belongs to the sample with the smallest delay, the "quickest" sample.
+TIMESYNC measures how late the quickest sample is.
 """
 
 from collections.abc import Callable
@@ -16,38 +17,39 @@ from companion.vehicle.clock_jumps import (
     MisfitRun,
     Reading,
     Stamp,
-    described,
-    wrapped,
+    describe_change,
+    has_wrapped,
 )
 
 _SETTLES_FOR = 2.0
-"""What was queued before we listened may come late and make the first offset wrong, for this, s."""
+"""Time after the first sample in which queued samples may make the offset wrong, s."""
 _CERTAINLY_BACK = 0.5
-"""TIMESYNC lags the samples' stamps a little; behind the newest by this, s, time has gone back, and
-has not only stood still."""
+"""A TIMESYNC time behind the newest stamp by more than this, s, means that the clock went back. If
+it is behind by less, the clock stood still, as TIMESYNC lags the stamps a little."""
 _TIMESYNC_LAG = 0.012
-"""TIMESYNC lags the samples' stamps by up to this, s, in the simulators (measured)."""
+"""Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _UNKNOWN_AFTER = 3.0
-"""An autopilot that answers TIMESYNC does so within this time, s."""
+"""Time within which an autopilot that supports TIMESYNC answers it, s."""
 
 
 class VehicleClock:
-    """One vehicle's clock, fed by every attitude sample and TIMESYNC exchange.
+    """One vehicle's clock, estimated from every attitude sample and TIMESYNC exchange.
 
-    All vehicle times that it gives continue over jumps: what computes with them never sees one.
-
-    Attributes:
-        rate: How fast the clock runs.
-        delay: How late even the quickest sample is, by TIMESYNC.
-        timeline: Rises whenever the clock jumped, wrapped, stood still or restarted.
-        restarts: Rises whenever the autopilot restarted: its time since boot went back by seconds,
-            and went on from there.
-        last_change: The newest of these changes in words.
-        outliers: Samples dropped because they alone were stamped far ahead.
-        on_event: Takes what the user should know, in words.
+    If the clock jumps, the vehicle times that are returned here go on without the jump.
 
     Args:
-        lockstep: Whether the vehicle's clock is ours, so that ages are known without TIMESYNC.
+        lockstep: Whether the event loop runs on the vehicle's clock, so that ages are known without
+            TIMESYNC.
+
+    Attributes:
+        rate: Rate of the vehicle's clock.
+        delay: Delay of the quickest sample, measured by TIMESYNC.
+        timeline: Rises whenever the clock jumped, wrapped, stood still or restarted.
+        restarts: Rises whenever the autopilot restarted: its time since boot went back by seconds
+            and goes on from there.
+        last_change: The newest of these changes in words.
+        outliers: Number of single samples dropped because they were stamped far ahead.
+        on_event: Called with a sentence for the user.
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
@@ -67,39 +69,39 @@ class VehicleClock:
 
     @property
     def age_known(self) -> bool:
-        """Whether ages are absolute; else they count from the quickest sample's."""
+        """Whether ages are absolute. Otherwise an age is the delay beyond the quickest sample's."""
         return self._lockstep or self.delay.known
 
     @property
     def offset(self) -> float | None:
-        """Vehicle time minus ours, s; None before the first sample."""
+        """Vehicle time minus event-loop time, s; None before the first sample."""
         return None if self._began == inf else self._quickest + self.delay.seconds
 
     def vehicle_time(self, time_boot_ms: int) -> float:
-        """The stamp of another message, s, as `Reading.vehicle_time`."""
+        """Convert the stamp of any message to a time on the clock of `Reading.vehicle_time`, s."""
         return time_boot_ms / 1000.0 + self._shift
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Age at our time `now` of what the vehicle stamped with `vehicle_time`; both in s.
+        """Age at the event-loop time `now` of a message stamped with `vehicle_time`; all in s.
 
-        Never negative; None before the first sample.
+        It is never negative, and None before the first sample.
         """
         offset = self.offset
         return None if offset is None else max(0.0, now + offset - vehicle_time)
 
     def is_ahead(self, vehicle_time: float, now: float) -> bool:
-        """Whether a stamp is ahead of the clock at `now`, further than the clock may drift."""
+        """Whether a stamp (s) is further ahead of the clock at time `now` than drift explains."""
         if self._began == inf:
             return False
         spread = self.rate.spread(max(0.0, now - self._received))
         return vehicle_time - now > self._quickest + self.delay.seconds + JUMP + spread
 
     def take(self, time_boot_ms: int, received: float) -> Reading:
-        """Take an attitude sample.
+        """Take the times of an attitude sample; return its vehicle time and age.
 
         Args:
-            time_boot_ms: Its stamp.
-            received: When it arrived, s on our clock.
+            time_boot_ms: Time stamp of the sample, ms.
+            received: Event-loop time of its arrival, s.
         """
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
@@ -126,13 +128,13 @@ class VehicleClock:
     def exchange(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
 
-        It also shows when the clock has slipped: simulators lose time on a busy computer and do not
-        catch up. Samples then seem late until the next exchange.
+        It also shows that the clock has slipped: on a busy computer simulators lose time and do not
+        catch up. Until the next exchange, samples then seem late.
 
         Args:
-            sent: When we asked, s on our clock.
-            received: When the answer came, s on our clock.
-            vehicle_ns: What the vehicle's clock said in between, ns.
+            sent: Event-loop time of the request, s.
+            received: Event-loop time of the answer, s.
+            vehicle_ns: The vehicle's clock in between, ns.
         """
         if self._lockstep or self._began == inf:
             return
@@ -147,29 +149,33 @@ class VehicleClock:
             if -delay < JUMP:
                 self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
             return
-        if attitude_fits:  # then it is TIMESYNC's clock that has changed
+        if attitude_fits:  # the samples are as before: only TIMESYNC's clock has changed
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
-            # Its answer may be a little older than the sample that came before it.
+            # The answer may be a little older than the newest sample.
             back = time < self._newest - _CERTAINLY_BACK
-            self._change(-behind, round(vehicle_ns * 1e-6), restarted=back)
+            self._accept_jump(-behind, round(vehicle_ns * 1e-6), restarted=back)
 
-    def look(self, now: float) -> None:
-        """Drop expired TIMESYNC exchanges; report when ages become unknown, or known again."""
+    def update(self, now: float) -> None:
+        """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
+
+        Args:
+            now: Event-loop time, s.
+        """
         self.delay.expire(now)
         if now - self._began < _UNKNOWN_AFTER or self.age_known is not self._told_unknown:
             return
         self._told_unknown = not self.age_known
         if self._told_unknown:
             self.on_event(
-                f"the age of telemetry is not known, because {self.delay.unknown.value}; only what "
-                "is later than the quickest sample counts as late"
+                f"the age of telemetry is not known, because {self.delay.unknown.value}; only the "
+                "delay beyond that of the quickest sample counts as lateness"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _judge_misfit(self, time_boot_ms: int, stamp: Stamp, quickest: float) -> Misfit | None:
-        """Why `stamp` does not fit; None where it does, or where the clock has changed to fit."""
+        """Why `stamp` does not fit the clock; None if it fits, also after a change of the clock."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -180,7 +186,7 @@ class VehicleClock:
             self._quickest = quickest
             self._drop_misfits()
             return None
-        if is_ahead and self._ends_lateness(stamp, quickest):
+        if is_ahead and self._link_got_quicker(stamp, quickest):
             return None
         if not self._misfits.continued_by(stamp):
             self._drop_misfits()
@@ -191,17 +197,18 @@ class VehicleClock:
         self._misfits.stamps.clear()
         self._quickest = quickest
         self._newest = -inf
-        self._change(by, time_boot_ms, restarted=by < 0.0)
+        self._accept_jump(by, time_boot_ms, restarted=by < 0.0)
         return None
 
-    def _ends_lateness(self, stamp: Stamp, quickest: float) -> bool:
-        """Whether the link is quicker again: by TIMESYNC even the quickest sample was late.
+    def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
+        """Whether `stamp` seems ahead only because the link has become quicker.
 
-        Samples then seem ahead by at most as much as the link was late. What TIMESYNC says after
-        the last sample that fitted does not count: the clock may have jumped before it.
+        A sample of a quicker link seems ahead by at most the delay that TIMESYNC measured before.
+        Exchanges after the last sample that fitted do not count, because the clock may have jumped
+        before them.
         """
         by = stamp.ahead - quickest
-        if by > self.delay.most(before=self._received - TOGETHER):
+        if by > self.delay.largest_possible(before=self._received - TOGETHER):
             return False
         self._quickest = quickest
         self.delay.shorten(by, stamp.received)
@@ -209,15 +216,18 @@ class VehicleClock:
         return True
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """A sample fits again, `late` s: the clock stood still if all in between had one stamp."""
+        """Take a sample that fits again and came `late` seconds late.
+
+        If all misfits before it repeated one stamp, the clock stood still.
+        """
         stood_still = self._misfits.stood_still(self._newest)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if stood_still and min(lasted, late) >= JUMP:
-            self._change(-late, time_boot_ms, restarted=False)
+            self._accept_jump(-late, time_boot_ms, restarted=False)
 
     def _drop_misfits(self) -> None:
-        """They were strays: the clock goes on as before, or differently again."""
+        """Drop the misfits as outliers: the clock goes on as before them, or changes again."""
         ahead = sum(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._told_outlier:
             self._told_outlier = True
@@ -229,14 +239,14 @@ class VehicleClock:
         self.outliers += ahead
         self._misfits.stamps.clear()
 
-    def _change(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
-        """Accept that the vehicle's clock jumped by `by` s; our vehicle times stay continuous."""
+    def _accept_jump(self, by: float, time_boot_ms: int, *, restarted: bool) -> None:
+        """Accept that the vehicle's clock jumped by `by` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= by
-        self.delay.retract(self._received - self.delay.seconds - TOGETHER)
+        self.delay.forget_after(self._received - self.delay.seconds - TOGETHER)
         if self._received - self._began < _SETTLES_FOR and by > -REBOOTED:
             return
         self.timeline += 1
-        self.restarts += restarted and not wrapped(by, before) and by < -REBOOTED
-        self.last_change = described(by, before, time_boot_ms / 1000.0, restarted=restarted)
+        self.restarts += restarted and not has_wrapped(by, before) and by < -REBOOTED
+        self.last_change = describe_change(by, before, time_boot_ms / 1000.0, restarted=restarted)
         self.on_event(self.last_change)

@@ -1,6 +1,7 @@
-"""Two estimates about the vehicle's clock: how fast it runs, and how late the quickest sample is.
+"""Two estimates about the vehicle's clock: its rate, and the delay of the quickest sample.
 
-The rate is the slope of the quickest samples' offset; the delay is what TIMESYNC adds to it.
+`clock.py` explains "quickest" and "offset". The rate is the slope of the quickest samples' offset.
+The delay is the difference between TIMESYNC's offset and that of the quickest sample.
 """
 
 from collections import deque
@@ -9,36 +10,36 @@ from math import inf
 from typing import NamedTuple
 
 MOST_DRIFT = 0.02
-"""The vehicle's clock is followed while its rate differs from ours by no more than this. Crystals
-differ by less than 0.0002, a simulator that is slower than real time by 0.006 (measured)."""
+"""Largest difference in rate between the two clocks, s per s. Crystals differ by less than 0.0002,
+a simulator that is slower than real time by 0.006 (measured)."""
 _UNSURE = 0.005
-"""By how much a measured rate may be wrong, or change while it is measured."""
+"""Error of a measured rate, s per s."""
 _NO_DRIFT = 0.005
-"""If the offset rises by more than the drift and this, s, from one note to the next, samples came
-late until then. From a backlog of 68 ms at the start (measured on PX4) a rate of 1.4 % would
-be measured, and samples would seem up to 79 ms old for 40 s."""
+"""If the offset rises by this (s) more than drift explains, earlier samples were late: the rate is
+measured anew. Otherwise a backlog of 68 ms at the start (measured on PX4) would give a rate of
+1.4 %, and samples would seem up to 79 ms old for 40 s."""
 _PERIOD = 1.0
 _LEAST, _MOST = 5, 20
-"""A rate is measured over this many seconds at least and at most."""
+"""Shortest and longest time over which a rate is measured, s."""
 
 LIFETIME = 20.0
-"""An exchange counts for this long, s; they come once a second."""
+"""Time for which an exchange counts, s; there is one each second."""
 _LONGEST = 10.0
-"""No link keeps a sample longer, s: a greater difference is another clock's."""
+"""Longest plausible delay of a sample, s; a greater difference means another clock."""
 _TOLERATED = 0.05
-"""By how much TIMESYNC may lag the samples' stamps, s; the simulators' does by up to 0.012."""
+"""Tolerated lag of TIMESYNC behind the samples' stamps, s; in the simulators up to 0.012."""
 
 
 class ClockRate:
     """Estimates the rate of the vehicle's clock.
 
-    Attributes:
-        rate: How much faster than ours the vehicle's clock runs, s per s.
-        slowest: The lowest rate that it may have just now: the offset may sink as quickly.
-        due: When the next offset is to be noted, s on our clock.
-
     Args:
-        fixed: The two clocks are one.
+        fixed: Whether the vehicle and the loop have the same clock.
+
+    Attributes:
+        rate: How much faster than the loop's clock the vehicle's runs, s per s.
+        slowest: The lowest rate that is possible now, s per s.
+        due: Event-loop time at which the next offset should be noted, s.
     """
 
     def __init__(self, *, fixed: bool = False) -> None:
@@ -49,19 +50,23 @@ class ClockRate:
         self._noted: deque[tuple[float, float]] = deque(maxlen=_MOST + 1)
 
     def _restart(self) -> None:
-        """Restart the measurement: the noted offsets are of late samples."""
+        """Restart the measurement, because the noted offsets are of late samples."""
         self._noted.clear()
         self.rate, self._unsure = 0.0, MOST_DRIFT
         self.slowest = -MOST_DRIFT
 
     def spread(self, seconds: float) -> float:
-        """How far apart the slowest and the fastest possible clock are after `seconds`, s."""
+        """Difference between the fastest and the slowest possible clock after `seconds`, s."""
         return 2.0 * self._unsure * seconds
 
     def note(self, now: float, offset: float) -> None:
-        """Take the quickest sample's offset (vehicle time minus ours), s, at `now`, once a second.
+        """Take the quickest sample's offset, vehicle time minus event-loop time, once a second.
 
-        Both in s. Two points far apart are enough: each is the best of a second's samples.
+        Two points far apart suffice, since each is the best of a second's samples.
+
+        Args:
+            now: Event-loop time, s.
+            offset: s.
         """
         if self._noted:
             then, before = self._noted[-1]
@@ -85,101 +90,108 @@ class DelayUnknown(Enum):
     OTHER_CLOCK = "TIMESYNC counts another clock than time_boot_ms"
 
 
-class _Compared(NamedTuple):
+class _Exchange(NamedTuple):
+    """A TIMESYNC exchange: event-loop time, half the round trip, and the delay it gives; s."""
+
     at: float
     half: float
     delay: float
 
     def error(self, now: float) -> float:
-        """By how much its delay may be wrong at `now`, s."""
+        """Largest error of the delay at the event-loop time `now`, s."""
         return self.half + MOST_DRIFT * (now - self.at)
 
 
 class TelemetryDelay:
-    """The delay of the quickest sample, from the best recent exchange.
+    """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error.
 
-    An exchange's error is half its round trip. It grows with its age, since what the samples tell
-    of the clock's rate may be a queue that grows.
+    The error of an exchange is half its round trip. It grows with age: what looks like a slower
+    clock in the samples may be a growing queue.
 
     Attributes:
-        known: Whether there is a delay.
+        known: Whether the delay is known.
         seconds: The delay, s; 0 while it is not known.
-        error: It may be wrong by this, s.
-        unknown: Why it is not known, where it is not.
+        error: Largest error of `seconds`, s.
+        unknown: Why the delay is not known; without meaning while it is known.
     """
 
     def __init__(self) -> None:
         self.known = False
         self.seconds = self.error = 0.0
         self.unknown = DelayUnknown.UNANSWERED
-        self._compared: deque[_Compared] = deque(maxlen=round(LIFETIME) + 10)
-        self._odd: _Compared | None = None
+        self._exchanges: deque[_Exchange] = deque(maxlen=round(LIFETIME) + 10)
+        self._odd: _Exchange | None = None
 
     def compare(self, now: float, half: float, delay: float) -> float | None:
-        """Take an exchange, unless no delay of the samples explains it.
+        """Take an exchange; ignore one whose delay is implausible.
 
         Args:
-            now: s on our clock.
-            half: Half of its round trip, s.
+            now: Event-loop time, s.
+            half: Half of the exchange's round trip, s.
             delay: TIMESYNC's offset minus the quickest sample's, s.
 
         Returns:
-            By how much TIMESYNC has come to lag the samples' stamps, s, if it agreed with them
-            before and two exchanges in a row say so; else None.
+            How far TIMESYNC now lags the samples' stamps, s, if it did not before and two exchanges
+            in a row show it. Otherwise None.
         """
-        taken = _Compared(now, half, delay)
+        taken = _Exchange(now, half, delay)
         if -(half + _TOLERATED) <= delay <= _LONGEST:
             self._odd = None
             self.unknown = DelayUnknown.UNANSWERED
-            self._compared.append(taken)
+            self._exchanges.append(taken)
             self.expire(now)
             return None
         before, self._odd = self._odd, taken
         if before is None or abs(before.delay - delay) > before.half + half + _TOLERATED:
             return None
         self._odd = None
-        if self._compared and delay < 0.0:
+        if self._exchanges and delay < 0.0:
             return self.seconds - delay
         self.forget(DelayUnknown.OTHER_CLOCK)
         return None
 
-    def most(self, before: float) -> float:
-        """The largest delay that exchanges up to `before` (s on our clock) leave possible, s."""
-        told = [each for each in self._compared if each.at <= before]
-        if not told:
+    def largest_possible(self, before: float) -> float:
+        """The largest delay possible by the exchanges until the event-loop time `before`, s."""
+        earlier = [each for each in self._exchanges if each.at <= before]
+        if not earlier:
             return 0.0
-        best = min(told, key=lambda each: each.error(before))
+        best = min(earlier, key=lambda each: each.error(before))
         return best.delay + best.error(before)
 
     def shorten(self, by: float, now: float) -> None:
-        """The quickest sample is `by` s quicker than those that were compared with; both in s."""
-        self._compared = deque(
-            (each._replace(delay=each.delay - by) for each in self._compared),
-            maxlen=self._compared.maxlen,
+        """Shorten all delays: a quicker sample than before has come.
+
+        Args:
+            by: How much quicker it is than the quickest sample before, s.
+            now: Event-loop time, s.
+        """
+        self._exchanges = deque(
+            (each._replace(delay=each.delay - by) for each in self._exchanges),
+            maxlen=self._exchanges.maxlen,
         )
         self.expire(now)
 
-    def retract(self, since: float) -> None:
-        """Forget what was compared after `since`, s on our clock: the clock had changed already."""
-        while self._compared and self._compared[-1].at > since:
-            self._compared.pop()
+    def forget_after(self, since: float) -> None:
+        """Forget the exchanges after event-loop time `since` (s), when the clock had changed."""
+        while self._exchanges and self._exchanges[-1].at > since:
+            self._exchanges.pop()
         self.expire(since)
 
     def forget(self, why: DelayUnknown) -> None:
-        """The delay is not known any more."""
-        self._compared.clear()
+        """Forget all exchanges: the delay is not known any more, because of `why`."""
+        self._exchanges.clear()
         self.known, self.unknown = False, why
         self.seconds = self.error = 0.0
 
     def expire(self, now: float) -> None:
-        """Forget exchanges that are too old, and choose the best of the others."""
-        compared = self._compared
-        while compared and now - compared[0].at > LIFETIME:
-            compared.popleft()
-        if not compared:
+        """Forget exchanges too old at event-loop time `now` (s); use the best of the others."""
+        exchanges = self._exchanges
+        while exchanges and now - exchanges[0].at > LIFETIME:
+            exchanges.popleft()
+        if not exchanges:
             self.forget(self.unknown)
             return
         self.known = True
-        best = min(compared, key=lambda each: each.error(now))
+        best = min(exchanges, key=lambda each: each.error(now))
         self.seconds = max(0.0, best.delay)
         self.error = best.error(now)

@@ -1,4 +1,4 @@
-"""Keeps one transport open between the endpoint, the inbox and the outbox."""
+"""Keeps the transport to the vehicle open, for the inbox and the outbox."""
 
 import asyncio
 import logging
@@ -19,15 +19,15 @@ _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
-    Nothing survives a drop: unsent frames are discarded, an incomplete frame is forgotten, and
-    `dropped` ends all waiting for answers.
+    When it drops, unsent frames are discarded, an incomplete frame is forgotten, and `dropped` is
+    called.
 
     Args:
-        endpoint: Where the vehicle is.
-        inbox: Takes what arrives.
-        outbox: Sends over the open transport, or drops frames.
+        endpoint: The endpoint to open.
+        inbox: Takes the bytes that arrive.
+        outbox: Sends over the open transport; without one it drops frames.
         stats: Counts the reconnects.
-        dropped: Called with the reason of each drop.
+        dropped: Called with the reason of each drop; ends all waiting for answers.
         opener: Opens the transport.
     """
 
@@ -47,16 +47,16 @@ class Connection:
 
     @property
     def local_address(self) -> tuple[str, int] | None:
-        """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
+        """(host, port) to which the socket is bound, for UDP and a TCP server; else `None`."""
         return getattr(self._outbox.transport, "local", None)
 
     async def open(self) -> None:
         """Open the transport.
 
         Raises:
-            EndpointError: With the reason and what to do.
+            EndpointError: The transport cannot be opened; the message says why and what to do.
         """
-        # Before the transport is there: its first bytes may come before we run again.
+        # First, because bytes may arrive before this coroutine resumes.
         self._inbox.connect(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
         self._lost_early = None
         transport = await self._opener(self._endpoint, self._inbox, self._on_lost)
@@ -86,7 +86,7 @@ class Connection:
         if transport.reconnects:
             self._drop_transport()
             self._reopening = asyncio.get_running_loop().create_task(self._reopen())
-        else:  # a server goes on listening
+        else:  # a TCP server goes on listening
             self._inbox.connect(streaming=True)
             self._stats.reconnects += 1
         self._dropped(reason)

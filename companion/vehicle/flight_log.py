@@ -15,13 +15,13 @@ Row = tuple[float, ...]
 
 _AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
 _ARMED = 128
-_WHAT_COUNTS = IGNORE_ATTITUDE | 0b1100111
-"""Of a type mask: quaternion, three rates, throttle, and the body thrust that may replace it."""
+_RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
+"""Bits of a type mask that are compared: quaternion, three rates, throttle, body thrust."""
 _STANDARD_GRAVITY = 9.80665
 _RECENT = 500
-"""Number of newest samples whose stamp a setpoint may echo."""
+"""Number of newest samples whose time stamp a setpoint may carry."""
 _ONE_CLOCK = 1.0
-"""An accelerometer stamp further than this from the attitude's is of another clock, s."""
+"""If stamps of accelerometer and attitude differ by more than this, s, their clocks differ."""
 _NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",
@@ -34,13 +34,13 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FlightLog:
-    """Rows of one flight; times are the vehicle's, s since its boot.
+    """Rows of one flight; times are in s since the vehicle's boot.
 
     Attributes:
-        setpoints: (time of the sample that it answers, roll, pitch, yaw rate in rad/s, thrust in
-            0..1), those that the autopilot obeyed.
-        rates: (time, roll, pitch, yaw rate in rad/s), measured.
-        specific_thrust: (time, m/s²), the accelerometer's −z (FRD).
+        setpoints: Setpoints that the autopilot obeyed: (time of the sample to which the setpoint
+            responds, roll, pitch, yaw rate in rad/s, thrust 0..1).
+        rates: Measured rates: (time, roll, pitch, yaw rate in rad/s).
+        specific_thrust: The accelerometer's −z (FRD): (time, m/s²).
     """
 
     setpoints: list[Row]
@@ -49,15 +49,15 @@ class FlightLog:
 
 
 def read_flight_log(path: Path) -> FlightLog:
-    """Read a `.tlog`, ours or another program's.
+    """Read a `.tlog` of this or another program.
 
-    A setpoint that carries the stamp of a recent sample answers that sample, as ours do; any other
-    is taken to answer the latest sample recorded before it. It counts where the heartbeats before
-    and after it say that the vehicle is armed and obeys rates.
+    A setpoint of this program carries the time stamp of the sample to which it responds. A setpoint
+    with another stamp is assigned to the latest sample recorded before it. A setpoint counts only
+    if the heartbeats before and after it say that the vehicle is armed and obeys rates.
 
     Raises:
-        LogError: the file cannot be read, is not a `.tlog`, or holds no heartbeat of an autopilot
-            that we know, or no setpoint that it obeyed.
+        LogError: the file cannot be read, is not a `.tlog`, or has no heartbeat of a supported
+            autopilot, or no setpoint that the autopilot obeyed.
     """
     reader = _Reader()
     for frame, message in messages(path, _NAMES):
@@ -69,7 +69,7 @@ def read_flight_log(path: Path) -> FlightLog:
             f"{path}: holds no body rates that the vehicle obeyed: SET_ATTITUDE_TARGET by rates, "
             "armed, in the mode that obeys it"
         )
-    # Both messages carry the same rates; together they would count twice.
+    # Both attitude messages carry the same rates, so only one of them is used.
     return FlightLog(
         reader.offboard_active,
         max(reader.quaternion, reader.euler, key=len),
@@ -83,7 +83,7 @@ class _Reader:
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
-        offboard_active: rows of setpoints.
+        offboard_active: rows of setpoints that the autopilot obeyed.
         quaternion: rows of rates from ATTITUDE_QUATERNION.
         euler: rows of rates from ATTITUDE.
         specific_thrust: rows of the accelerometer.
@@ -123,7 +123,7 @@ class _Reader:
         self._obeying = obeying
 
     def _setpoint(self, setpoint: Message) -> None:
-        if not self._stamps_ms or setpoint.type_mask & _WHAT_COUNTS != IGNORE_ATTITUDE:
+        if not self._stamps_ms or setpoint.type_mask & _RELEVANT_BITS != IGNORE_ATTITUDE:
             return
         echoes = setpoint.time_boot_ms in self._stamps_ms
         answered = setpoint.time_boot_ms if echoes else self._stamps_ms[-1]

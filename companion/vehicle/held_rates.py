@@ -1,17 +1,17 @@
-"""The effective rate of our setpoints, from how long the vehicle holds each of them."""
+"""The effective rate of the setpoints, from how long the vehicle holds each of them."""
 
 _UNEVEN = 2.0
-"""Uneven intervals hold setpoints longer on average than even ones. If they hold them longer than
-even intervals of half the rate would, the rate counts as lower."""
+"""Uneven intervals are tolerated until setpoints are held, on average, as long as at half the rate
+with even intervals. Beyond that the effective rate is lower than the mean rate."""
 
 
 class HeldRates:
-    """Sums over the intervals between consecutive answers.
+    """Sums over the intervals between consecutive setpoints.
 
     Attributes:
-        intervals: Their number.
-        seconds: Their sum.
-        squares: Sum of their squares, s².
+        intervals: Number of intervals.
+        seconds: Sum of the intervals, s.
+        squares: Sum of the squared intervals, s².
     """
 
     __slots__ = ("intervals", "seconds", "squares")
@@ -20,20 +20,20 @@ class HeldRates:
         self.intervals, self.seconds, self.squares = intervals, seconds, squares
 
     def add(self, interval: float) -> None:
-        """Take the time between two answers, s."""
+        """Add the time between two setpoints, s."""
         self.intervals += 1
         self.seconds += interval
         self.squares += interval * interval
 
     def copy(self) -> "HeldRates":
-        """These sums at this moment."""
+        """A copy of the present sums."""
         return HeldRates(self.intervals, self.seconds, self.squares)
 
     def rate_since(self, before: "HeldRates") -> float | None:
-        """Answers a second since `before`, Hz, or None where nothing was answered in a row.
+        """Effective rate since `before`, Hz; None if there was no interval since then.
 
-        Samples in bursts are worth no more than the pauses between them: for intervals g the rate
-        is at most 2·Σg/Σg².
+        It is the number of setpoints per second, but for intervals g at most 2·Σg/Σg², so that
+        setpoints in bursts do not hide the pauses between the bursts.
         """
         intervals = self.intervals - before.intervals
         seconds, squares = self.seconds - before.seconds, self.squares - before.squares

@@ -1,8 +1,8 @@
-"""What arrives: checked, and passed on to the control loop and to the router.
+"""Checks the bytes that arrive, and passes their frames to the control loop and to the router.
 
-Every frame goes one way, whatever the transport: scan, filter, control loop, count, subscribers.
-In lockstep frames wait for the beacon that closes their step, and samples for the tasks of the
-step; nothing else differs.
+Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
+subscribers. In lockstep, frames also wait for the beacon that closes their step, and samples for
+the tasks of the step.
 """
 
 import asyncio
@@ -30,23 +30,23 @@ from companion.vehicle.records import AttitudeSample
 
 
 class Inbox:
-    """Checks what arrives and passes it on: samples to the control loop, all else to the router.
+    """Passes attitude samples to the control loop, and all accepted frames to the router.
+
+    Args:
+        settings: Ids of the vehicle, and the signing key.
+        stats: Counters of the link.
+        router: Takes every accepted frame.
+        tap: Called with every accepted frame, for recordings.
+        notice: Called once for each reason why frames are refused.
+        clock: The vehicle's clock; takes the time stamp of every sample.
+        last_setpoint: Returns the event-loop time of the last setpoint sent, s.
 
     Attributes:
         on_attitude: Called with each attitude sample, synchronously.
-        on_foreign: Called with each frame of a system or component that we do not listen to.
-        on_frame: Called with each frame of the peer, whoever sent it and of whatever message, after
-            the control loop and all subscribers.
-        lockstep: Set when vehicle time drives the loop.
-
-    Args:
-        settings: Whom to hear, and the key.
-        stats: Counts.
-        router: Takes every accepted frame.
-        tap: Shown every accepted frame, for recordings.
-        notice: Told once of each reason why the two sides do not understand each other.
-        clock: The vehicle's; is fed by every sample.
-        last_setpoint: Loop time of the last setpoint sent, s.
+        on_foreign: Called with each frame of another system or component than the vehicle's.
+        on_frame: Called with each frame of the peer, whatever its source and message, after the
+            control loop and all subscribers.
+        lockstep: Handles beacons in lockstep; otherwise None.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Inbox:
         self.connect(streaming=False)
 
     def connect(self, *, streaming: bool) -> None:
-        """Begin with a fresh connection."""
+        """Forget an incomplete frame: the next bytes come over another connection."""
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
         )
@@ -89,12 +89,12 @@ class Inbox:
     def follow_vehicle_time(
         self, loop: LockstepEventLoop, answer: Callable[[int], None]
     ) -> LockstepClient:
-        """From now on hold what arrives until the vehicle closes its step."""
+        """Switch to lockstep: from now on frames wait until the vehicle closes its step."""
         self.lockstep = LockstepClient(loop, self._process, self._deliver, answer)
         return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
-        """Take bytes from the transport; true if a frame in them was accepted. Never raises."""
+        """Take bytes of the peer; return whether a frame in them was accepted. Never raises."""
         accepted = False
         try:
             for frame in self._scanner.feed(data):
@@ -103,20 +103,20 @@ class Inbox:
                 elif self._admit(frame):
                     accepted = True
                     if self._candidate is not None:
-                        self._peer_rule.fix(self._candidate)
+                        self._peer_rule.set_peer(self._candidate)
                         self._candidate = None
                     self._accept(frame, received_ns)
                 elif not self._filter.is_vehicle(frame):
                     self._show(frame)
-        except Exception as error:  # of the tap; subscribers are guarded one by one
+        except Exception as error:  # from the tap; subscribers are guarded one by one
             self._router.report(error)
             return False
         return accepted
 
     def claim(self, data: bytes, received_ns: int, who: str) -> bool:
-        """Take bytes of `who`, who is not the peer; true if that makes it the peer.
+        """Take bytes of `who`, who is not the peer; return whether `who` becomes the peer.
 
-        Without a valid claim in them nothing is accepted. Never raises.
+        Without a valid claim in the bytes, no frame in them is accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._admit(frame)]
@@ -124,31 +124,34 @@ class Inbox:
             self._stats.unclaimed += len(admitted)
             return False
         self._candidate = None
-        self._peer_rule.fix(who)
+        self._peer_rule.set_peer(who)
         try:
             for frame in admitted:
                 self._accept(frame, received_ns)
-        except Exception as error:  # of the tap
+        except Exception as error:  # from the tap
             self._router.report(error)
         return True
 
     def may_answer(self, who: str) -> bool:
-        """Whether `who` is sent to although its claim failed: its signature may be proven yet."""
+        """Whether frames are sent to `who` although its claim was refused.
+
+        If so, its answer to a TIMESYNC request would make its signatures acceptable.
+        """
         if not self._filter.awaits_answer:
             return False
         self._candidate = who
         return True
 
     def claim_lapsed(self) -> bool:
-        """Whether another sender may take the peer's place."""
+        """Whether another sender may become the peer."""
         return self._peer_rule.lapsed()
 
-    def stranger(self, who: str) -> None:
-        """`who`, whom the endpoint does not name, was ignored."""
+    def note_stranger(self, who: str) -> None:
+        """Tell the user that bytes of `who` were ignored, as the endpoint names other peers."""
         self._peer_rule.ignore(who)
 
     def tell_remarks(self) -> None:
-        """Pass on what signing has to say about time stamps."""
+        """Pass the remarks about the time stamps of signatures to the user."""
         self._filter.tell_remarks()
 
     def _admit(self, frame: Frame) -> bool:
@@ -167,18 +170,21 @@ class Inbox:
         beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
         if beacon is None:
             self._held.append((frame, received_ns))
-        else:  # no telemetry: beacons have running numbers of their own
+        else:  # not counted as telemetry: beacons have sequence numbers of their own
             self.lockstep.beacon(beacon)
 
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
-        """Control first: when a sample comes the caches are cold, and each line costs latency."""
+        """Pass a frame to the tap, the control loop, the counter and the router.
+
+        The control loop comes early because each line before it adds latency.
+        """
         now = self._loop.time()
         if self._tap is not None:
             self._tap(now, frame.raw)
         if frame.message_id == ATTITUDE_QUATERNION:
             try:
                 self._take_sample(frame.payload, now, received_ns)
-            except Exception as error:  # the frame still counts, and subscribers still get it
+            except Exception as error:  # the frame is still counted and passed to subscribers
                 self._router.report(error)
         self._counter.count(frame.message_id, frame.sequence)
         self._router.route(frame.message_id, frame.payload)
@@ -186,7 +192,7 @@ class Inbox:
             self._router.guard(self.on_frame, frame)
 
     def _show(self, frame: Frame) -> None:
-        """Show a frame that is used for nothing else."""
+        """Pass to `on_frame` a frame that is not the vehicle's or whose message is unknown."""
         if self.on_frame is not None:
             self._router.guard(self.on_frame, frame)
 
@@ -200,22 +206,22 @@ class Inbox:
         known = self._clock.age_known
         sample = AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
         if self.lockstep is None:
-            self._control(sample)
+            self._call_on_attitude(sample)
         else:
             self._samples.append(sample)
 
-    def _control(self, sample: AttitudeSample) -> None:
+    def _call_on_attitude(self, sample: AttitudeSample) -> None:
         if self.on_attitude is not None:
             self._router.guard(self.on_attitude, sample)
 
     def _process(self) -> None:
-        """Lockstep: handle a step's frames, in order, once its beacon has moved the clock."""
+        """In lockstep: pass on the frames of a step, in order, after its beacon set the clock."""
         held, self._held = self._held, []
         for frame, received_ns in held:
             self._pass_on(frame, received_ns)
 
     def _deliver(self) -> None:
-        """Lockstep: hand the step's samples to the control loop, once its tasks have run."""
+        """In lockstep: pass the samples of a step to the control loop, after its tasks have run."""
         samples, self._samples = self._samples, []
         for sample in samples:
-            self._control(sample)
+            self._call_on_attitude(sample)

@@ -1,4 +1,4 @@
-"""The link to one vehicle: everything the program sends and receives passes here."""
+"""The link to one vehicle, through which everything is sent and received."""
 
 import asyncio
 import logging
@@ -44,21 +44,20 @@ class Link(VehicleClient):
     setpoint: each one is sent by one call of `send_setpoint`.
 
     Args:
-        settings: Where the vehicle is and who we are.
+        settings: The endpoint, and the ids of the vehicle and of this program.
         tap: Called with every frame accepted from and sent to the vehicle, for recordings.
         opener: Opens the transport.
-        notice: Told once of each reason why the two sides do not understand each other; by default
-            the log.
+        notice: Called once for each reason why frames are refused; by default it logs a warning.
 
     Attributes:
-        stats: Counters.
-        state: What is known of the vehicle.
-        clock: The vehicle's: how old a sample is, and whether the clock jumped or restarted.
+        stats: Counters of the link.
+        state: The vehicle's telemetry.
+        clock: The vehicle's clock: the age of samples, and jumps or restarts of the clock.
         timesync: Round trip and jitter.
 
     Raises:
-        EndpointError: The endpoint's notation is wrong.
-        LinkError: Lockstep is asked for on another event loop than its own.
+        EndpointError: The endpoint cannot be parsed.
+        LinkError: The settings demand lockstep on an event loop other than `LockstepEventLoop`.
     """
 
     def __init__(
@@ -115,18 +114,18 @@ class Link(VehicleClient):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks.clear()
-        self._registry.fail("closed by us")
+        self._registry.fail("this program closed it")
         await self._connection.close()
         if self._keeper is not None:
             self._keeper.stop()
         self._inbox.tell_remarks()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
-        """Wait for the autopilot's heartbeat; return the newest at once if there was one.
+        """Wait for the autopilot's first heartbeat; return the newest heartbeat.
 
         Raises:
-            LinkTimeout: None came; the message says what came instead.
-            UnsupportedAutopilot: We cannot fly it.
+            LinkTimeout: No heartbeat came; the message says what came instead.
+            UnsupportedAutopilot: This program cannot fly the autopilot.
         """
         with Pending[None](self._registry) as heard:
             unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
@@ -145,14 +144,17 @@ class Link(VehicleClient):
 
     @property
     def local_address(self) -> tuple[str, int] | None:
-        """(host, port) we are bound to, for UDP and a TCP server; otherwise `None`."""
+        """(host, port) to which the socket is bound, for UDP and a TCP server; else `None`."""
         return self._connection.local_address
 
     # --- control
 
     @property
     def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample inside the read callback; exceptions are reported."""
+        """Called with each attitude sample, inside the read callback.
+
+        An exception that it raises goes to `on_error`.
+        """
         return self._inbox.on_attitude
 
     @on_attitude.setter
@@ -161,7 +163,7 @@ class Link(VehicleClient):
 
     @property
     def on_foreign(self) -> Callable[[Frame], None] | None:
-        """Called with each frame that is not the autopilot's; those are used for nothing else."""
+        """Called with each frame of another system or component than the vehicle's."""
         return self._inbox.on_foreign
 
     @on_foreign.setter
@@ -170,9 +172,10 @@ class Link(VehicleClient):
 
     @property
     def on_frame(self) -> Callable[[Frame], None] | None:
-        """Called with each frame that came, of any sender and message, after all other callbacks.
+        """Called with each received frame, of any sender and message, after all other callbacks.
 
-        Exceptions are reported. The checksum of a message that the dialect lacks is not checked.
+        An exception that it raises goes to `on_error`. The checksum of a message that the dialect
+        does not know is not checked.
         """
         return self._inbox.on_frame
 
@@ -181,12 +184,12 @@ class Link(VehicleClient):
         self._inbox.on_frame = callback
 
     def forward(self, frame: bytes) -> bool:
-        """Send another node's whole frame as it is; false if it could not leave."""
+        """Send a whole frame of another node unchanged; return False if it could not be sent."""
         return self._outbox.forward(frame)
 
     @property
     def on_error(self) -> Callable[[Exception], None] | None:
-        """Called with what a callback raised; without it such errors go to the log."""
+        """Called with an exception that a callback raised; without it such errors are logged."""
         return self._router.on_error
 
     @on_error.setter
@@ -194,20 +197,21 @@ class Link(VehicleClient):
         self._router.on_error = callback
 
     def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
-        """Send body rates and thrust, once and now. It never blocks.
+        """Send body rates and thrust once, now. It never blocks.
 
-        In lockstep a setpoint that answers the open step closes it, and is sent last.
+        In lockstep, the setpoint for the sample of the open step is sent last and closes the step.
 
         Args:
-            time_boot_ms: The stamp of the sample it answers, ms.
+            time_boot_ms: Time stamp of the sample to which the setpoint responds, ms.
             rates: rad/s about body x, y, z (FRD).
             thrust: Collective thrust, 0..1.
 
         Returns:
-            Whether it was sent; false if the connection is down or the kernel does not accept it.
+            Whether it was sent; False if the connection is down or the kernel refuses it.
 
         Raises:
-            InvalidSetpoint: Not finite or out of range (`NonFiniteSetpoint`); nothing was sent.
+            InvalidSetpoint: A value is out of range, or not finite (`NonFiniteSetpoint`); nothing
+                was sent.
         """
         if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)
@@ -226,7 +230,7 @@ class Link(VehicleClient):
         self._tasks.append(task)
 
     async def _first_beacon(self, lockstep: LockstepClient) -> None:
-        # A vehicle that waits for our first message (udpout, TCP) gets this one.
+        # Some vehicles wait for a first message before they send (udpout, TCP).
         send_heartbeat(self.settings, self._outbox)
         try:
             async with asyncio.timeout(self.settings.first_beacon_timeout_s):

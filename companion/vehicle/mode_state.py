@@ -16,19 +16,20 @@ _STATE_CRITICAL = 5
 
 
 class ModeState:
-    """The newest heartbeat and mode, `None` until they came.
+    """The newest heartbeat and mode; each is `None` until its message has come.
 
     Args:
-        router: Brings both messages.
-        clock: Event-loop time, s.
+        router: Delivers HEARTBEAT and CURRENT_MODE.
+        clock: Returns the event-loop time, s.
 
     Attributes:
         heartbeat: See `Heartbeat`.
-        current_mode: See `CurrentMode`; `mode` is the newer of the two messages.
-        heartbeat_is_newest: Whether HEARTBEAT was the last of the two; its arming is then as new.
-        armings: How often the vehicle was seen to become armed.
-        autopilot: How to command it, known from its first heartbeat.
-        unsupported: The error to raise if we cannot fly it.
+        current_mode: See `CurrentMode`. The property `mode` takes the newer of the two messages.
+        heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
+            `mode`.
+        armings: How often a heartbeat showed that the vehicle had become armed.
+        autopilot: How to command the vehicle; known from its first heartbeat.
+        unsupported: The error to raise if this program cannot fly the autopilot.
     """
 
     def __init__(self, router: Router, clock: Callable[[], float]) -> None:
@@ -45,7 +46,7 @@ class ModeState:
 
     @property
     def mode(self) -> str | None:
-        """Name of the present mode, by whichever of HEARTBEAT and CURRENT_MODE came last."""
+        """Name of the present mode, from the newer of HEARTBEAT and CURRENT_MODE."""
         heartbeat, current = self.heartbeat, self.current_mode
         if heartbeat is None:
             return None
@@ -53,23 +54,23 @@ class ModeState:
 
     @property
     def mode_received(self) -> float:
-        """When the present mode was last received, s of our clock; -inf if it never was."""
-        told = (self.heartbeat, self.current_mode)
-        return max((each.received for each in told if each is not None), default=-inf)
+        """Event-loop time at which a mode was last received, s; −inf if none was."""
+        messages = (self.heartbeat, self.current_mode)
+        return max((each.received for each in messages if each is not None), default=-inf)
 
     @property
     def armed(self) -> bool | None:
-        """Whether the motors may turn."""
+        """Whether the vehicle is armed; None before the first heartbeat."""
         return self.heartbeat.armed if self.heartbeat else None
 
     @property
     def failsafe(self) -> bool:
-        """Whether the autopilot says that it is in a failsafe."""
+        """Whether the autopilot reports a failsafe (MAV_STATE_CRITICAL)."""
         return self.heartbeat is not None and self.heartbeat.system_status == _STATE_CRITICAL
 
     @property
     def mode_by_failsafe(self) -> bool:
-        """Whether a failsafe chose the present mode, as far as the autopilot says."""
+        """Whether a failsafe chose the present mode, as far as the autopilot reports it."""
         current = self.current_mode
         if current is None or self.heartbeat_is_newest:
             return self.failsafe
@@ -77,10 +78,10 @@ class ModeState:
 
     def _on_heartbeat(self, message: Message) -> None:
         if message.autopilot == _AUTOPILOT_INVALID:
-            return  # some other part of the vehicle, under the autopilot's own id
+            return  # another component that uses the autopilot's id
         kind = message.autopilot, message.type in MULTIROTORS
         if self.autopilot is not None and kind != (self.autopilot.mav_autopilot, True):
-            return  # an autopilot does not change its kind; this is some other part of the vehicle
+            return  # an autopilot does not change its kind: this is another component
         if self.autopilot is None:
             try:
                 self.autopilot = autopilot_for(message.autopilot, message.type)
@@ -106,7 +107,7 @@ class ModeState:
 
     def _on_current_mode(self, message: Message) -> None:
         if self.autopilot is None:
-            return  # what the number means is not known yet
+            return  # the meaning of the mode's number is not known yet
         mode, intended = (
             self.autopilot.mode_name(self._base_mode, number)
             for number in (message.custom_mode, message.intended_custom_mode)

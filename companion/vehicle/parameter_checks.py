@@ -1,4 +1,4 @@
-"""Checks that several parameters share, whatever the autopilot."""
+"""Checks of parameter values that both autopilots use."""
 
 from collections.abc import Mapping
 from math import degrees
@@ -8,17 +8,18 @@ from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSetti
 UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 LONGEST_HELD = 2.0
-"""0.4 rad/s held for 1 s became 24° of tilt (measured on PX4); twice that is not recoverable, s."""
+"""Longest time for which the last rates may be held, s. 0.4 rad/s held for 1 s became 24° of tilt
+(measured on PX4); twice that tilt is not recoverable."""
 
 _SAME_HOVER = 1.4
-"""Hover thrusts that differ by more than this factor are not of one vehicle at one battery."""
+"""If two hover thrusts differ by more than this factor, one of them is wrong."""
 
 _SAME_LIMIT = 1.15
-"""Acceleration limits that differ by less than this factor make no difference to a flight."""
+"""Acceleration limits that differ by less than this factor have the same effect."""
 
 
 def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | None = None) -> Check:
-    """Values that are forbidden, each with what follows from it."""
+    """A check that forbids the values in `bad`, which gives the consequence of each."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         because = bad.get(value)
@@ -28,7 +29,7 @@ def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | Non
 
 
 def required(result: CheckResult, good: float, because: str) -> Check:
-    """The one value that is right."""
+    """A check that requires the value `good`; any other has the consequence `because`."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         return None if value == good else Problem(result, because, good)
@@ -37,7 +38,7 @@ def required(result: CheckResult, good: float, because: str) -> Check:
 
 
 def positive(result: CheckResult, because: str, set_to: float) -> Check:
-    """Zero and below switch off a protection that is needed."""
+    """A check that requires a value above zero: zero or less switches a protection off."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         return None if value > 0.0 else Problem(result, because, set_to)
@@ -46,7 +47,7 @@ def positive(result: CheckResult, because: str, set_to: float) -> Check:
 
 
 def at_most(result: CheckResult, limit: float, because: str, set_to: float) -> Check:
-    """Values above a limit do harm."""
+    """A check that requires a value of at most `limit`."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         return None if value <= limit else Problem(result, because, set_to)
@@ -55,7 +56,7 @@ def at_most(result: CheckResult, limit: float, because: str, set_to: float) -> C
 
 
 def bit_set(result: CheckResult, bit: int, because: str) -> Check:
-    """A bit of the mask, given by its value, that has to be set."""
+    """A check that requires a bit of a mask to be set; `bit` is the bit's value."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         mask = int(value)
@@ -65,7 +66,7 @@ def bit_set(result: CheckResult, bit: int, because: str) -> Check:
 
 
 def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
-    """A bit of the mask, given by its value, that must not be set."""
+    """A check that requires a bit of a mask not to be set; `bit` is the bit's value."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         mask = int(value)
@@ -75,24 +76,28 @@ def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
 
 
 def shortest_hold(silence_limit: float) -> float:
-    """Shortest time for which the autopilot must hold the last rates, s: we must give up first."""
+    """Shortest time for which the autopilot must hold the last rates, s.
+
+    It is longer than `silence_limit` (s), so that `companion` releases control first.
+    """
     return 1.5 * silence_limit
 
 
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """The time for which the autopilot holds the last rates: short, but longer than our limit."""
+    """Check how long the autopilot holds the last rates: longer than `silence_limit`, but short."""
     right = shortest_hold(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
             UNSAFE,
-            f"the autopilot gives up on us before we do (deadman.silence_limit_ms "
-            f"{1e3 * settings.silence_limit:g}), so a short gap ends in its failsafe",
+            f"the autopilot's failsafe begins before companion releases control "
+            f"(deadman.silence_limit_ms {1e3 * settings.silence_limit:g}), so a short gap in the "
+            "setpoints triggers it",
             right,
         )
     if value > LONGEST_HELD:
         return Problem(
             UNSAFE,
-            f"when our setpoints stop the last rates are held for {value:g} s: 0.4 rad/s become "
+            f"when setpoints stop, the last rates are held for {value:g} s: 0.4 rad/s become "
             f"{degrees(0.4 * value):.0f}° of tilt",
             right,
         )
@@ -100,56 +105,56 @@ def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem 
 
 
 def hover_thrust(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """The autopilot's hover thrust and ours describe the same vehicle."""
+    """Check that the autopilot's hover thrust agrees with `thrust.hover_thrust`."""
     ours = settings.hover_thrust
     if value > 0.0 and 1.0 / _SAME_HOVER < value / ours < _SAME_HOVER:
         return None
     return Problem(
         INEFFECTIVE,
-        f"thrust.hover_thrust is {ours:g}, and one of the two is wrong: the vehicle jumps or sags "
-        "when control changes hands; hover it, read its thrust, and set both to that",
+        f"thrust.hover_thrust is {ours:g}, and one of the two is wrong, so the vehicle jumps or "
+        "sags at the takeover; hover it, read its thrust, and set both to that",
     )
 
 
 def thrust_curve(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Either the autopilot compensates the rotors' thrust curve or we do."""
+    """Check that only one of autopilot and `companion` compensates the rotors' thrust curve."""
     if value == 0.0 or settings.curve_factor == 0.0:
         return None
     return Problem(
         INEFFECTIVE,
-        f"the autopilot compensates the thrust curve, and so do we (thrust.curve_factor "
+        f"both the autopilot and companion compensate the thrust curve (thrust.curve_factor "
         f"{settings.curve_factor:g}); set thrust.curve_factor to 0",
     )
 
 
 def battery_scaling(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """Either the autopilot compensates the battery voltage or we do."""
+    """Check that only one of autopilot and `companion` compensates the battery voltage."""
     if value <= 0.0 or settings.battery_exponent == 0.0:
         return None
     return Problem(
         INEFFECTIVE,
-        f"the autopilot compensates the battery voltage, and so do we (thrust.battery_exponent "
-        f"{settings.battery_exponent:g}), so thrust grows as the battery empties; set "
-        "thrust.battery_exponent to 0",
+        f"both the autopilot and companion compensate the battery voltage "
+        f"(thrust.battery_exponent {settings.battery_exponent:g}), so thrust grows as the battery "
+        "empties; set thrust.battery_exponent to 0",
     )
 
 
-def our_system(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """A companion shares its vehicle's system id."""
+def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+    """Check that `companion` uses the vehicle's system id, as a companion computer must."""
     if value == settings.source_system:
         return None
     return Problem(
         INEFFECTIVE,
-        f"our heartbeat says system {settings.source_system}, so the autopilot takes us for "
-        f"another vehicle; set link.source_system to {value:g}",
+        f"companion's heartbeat says system {settings.source_system}, so the autopilot takes "
+        f"companion for another vehicle; set link.source_system to {value:g}",
     )
 
 
 def acceleration_limit(unit: float, axis: str) -> Check:
-    """The acceleration limit that the planner assumes is the autopilot's.
+    """A check that the planner assumes the autopilot's acceleration limit of an axis.
 
     Args:
-        unit: the parameter's unit in °/s².
+        unit: the parameter's unit, °/s².
         axis: `roll`, `pitch` or `yaw`.
     """
     prefix = "" if axis == "roll" else f"{axis}_"

@@ -11,24 +11,24 @@ from math import isfinite
 from typing import NamedTuple
 
 Values = Mapping[str, float]
-"""Parameters as read, by the newest of their names; those the autopilot lacks are absent."""
+"""Values of the parameters that the autopilot has, by the newest name of each."""
 
 
 class CompanionSettings(NamedTuple):
-    """The part of our configuration that the autopilot's parameters must agree with.
+    """The part of the configuration with which the autopilot's parameters must agree.
 
     Attributes:
-        source_system: Our own system id.
-        attitude_rate_hz: Rate of attitude samples that we request.
-        silence_limit: After this long without control we hand back, s.
+        source_system: System id of `companion`.
+        attitude_rate_hz: Rate of attitude samples that is requested, Hz.
+        silence_limit: Time without setpoints after which `companion` releases control, s.
         hover_thrust: Normalised thrust at hover with which the flight begins.
-        curve_factor: Of the thrust curve that we compensate; 0: none.
-        battery_exponent: Of the battery voltage that we compensate; 0: none.
+        curve_factor: Factor of the thrust curve that `companion` compensates; 0: none.
+        battery_exponent: Exponent of the voltage that `companion` compensates; 0: none.
         tilt_compensated: Whether the autopilot is expected to divide thrust by cos(tilt).
-        acceleration_limits: Of `roll`, `pitch` and `yaw` as the planner assumes them, rad/s²;
+        acceleration_limits: Limits of `roll`, `pitch` and `yaw` that the planner assumes, rad/s²;
             `None`: no limit.
         max_tilt: Largest tilt of a target, rad.
-        signs: Whether we sign what we send, and refuse what is not signed.
+        signs: Whether signing is configured.
     """
 
     source_system: int
@@ -44,27 +44,27 @@ class CompanionSettings(NamedTuple):
 
 
 class CheckResult(Enum):
-    """What a preflight check came to."""
+    """Result of a preflight check."""
 
     SAFE = "safe"
     UNSAFE = "unsafe"
     """Somebody may be hurt or the vehicle lost."""
     INEFFECTIVE = "ineffective"
-    """The flight does not do what is asked of it, or a protection does nothing."""
+    """The flight does not do what is commanded, or a protection has no effect."""
     NOT_READY = "not_ready"
-    """The finding only follows from a vehicle that is not ready to arm yet."""
+    """Only because the vehicle is not ready to arm yet."""
     NOT_CONNECTED = "not_connected"
-    """Nobody answers, so nothing was checked."""
+    """No vehicle answers, so nothing was checked."""
 
 
 class Problem(NamedTuple):
-    """What is wrong with a value.
+    """What is wrong with the value of a parameter.
 
     Attributes:
-        result: How bad it is.
-        because: What follows from it, one sentence.
-        set_to: What to set the parameter to. `None` where only the user can know, or where our
-            configuration must change; `because` then says so.
+        result: Severity.
+        because: Consequence of the value, one sentence.
+        set_to: Value to which the parameter should be set. `None`: only the user can know it, or
+            the configuration must change; `because` then says which key.
     """
 
     result: CheckResult
@@ -73,22 +73,22 @@ class Problem(NamedTuple):
 
 
 Check = Callable[[float, Values, CompanionSettings], Problem | None]
-"""Judges a parameter by its value, the other values (which may be absent) and our settings."""
+"""Judges a parameter from its value, the other parameters (some may be absent) and the settings."""
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterRule:
-    """One parameter that matters.
+    """A rule for one parameter.
 
     Attributes:
-        names: Its names, the newest first; older versions use the others.
-        meaning: What it decides, one clause.
-        check: Judges its value; returns `None` if the value is right.
-        source: How this is known.
-        vital: Without it the effect of a setpoint, or for how long it is held, is unknown. A
+        names: Names of the parameter, the newest first; older versions use the others.
+        meaning: What the parameter decides, one clause.
+        check: Judges the value; returns `None` if the value is right.
+        source: Where this rule comes from.
+        vital: Without the parameter it is unknown what a setpoint does, or how long it is held. A
             vehicle that does not send it is not flown.
-        universal: Every supported version has it, and some value of it is unsafe. If it was not
-            received on a link that loses frames, it may hold such a value.
+        universal: Every supported version has the parameter, and some of its values are unsafe. If
+            it was not received on a link that loses frames, it may have such a value.
         instead: Name of the rule for the parameter that other versions have in its place.
         reboot: A change takes effect only after the autopilot restarts.
     """
@@ -109,19 +109,19 @@ class ParameterRule:
 
 
 _NO_NUMBER = Problem(
-    CheckResult.UNSAFE, "that is no number, and what the autopilot makes of it is unknown"
+    CheckResult.UNSAFE, "the value is not a number, and its effect on the autopilot is unknown"
 )
 
 
 class ParameterFinding(NamedTuple):
-    """What a rule found.
+    """The result of one rule.
 
     Attributes:
-        rule: Which rule.
+        rule: The rule.
         value: The autopilot's value.
-        result: How bad it is.
-        because: What follows from it; empty if it is safe.
-        set_to: What to set it to, or `None`.
+        result: Severity.
+        because: Consequence of the value; empty if it is safe.
+        set_to: Value to which the parameter should be set, or `None`; see `Problem`.
     """
 
     rule: ParameterRule
@@ -134,9 +134,9 @@ class ParameterFinding(NamedTuple):
 def judge(
     rules: Iterable[ParameterRule], values: Values, settings: CompanionSettings
 ) -> list[ParameterFinding]:
-    """Apply the rules, in their order; a parameter that the autopilot lacks is left out.
+    """Apply the rules in their order; a rule whose parameter is absent is left out.
 
-    A value that is NaN or infinite is unsafe under every rule, and hidden from other rules.
+    A value that is NaN or infinite is unsafe under every rule, and is not shown to other rules.
     """
     findings = []
     finite = {name: value for name, value in values.items() if isfinite(value)}

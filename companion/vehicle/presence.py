@@ -1,4 +1,4 @@
-"""What the link sends unasked: heartbeats and clock requests; and why no heartbeat came back.
+"""Heartbeats and TIMESYNC requests that the link sends, and why no heartbeat came.
 
 Sources: the MAVLink heartbeat and time synchronisation protocols.
 """
@@ -26,7 +26,7 @@ _NS = 1e-9
 
 
 def send_heartbeat(settings: LinkSettings, outbox: Outbox) -> None:
-    """Send one HEARTBEAT: an onboard controller (or what the settings say), active."""
+    """Send one HEARTBEAT of the configured type, with the state active."""
     outbox.message(
         dialect.MAVLink_heartbeat_message(
             type=settings.heartbeat_type,
@@ -52,13 +52,13 @@ class _Exchange(NamedTuple):
 
 
 class TimeSync:
-    """Asks for the vehicle's time for `VehicleClock`, and answers the vehicle's own requests.
+    """Sends TIMESYNC requests, gives the answers to `VehicleClock`, and answers the vehicle's own.
 
     Args:
-        outbox: Takes what is sent.
-        router: Brings TIMESYNC.
-        clock: Our time in s (the event loop's).
-        vehicle_clock: Takes each exchange.
+        outbox: Sends requests and answers.
+        router: Delivers TIMESYNC.
+        clock: Returns the event-loop time, s.
+        vehicle_clock: Takes each exchange of request and answer.
     """
 
     def __init__(
@@ -69,38 +69,38 @@ class TimeSync:
         vehicle_clock: VehicleClock,
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
-        self._asked: deque[int] = deque(maxlen=_WINDOW)
+        self._requests: deque[int] = deque(maxlen=_WINDOW)
         self._exchanges: deque[_Exchange] = deque(maxlen=_WINDOW)
         router.subscribe("TIMESYNC", self._on_timesync)
 
     @property
     def round_trip_s(self) -> float | None:
-        """The shortest recent round trip, s; `None` if none was answered recently."""
+        """The shortest recent round trip, s; `None` if no recent request was answered."""
         return min(self._round_trips(), default=None)
 
     @property
     def jitter_s(self) -> float | None:
-        """How far recent round trips differ, s; `None` if none was answered."""
+        """Range of the recent round trips, s; `None` if no recent request was answered."""
         trips = self._round_trips()
         return max(trips) - min(trips) if trips else None
 
     def ask(self) -> None:
         """Send one request."""
         stamp = self._now_ns()
-        self._asked.append(stamp)
+        self._requests.append(stamp)
         self._outbox.message(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
 
     def reset(self) -> None:
-        """Forget all, after a reconnect: the vehicle may have restarted."""
-        self._asked.clear()
+        """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
+        self._requests.clear()
         self._exchanges.clear()
 
     def _on_timesync(self, message: Message) -> None:
         now = self._now_ns()
         if message.tc1 == 0:
             self._outbox.message(dialect.MAVLink_timesync_message(tc1=now, ts1=message.ts1))
-        elif message.ts1 in self._asked:  # else it answers another station
-            self._asked.remove(message.ts1)
+        elif message.ts1 in self._requests:  # otherwise it answers another station
+            self._requests.remove(message.ts1)
             self._exchanges.append(_Exchange((now - message.ts1) * _NS, now * _NS))
             self._vehicle_clock.exchange(message.ts1 * _NS, now * _NS, message.tc1)
 
@@ -114,7 +114,7 @@ class TimeSync:
 
 
 async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
-    """Ask for the vehicle's time until cancelled."""
+    """Send TIMESYNC requests until cancelled: quickly at first, then one each second."""
     now = asyncio.get_running_loop().time
     for _ in range(_QUICK_REQUESTS):
         timesync.ask()
@@ -122,13 +122,13 @@ async def synchronise(timesync: TimeSync, clock: VehicleClock) -> None:
     while True:
         timesync.ask()
         await asyncio.sleep(_PERIOD_S)
-        clock.look(now())
+        clock.update(now())
 
 
 def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
-    """No heartbeat of the autopilot came within `timeout_s`."""
+    """The error message if no heartbeat of the autopilot came within `timeout_s`."""
     start = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    refused = _refused(start, stats)
+    refused = _why_refused(start, stats)
     if refused is not None:
         return refused
     if stats.bad_crc:
@@ -137,18 +137,18 @@ def no_heartbeat(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> 
 
 
 def no_beacon(settings: LinkSettings, stats: LinkStats) -> str:
-    """No lockstep beacon came within `first_beacon_timeout_s`."""
+    """The error message if no lockstep beacon came within `first_beacon_timeout_s`."""
     start = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
     why = f"{start} on {settings.endpoint}; is the vehicle running, and in lockstep?"
-    return _refused(start, stats) or why
+    return _why_refused(start, stats) or why
 
 
-def _refused(start: str, stats: LinkStats) -> str | None:
-    """Which messages arrived and were refused while no heartbeat was accepted; None: none."""
+def _why_refused(start: str, stats: LinkStats) -> str | None:
+    """The error message if frames arrived and all were refused; None if none arrived."""
     if stats.unclaimed:
         return (
-            f"{start}, but {stats.unclaimed} other frames with its ids; no sender is taken for the "
-            "vehicle before its autopilot's heartbeat"
+            f"{start}, but {stats.unclaimed} other frames with its ids; a sender counts as the "
+            "vehicle only after a heartbeat of its autopilot"
         )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))
@@ -158,7 +158,8 @@ def _refused(start: str, stats: LinkStats) -> str | None:
         )
     if stats.bad_signature:
         return (
-            f"{start}, but {stats.bad_signature} frames not signed with our key, or with a time "
-            "stamp that is not believed"
+            f"{start}, but {stats.bad_signature} frames that are not signed with the key in "
+            "link.signing_key_file, or whose time stamp is refused; give both sides the same key, "
+            "and set this computer's clock"
         )
     return None

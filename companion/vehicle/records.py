@@ -8,33 +8,33 @@ from companion.vehicle.clock_jumps import Misfit
 Vector = tuple[float, float, float]
 
 _LASTS = 5.0
-"""Telemetry that comes at 1 Hz or faster counts as unknown after this time without it, s."""
+"""Telemetry older than this counts as unknown, s; it should come at 1 Hz or faster."""
 
 
 def outdated(received: float, now: float) -> bool:
-    """Whether a status from `received` is too old at `now` to count; both in s of our clock."""
+    """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
     return now - received > _LASTS
 
 
 GPS_FIX_3D = 3
-"""Of GPS_FIX_TYPE, this and above."""
+"""GPS_FIX_TYPE of a 3D fix; higher numbers are 3D fixes too."""
 
 
 class AttitudeSample(NamedTuple):
-    """One ATTITUDE_QUATERNION, every number finite; the norm of `q` is not judged here.
+    """One ATTITUDE_QUATERNION. All numbers are finite; the norm of `q` has not been checked.
 
     Attributes:
-        time_boot_ms: The vehicle's time stamp as it came, ms since its boot.
-        vehicle_time: The same in s; the control law's clock. It goes on where the vehicle's clock
-            jumps or restarts.
-        received: Event-loop time of arrival, s; the watchdogs' clock.
-        received_ns: `time.perf_counter_ns()` at which it reached this computer (over UDP, by the
-            kernel's stamp) or was read; for latency.
+        time_boot_ms: The vehicle's time stamp as received, ms since its boot.
+        vehicle_time: The time stamp in s, without jumps and restarts of the vehicle's clock. The
+            control laws use it.
+        received: Event-loop time of arrival, s. The watchdogs use it.
+        received_ns: `time.perf_counter_ns()` of arrival, to measure latency. Over UDP it is the
+            time at which the kernel received the datagram, otherwise the time of reading.
         q: Attitude (w, x, y, z), body FRD -> world NED.
         body_rates: Measured rates about body x, y, z, rad/s.
-        age: How old it was when it arrived, s, as `VehicleClock` says; NaN for a misfit.
-        misfit: Why it does not fit the vehicle's clock and must not be used, or None.
-        age_known: Whether `age` is absolute; else it counts from the quickest sample's.
+        age: Age at arrival by `VehicleClock`, s; NaN for a misfit.
+        misfit: Why the sample does not fit the vehicle's clock and must not be used, or None.
+        age_known: Whether `age` is absolute; see `VehicleClock.age_known`.
     """
 
     time_boot_ms: int
@@ -56,8 +56,8 @@ class Heartbeat(NamedTuple):
         autopilot: MAV_AUTOPILOT.
         vehicle_type: MAV_TYPE.
         mode: The autopilot's name for the mode.
-        custom_mode: The same as a number.
-        armed: Motors may turn.
+        custom_mode: The autopilot's number for the mode.
+        armed: Whether the vehicle is armed.
         system_status: MAV_STATE: 3 standby, 4 active, 5 critical (failsafe).
     """
 
@@ -76,7 +76,7 @@ class CurrentMode(NamedTuple):
     Attributes:
         received: Event-loop time, s.
         mode: The autopilot's name for the mode.
-        intended: The mode that the user commanded last; differs while a failsafe acts.
+        intended: The mode that the user commanded last; it differs while a failsafe acts.
     """
 
     received: float
@@ -127,12 +127,12 @@ class GlobalPosition(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """SYS_STATUS and BATTERY_STATUS; `None` where the vehicle does not know.
+    """SYS_STATUS or BATTERY_STATUS; a value that the vehicle does not know is `None`.
 
     Attributes:
         received: Event-loop time, s.
-        voltage_v: Of the whole battery, V.
-        remaining: 0..1.
+        voltage_v: Voltage of the whole battery, V.
+        remaining: Remaining charge, 0..1.
     """
 
     received: float
@@ -141,11 +141,11 @@ class Battery(NamedTuple):
 
 
 class AttitudeTargetThrust(NamedTuple):
-    """ATTITUDE_TARGET: the setpoint of the autopilot's attitude and rate control, from any source.
+    """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source.
 
     Attributes:
         received: Event-loop time, s.
-        thrust: Collective, 0..1.
+        thrust: Collective thrust, 0..1.
     """
 
     received: float
@@ -156,8 +156,8 @@ class AttitudeTarget(NamedTuple):
     """ATTITUDE_TARGET: the attitude along whose axes the autopilot takes body rates.
 
     Attributes:
-        time_boot_ms: The vehicle's time stamp as it came, ms since its boot.
-        q: Body FRD -> world NED, of unit length.
+        time_boot_ms: The vehicle's time stamp as received, ms since its boot.
+        q: Attitude (w, x, y, z), body FRD -> world NED, of unit norm.
     """
 
     time_boot_ms: int
@@ -170,8 +170,8 @@ class Gps(NamedTuple):
     Attributes:
         received: Event-loop time, s.
         fix_type: GPS_FIX_TYPE; 3 or more is a 3D fix.
-        satellites: Number in use; `None`: unknown.
-        altitude_m: Above mean sea level, m.
+        satellites: Number of satellites; `None`: unknown.
+        altitude_m: Altitude above mean sea level, m.
     """
 
     received: float
@@ -181,7 +181,7 @@ class Gps(NamedTuple):
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
-    """What is wrong at `now`, s of our clock, with a GPS that had a 3D fix; `None`: nothing."""
+    """What is wrong with a GPS that had a 3D fix, at event-loop time `now` (s); `None`: nothing."""
     if gps is None or outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None
@@ -192,7 +192,7 @@ class Prearm(NamedTuple):
 
     Attributes:
         received: Event-loop time, s.
-        good: They pass.
+        good: Whether the checks pass.
     """
 
     received: float
@@ -206,8 +206,8 @@ class Home(NamedTuple):
         received: Event-loop time, s.
         latitude_deg: WGS84.
         longitude_deg: WGS84.
-        altitude_m: Above mean sea level, m.
-        down: In the local frame of LOCAL_POSITION_NED, m.
+        altitude_m: Altitude above mean sea level, m.
+        down: Down coordinate in the frame of LOCAL_POSITION_NED, m.
     """
 
     received: float
@@ -218,7 +218,7 @@ class Home(NamedTuple):
 
 
 class Estimator(NamedTuple):
-    """ESTIMATOR_STATUS, or EKF_STATUS_REPORT, whose flags mean the same.
+    """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same.
 
     Attributes:
         received: Event-loop time, s.

@@ -15,22 +15,23 @@ AUTOPILOTS: tuple[Autopilot, ...] = (Px4(), ArduPilot())
 AUTOPILOT_NAMES = " or ".join(
     f"{autopilot.name} ({autopilot.mav_autopilot})" for autopilot in AUTOPILOTS
 )
-"""For people, with their MAV_AUTOPILOT numbers."""
+"""Names to show to users, with the MAV_AUTOPILOT numbers."""
 
 MULTIROTORS = frozenset({2, 3, 13, 14, 15, 29, 35})
-"""MAV_TYPE of four, two coaxial, six, eight, three, twelve and ten rotors."""
+"""MAV_TYPE of multirotors: quadrotor, coaxial, hexa-, octo-, tri-, dodeca- and decarotor."""
 
 
 def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
-    """The autopilot of a heartbeat, by its `autopilot` and `type` fields.
+    """The autopilot of a heartbeat with these `autopilot` and `type` fields.
 
     Raises:
-        UnsupportedAutopilot: We do not fly it, or it is no multirotor: on a plane the same mode
-            numbers mean something else.
+        UnsupportedAutopilot: This program cannot fly the autopilot, or the vehicle is not a
+            multirotor: on a plane the same mode numbers mean something else.
     """
     if vehicle_type not in MULTIROTORS:
         raise UnsupportedAutopilot(
-            f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor, and only those are flown"
+            f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor; this program flies only "
+            "multirotors"
         )
     for autopilot in AUTOPILOTS:
         if autopilot.mav_autopilot == mav_autopilot:
@@ -45,8 +46,8 @@ def read_events(router: Router, texts: TextAssembler, clock: Callable[[], float]
     """Turn PX4's events into texts; on some links it sends them instead of STATUSTEXT.
 
     Args:
-        router: brings EVENT.
-        texts: takes the words.
-        clock: loop time, s.
+        router: delivers EVENT.
+        texts: takes the texts.
+        clock: returns the event-loop time, s.
     """
     router.subscribe_raw("EVENT", EventReader(texts, clock).take)

@@ -1,4 +1,4 @@
-"""What the vehicle's telemetry tells. Values that are not finite are never kept."""
+"""The vehicle's newest telemetry. Values that are not finite are never kept."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -29,7 +29,7 @@ from companion.vehicle.records import (
 )
 
 GROUND_HEIGHT = 1.5
-"""Height above home that may be read on the ground, m: the estimate drifts."""
+"""Largest height above home that counts as on the ground, m: the estimate drifts."""
 _UNKNOWN_U16 = 65535
 _PREARM_CHECK = 0x10000000
 _UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
@@ -53,21 +53,21 @@ class _Values:
 
 
 class VehicleState(ModeState, _Values):
-    """The newest of each, `None` until it came; stamped with the time of arrival.
+    """The newest record of each kind of telemetry; each is `None` until its message has come.
 
-    Mode and arming are those of `ModeState`.
+    Mode and arming are in the base class `ModeState`.
 
     Attributes:
-        landed_state: See `Landed`; `landed` and `taking_off` ignore an outdated one.
-        position: See `LocalPosition`; the newest by its own time stamp.
-        attitude_target: See `AttitudeTarget`; only if the autopilot takes `rates_along_target`. One
-            that is no unit quaternion is ignored.
+        landed_state: See `Landed`; `landed`, `flying` and `taking_off` ignore an outdated one.
+        position: See `LocalPosition`; the newest by the vehicle's time stamp.
+        attitude_target: See `AttitudeTarget`; only for an autopilot with `rates_along_target`. It
+            is ignored if it is not a unit quaternion.
         global_position: See `GlobalPosition`; `None` while the vehicle does not know it.
         attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
-        positions: How many positions were taken.
+        positions: Number of positions taken.
         gps_was_good: Whether GPS has had a 3D fix since the link was opened.
-        reset_counter: ODOMETRY: rises whenever the estimator jumps.
-        texts: What it said, newest last.
+        reset_counter: Counter in ODOMETRY that rises whenever the estimate jumps.
+        texts: Texts of the autopilot, newest last.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class VehicleState(ModeState, _Values):
             router.subscribe(name, callback)
 
     def forget(self) -> None:
-        """Forget all but the newest heartbeat: the rest may come from another vehicle."""
+        """Forget everything but the newest heartbeat: the rest may be of another vehicle."""
         self.current_mode, self.armings = None, 0
         fresh = _Values()
         for field in fields(_Values):
@@ -108,34 +108,34 @@ class VehicleState(ModeState, _Values):
 
     @property
     def landed(self) -> bool:
-        """Whether the autopilot says that it stands on the ground; unknown is not landed."""
+        """Whether the autopilot reports that it is on the ground; False if unknown."""
         return self._landed_state() == LANDED_ON_GROUND
 
     @property
     def flying(self) -> bool:
-        """Whether the autopilot says that it is in the air; unknown is not flying."""
+        """Whether the autopilot reports that it is in the air; False if unknown."""
         return self._landed_state() not in (None, _UNDEFINED, LANDED_ON_GROUND)
 
     @property
     def taking_off(self) -> bool:
-        """Whether the autopilot says that its take-off is not over yet."""
+        """Whether the autopilot reports that it is taking off."""
         return self._landed_state() == LANDED_TAKEOFF
 
     @property
     def battery_silent(self) -> bool:
-        """Whether the battery was reported and no longer is."""
+        """Whether the battery was reported before and is not any more."""
         return self.battery is not None and outdated(self.battery.received, self._clock())
 
     @property
     def height(self) -> float | None:
-        """Height above home, m."""
+        """Height above home, m; None while position or home is unknown."""
         if self.position is None or self.home is None:
             return None
         return self.home.down - self.position.position_ned[2]
 
     @property
     def readiness(self) -> Readiness:
-        """What the autopilot needs before arming; what is outdated counts as unknown."""
+        """The telemetry that decides about arming; outdated telemetry counts as unknown."""
         now = self._clock()
         prearm, estimator, position = self.prearm, self.estimator, self.position
         return Readiness(
@@ -147,15 +147,15 @@ class VehicleState(ModeState, _Values):
 
     @property
     def gps_fault(self) -> str | None:
-        """What is wrong with a GPS that was good, in words, or `None`."""
+        """What is wrong with a GPS that has had a 3D fix, in words; `None`: nothing."""
         return gps_fault(self.gps, self._clock()) if self.gps_was_good else None
 
     def _on_extended_sys_state(self, message: Message) -> None:
         self.landed_state = Landed(self._clock(), message.landed_state)
 
     def _landed_state(self) -> int | None:
-        told = self.landed_state
-        return None if told is None or outdated(told.received, self._clock()) else told.state
+        landed = self.landed_state
+        return None if landed is None or outdated(landed.received, self._clock()) else landed.state
 
     def _on_local_position(self, message: Message) -> None:
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)
@@ -169,7 +169,7 @@ class VehicleState(ModeState, _Values):
         elif (
             last is not None
             and stamp <= last.vehicle_time
-            and not clock.is_ahead(last.vehicle_time, now)  # it came before the clock was known
+            and not clock.is_ahead(last.vehicle_time, now)  # came before the clock was known
         ):
             self._stats.outdated += 1
         else:
@@ -215,7 +215,7 @@ class VehicleState(ModeState, _Values):
 
     def _on_global_position(self, message: Message) -> None:
         if message.lat == message.lon == 0:
-            return  # ArduPilot sends zeros until it knows
+            return  # ArduPilot sends zeros until it knows its position
         self.global_position = GlobalPosition(self._clock(), message.lat / 1e7, message.lon / 1e7)
 
     def _on_gps(self, message: Message) -> None:

@@ -1,4 +1,4 @@
-"""Requests message rates, and counts what really comes."""
+"""Requests message rates, and measures the rates at which messages arrive."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -16,18 +16,18 @@ _TIMEOUT_S = 1.0
 _RETRIES = 3
 _DENIED = 2
 _HALVINGS = 3
-_ROUNDING = 1e-6  # so that 1e6 / 333.333… does not lose a whole step
+_ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
 
 
 class StreamRate(NamedTuple):
-    """A message's rate as requested, granted and counted, Hz.
+    """The rate of one message, as requested, granted and measured, Hz.
 
     Attributes:
-        asked: Requested rate; 0 asked the autopilot to stop sending it.
-        granted: What the autopilot agreed to; 0 if it refused altogether.
-        achieved: Counted over the window. An ACK says nothing about it: PX4 accepts every
-            request and sends what its loops allow.
-        refusal: The autopilot's answer if it refused, otherwise empty.
+        asked: Requested rate; 0 requests that the message stops.
+        granted: Rate that the autopilot accepted; 0 if it refused all rates.
+        achieved: Measured rate. It may differ from `granted`: PX4 accepts every request, and sends
+            as often as its loops allow.
+        refusal: Result of the last refused request if all were refused, otherwise empty.
     """
 
     asked: float
@@ -43,22 +43,22 @@ async def set_rates(
     window_s: float,
     interval_step_us: int,
 ) -> dict[str, StreamRate]:
-    """Request an interval for each message, then count for `window_s` seconds.
+    """Request an interval for each message, then count arrivals for `window_s` seconds.
 
-    A denied rate is halved until it is granted: ArduPilot denies rates above its loop rate, and
-    keeps the rate it had.
+    ArduPilot denies a rate above its loop rate and keeps the old one, so a denied rate is halved
+    and requested again, up to three times.
 
     Args:
         commands: Sends the requests.
-        stats: Counts what comes.
-        rates: In Hz, by message; 0 stops one.
-        window_s: How long to count, s.
-        interval_step_us: Intervals are rounded down to whole multiples of this.
+        stats: Counts the messages that arrive.
+        rates: Rate of each message, Hz; 0 stops the message.
+        window_s: Time of counting, s.
+        interval_step_us: Intervals are rounded down to a whole multiple of this, us.
 
     Raises:
-        UnknownMessage: A name is not in the dialect; nothing was sent then.
+        UnknownMessage: A name is not in the dialect; nothing was sent.
         CommandTimeout: The autopilot did not answer a request.
-        LinkLost: The connection dropped meanwhile.
+        LinkLost: The connection dropped while waiting.
     """
     numbers = {name: message_id(name) for name in rates}
     answers = {
@@ -75,7 +75,7 @@ async def set_rates(
 async def _request(
     commands: CommandClient, number: int, rate: float, interval_step_us: int
 ) -> tuple[float, str]:
-    """Request one message; what was granted in Hz, and the last refusal if nothing was."""
+    """Request one message; return the granted rate in Hz, and the last refusal if it is 0."""
     refusal = ""
     for _ in range(_HALVINGS + 1):
         interval_us = _DISABLE

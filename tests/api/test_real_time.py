@@ -18,10 +18,12 @@ def test_a_coroutine_that_blocks_for_a_second_leaves_the_vehicle_held(tmp_path):
         async def main():
             async with companion.connect(config, folder=tmp_path) as vehicle:
                 await vehicle.take_off()
+                blocked = False
                 async with vehicle.control() as control:
                     async for _ in control.states(seconds=10.0):
                         control.accelerate((0.3, 0.0, 0.0))
-                        if control.state.velocity_ned[0] > 0.3:
+                        if not blocked and control.state.velocity_ned[0] > 0.3:
+                            blocked = True
                             time.sleep(1.0)  # noqa: ASYNC251
 
         with pytest.raises(companion.FlightEnded) as ended:

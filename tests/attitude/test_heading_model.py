@@ -16,7 +16,7 @@ def heading_model(limits=UNLIMITED, lag=0.075, acceleration=np.inf, yaw_gain=2.0
     model = HeadingModel(
         make_constants(5.0, yaw_gain, limits), AxisResponse(lag, 0.1, acceleration)
     )
-    model.place(0.3, 0.0)
+    model.start_at(0.3, 0.0)
     return model
 
 

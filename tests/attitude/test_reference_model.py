@@ -17,7 +17,7 @@ AT_REST = Coefficients(0.0, 0.0)
 
 def placed(start, limits=Limits(), lag=0.05, speed=AT_REST, gain=5.0, **response):  # noqa: B008
     model = ReferenceModel(make_constants(gain, 2.0, limits), lag, **response)
-    model.place(Coefficients(*start), Coefficients(*speed))
+    model.start_at(Coefficients(*start), Coefficients(*speed))
     return model
 
 

@@ -197,7 +197,7 @@ def test_what_realtime_requires_and_is_refused_is_named_and_nothing_is_flown(cap
     endpoint = f"udpin://127.0.0.1:{free_port()}"
     code, _, err = run(capsys, "fly", "--config", path, "--endpoint", endpoint)
     assert code == 2
-    assert "processor 1023: not granted: no processor 1023 for this program, which has 0" in err
+    assert "processor 1023: not granted: processor 1023 is not available to this program" in err
     assert list((tmp_path / "flights").iterdir()) == []
 
 

@@ -48,7 +48,7 @@ def test_the_demo_flies_shows_and_can_be_drawn(folder):
     options = ("--config", quick_demo(folder), "--lockstep", "--maneuvers", "steps", "--json")
     done = companion(folder, "demo", *options)
     assert done.returncode == 0, done.stderr
-    assert "flight ok" in done.stderr
+    assert "The flight was good: steps" in done.stderr
     assert "time constant north" in done.stderr
     result = json.loads(done.stdout)
     assert (result["result"], result["phase"]) == ("ok", "disarm")

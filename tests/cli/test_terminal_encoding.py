@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from companion.cli.text_streams import ascii_for
 from companion.demo import free_port
+from companion.files.ascii_text import ascii_for
 from tests.cli.test_demo import quick_demo
 
 ASCII = {"PYTHONIOENCODING": "ascii"}
@@ -68,11 +68,11 @@ def test_no_character_is_written_as_one_that_would_break_json():
 def test_a_good_flight_is_good_on_any_terminal(tmp_path, environment):
     options = ("--config", quick_demo(tmp_path), "--lockstep", "--maneuvers", "steps")
     done = companion(tmp_path, environment, "demo", *options)
-    assert_said(done, 0, b"flight ok", b"sample in -> setpoint out", b"landing")
+    assert_said(done, 0, b"The flight was good", b"open loop", b"landing")
     assert b"Recorded in" in done.stdout  # to the very end
     if environment is not LATIN:
         assert done.stdout.isascii()
-        assert b" us" in done.stdout
+        assert b" deg tilted" in done.stdout
         assert b"?" not in done.stdout
     (log,) = (path for path in (tmp_path / "flights").iterdir() if path.is_dir())
     told = companion(tmp_path, environment, "identify", "--log", log)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.config import Config
-from companion.control.outer_loop import disturbance_bandwidth, hold_delay, hold_weights
+from companion.control.outer_loop import attitude_delay, disturbance_bandwidth, hold_weights
 from companion.files import bounded_yaml
 from companion.files.yaml_file import parse
 from tests.control.one_axis import Airframe, hold, settled
@@ -38,14 +38,14 @@ def real(lag_ms, dead_ms, slower=1.0, strength=1.0):
 
 def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     config = believed(47.0, 40.0)
-    delay = hold_delay(config)
+    delay = attitude_delay(config)
     assert delay == pytest.approx(0.25 + 0.0625 + 0.04 + 0.01)  # 1/p, model's lag, dead time, T/2
     weights = hold_weights(config)
     nobody_knows = hold_weights(parse("{}", "test", Config))
     assert nobody_knows.position == pytest.approx(0.33**-4)
     assert (weights.position, weights.velocity) == pytest.approx((2.0 * delay**-4, delay**-2))
     heavy = believed(*VEHICLES[-1])
-    assert hold_weights(heavy).position == pytest.approx(hold_delay(heavy) ** -4)
+    assert hold_weights(heavy).position == pytest.approx(attitude_delay(heavy) ** -4)
     assert disturbance_bandwidth(config) == pytest.approx(1.5 / delay)
     told = believed(
         47.0,

@@ -17,7 +17,7 @@ def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name(tmp_path):
     for name, summary in (("refused", refused), ("accepted", accepted)):
         told[name] = [text for _, text in summary.events]
     assert (refused.phase, accepted.phase, accepted.result) == ("checks", "disarm", "ok")
-    assert refused.result.startswith("COM_OF_LOSS_T is 5: when our setpoints stop")
+    assert refused.result.startswith("COM_OF_LOSS_T is 5: when setpoints stop")
     assert refused.result.endswith("set COM_OF_LOSS_T to 0.75")
     assert "unsafe, but excepted by flight.accept: " + refused.result in told["accepted"]
     assert (

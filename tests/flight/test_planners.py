@@ -21,7 +21,8 @@ from companion.attitude import (
 from companion.config.files import load
 from companion.flight import assembly
 from companion.mavlink import loop
-from tests.flight.fly import fly, mock_vehicle, session_for
+from tests.flight import sockets
+from tests.flight.fly import fly, mock_vehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -174,10 +175,10 @@ def test_the_order_is_the_same_in_real_time(tmp_path):
             folder = tmp_path / name
             folder.mkdir()
             mock = stack.enter_context(
-                mock_vehicle(folder, in_lockstep=False, seed=3, speed=1.0, rate_loop="px4")
+                sockets.mock_vehicle(folder, in_lockstep=False, seed=3, speed=1.0, rate_loop="px4")
             )
             changes = {"planner": {"name": name}, "vehicle": shipped_vehicle("px4")}
-            sessions.append(session_for(mock, folder / "log", **FIGURE_2, **changes))
+            sessions.append(sockets.session_for(mock, folder / "log", **FIGURE_2, **changes))
 
         async def fly_all():
             return await asyncio.gather(*(session.fly() for session in sessions))

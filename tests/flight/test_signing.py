@@ -48,7 +48,7 @@ def test_keys_that_do_not_fit(theirs, ours, said, keys, tmp_path):
     assert sum(said in text for _, text in summary.events) == 1
     assert (truth["armed"], truth["setpoints"], truth["mode"]) == (False, 0, "LOITER")
     if theirs is None:
-        assert "frames not signed with our key" in summary.result
+        assert "frames that are not signed with the key" in summary.result
     else:
         assert truth["signing"]["accepted"] == 0
         assert truth["signing"]["unsigned" if ours is None else "refused"] > 0
@@ -74,7 +74,7 @@ def test_with_the_clock_months_back_the_vehicle_is_heard_and_obeys(autopilot, ke
         truth = mock.state()
     assert truth["signing"]["accepted"] > 0
     assert truth["signing"]["refused"] == 0
-    assert any("days behind the vehicle, which has our key" in notice for notice in notices)
+    assert any("days behind the vehicle, which has the right key" in notice for notice in notices)
 
 
 def test_another_system_id_is_not_heard(tmp_path):
@@ -105,5 +105,5 @@ def test_without_a_beacon_that_is_signed_lockstep_says_why(keys, tmp_path):
             lockstep=True,
             first_beacon_timeout_s=2.0,
         )
-        with pytest.raises(LinkTimeout, match="frames not signed with our key"):
+        with pytest.raises(LinkTimeout, match="frames that are not signed with the key"):
             lockstep.run(connect(settings))

@@ -58,15 +58,12 @@ def test_one_seed_gives_one_log_to_the_bit(twice):
 
 
 @pytest.mark.slow
-def test_another_seed_gives_another_log(twice, tmp_path):
-    """Compared as far as the first maneuver leads."""
-    logs = [twice[0].log / "flight.tlog"]
-    for seed in (7, 8):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        with mock_vehicle(folder, seed=seed, in_lockstep=True) as mock:
-            logs.append(fly(mock, folder / "log", **HOVER).log / "flight.tlog")
-    once, same, other = (log.read_bytes()[:100_000] for log in logs)
+def test_another_seed_gives_another_log(tmp_path):
+    logs = []
+    for number, seed in enumerate((7, 7, 8)):
+        with mock_vehicle(seed=seed, in_lockstep=True) as mock:
+            logs.append(fly(mock, tmp_path / str(number), **HOVER).log / "flight.tlog")
+    once, same, other = (log.read_bytes() for log in logs)
     assert once == same != other
 
 

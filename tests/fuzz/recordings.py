@@ -123,9 +123,9 @@ def _undo_text(draw: Any) -> str:
 
 
 @st.composite
-def _figures(draw: Any) -> str:
+def _figures(draw: Any, columns: int = 7) -> str:
     """A table of numbers under a header, such as a flight writes."""
-    width = draw(st.sampled_from((7, 7, 7, 1, 3, 9)))
+    width = draw(st.sampled_from((columns, columns, columns, 1, 3, 9)))
     row = st.lists(st.one_of(numbers, st.floats(-1.0, 1.0)), min_size=width, max_size=width)
     rows = draw(st.lists(row, max_size=4)) * draw(st.sampled_from((1, 1, 5)))
     step = draw(st.sampled_from((0.004, 0.1, 0.0, -0.1, 1.0)))
@@ -137,8 +137,21 @@ _tables = st.fixed_dictionaries(
     {"tracking.csv": st.one_of(_figures(), mutated(_figures()))},
     optional={
         "response.csv": _figures(),
+        "motion.csv": _figures(6),
         "summary.json": st.sampled_from(
-            ('{"gain_per_s": 5.0}', '{"gain_per_s": 0}', "[]", "{}", '{"gain_per_s": NaN}', "{")
+            (
+                '{"gain_per_s": 5.0}',
+                '{"gain_per_s": 0}',
+                "[]",
+                "{}",
+                '{"gain_per_s": NaN}',
+                "{",
+                '{"gain_per_s": 5.0, "phases": 3, "maneuvers": []}',
+                '{"phases": [], "maneuvers": [], "early_end": {"time_s": 1e999}, "result": ""}',
+                '{"gain_per_s": 5.0, "phases": [{"time_s": 1, "name": "$a"}], "result": "$_{",'
+                ' "maneuvers": [{"name": "", "begin_s": 2, "duration_s": -1, "open_loop": 1}],'
+                ' "early_end": {"time_s": 1e8}}',
+            )
         ),
     },
 )

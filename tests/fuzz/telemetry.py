@@ -14,6 +14,7 @@ from unittest import mock
 from companion.config import Config
 from companion.flight.environment import Environment
 from companion.flight.session import Session
+from companion.flight.status import FlightStatus
 from tests.fuzz import virtual_time
 from tests.fuzz.channel import Channel
 from tests.fuzz.family import ARDUPILOT, PX4
@@ -55,6 +56,9 @@ class Outcome:
             self.channel.phase(name)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Nothing."""
+
+    def status(self, status: FlightStatus) -> None:
         """Nothing."""
 
     def event(self, time: float, text: str) -> None:

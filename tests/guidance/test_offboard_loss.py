@@ -7,16 +7,16 @@ import pytest
 from companion.drag import NO_DRAG, Drag
 from companion.guidance import GRAVITY
 from companion.guidance.fence import Fence
-from companion.guidance.offboard_loss import Flown, Loss, path_thrust, reach
+from companion.guidance.offboard_loss import LossFailsafe, MotionAtLoss, path_thrust, reach
 
 LEVEL, NOTHING = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.0)
 FENCE = Fence(50.0, 30.0, 1.0, (), (), 2.5, 0.3)
-PX4 = Loss(1.0, brakes=True, drag=NO_DRAG, max_tilt_rate=pi, fence=FENCE)
+PX4 = LossFailsafe(1.0, brakes=True, drag=NO_DRAG, max_tilt_rate=pi, fence=FENCE)
 ARDUPILOT = PX4._replace(brakes=False)
 
 
 def flown(velocity=NOTHING, thrust=LEVEL, turn=NOTHING):
-    return Flown(NOTHING, velocity, thrust, turn)
+    return MotionAtLoss(NOTHING, velocity, thrust, turn)
 
 
 def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it():

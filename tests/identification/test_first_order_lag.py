@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.identification.lags import held, lagged, slewed, value_at
+from companion.identification.lags import held_commands, lagged, slewed, value_at
 
 
 def recursion(commands, lag, at):
@@ -27,7 +27,7 @@ def test_running_sums_are_the_recursion_however_long_the_record(lag, slew):
     rng = np.random.default_rng(4)
     steps = rng.uniform(0.004, 0.02, size=2000)
     steps[[300, 301, 900]] = 0.9  # with a lag of 1 ms more than an exponential can bear
-    commands = held(np.cumsum(steps), rng.normal(size=2000))
+    commands = held_commands(np.cumsum(steps), rng.normal(size=2000))
     if slew is not None:
         commands = slewed(commands, slew)
     at = np.sort(rng.uniform(commands.time[0], commands.time[-1] + 2.0, size=3000))
@@ -36,16 +36,22 @@ def test_running_sums_are_the_recursion_however_long_the_record(lag, slew):
 
 def test_commands_that_hardly_differ_make_no_piece_of_their_own():
     time = np.arange(6.0)
-    commands = held(time, np.array([0.0, 0.004, -0.004, 0.02, 0.024, 0.0]), alike=0.005)
+    commands = held_commands(
+        time, np.array([0.0, 0.004, -0.004, 0.02, 0.024, 0.0]), tolerance=0.005
+    )
     assert commands.time.tolist() == [0.0, 3.0, 5.0]
     assert value_at(commands, np.array([2.5, 4.5])).tolist() == [0.0, 0.02]
-    assert held(time, np.array([0.0, 0.0, 1e-9, 1e-9, 0.0, 0.0])).time.tolist() == [0.0, 2.0, 4.0]
+    assert held_commands(time, np.array([0.0, 0.0, 1e-9, 1e-9, 0.0, 0.0])).time.tolist() == [
+        0.0,
+        2.0,
+        4.0,
+    ]
 
 
 @pytest.mark.parametrize("slew", [0.5, 5.0, 500.0])
 def test_slewed_commands_are_those_approached_in_small_steps(slew):
     rng = np.random.default_rng(6)
-    commands = held(np.cumsum(rng.integers(4, 60, size=200)) * 1e-3, rng.normal(size=200))
+    commands = held_commands(np.cumsum(rng.integers(4, 60, size=200)) * 1e-3, rng.normal(size=200))
     step = 1e-4
     at = np.arange(commands.time[0], commands.time[-1] + 0.5, step)
     asked = value_at(commands, at + 0.5 * step)

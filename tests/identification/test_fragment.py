@@ -116,7 +116,7 @@ def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so()
     assert axes["roll"][:2] == (47.5, 41.0)
     assert (
         "# yaw: kept from the configuration: lag 60.0 ms, dead time 158.0 ms, slew 270 °/s²; "
-        "the fit is bad: poor fit: the model is off by 40% of the movement, at most 30% may be"
+        "the fit is bad: poor fit: the model's error is 40% of the movement, more than 30%"
     ) in vehicle_fragment(vehicle, GRAVITY, IN_FORCE)
     axes = configured(replace(VEHICLE, pitch=bad(PITCH)), IN_FORCE).vehicle.axes
     assert axes["pitch"] == (17.0, 19.0, 1000.0, None)

@@ -66,7 +66,7 @@ def test_first_order_is_not_called_second_order():
 def test_a_loop_that_hardly_is_damped_is_a_poor_fit_without_any_noise():
     plant = {"frequency": 12.0, "damping": 0.08, "dead_time": 0.02}
     found = fit_rate_response(*flown(SLOW, plant, 1, 0.0), gain=1.0)
-    assert found.reason().startswith("poor fit: the model is off by")
+    assert found.reason().startswith("poor fit: the model's error is")
     assert max(found.fit.lag_error, found.fit.dead_time_error) < 0.01
 
 

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from companion.identification.lags import held, second_order, second_order_decay, slewed, value_at
+from companion.identification.lags import (
+    held_commands,
+    second_order,
+    second_order_decay,
+    slewed,
+    value_at,
+)
 
 LOOPS = [(6.0, 0.44), (19.6, 0.73), (10.0, 1.0), (10.0, 1.0 + 1e-9), (8.0, 1.3), (60.0, 3.0)]
 
@@ -13,7 +19,7 @@ LOOPS = [(6.0, 0.44), (19.6, 0.73), (10.0, 1.0), (10.0, 1.0 + 1e-9), (8.0, 1.3),
 @pytest.mark.parametrize(("frequency", "damping"), LOOPS)
 def test_it_answers_as_its_equation_says(frequency, damping, slew):
     rng = np.random.default_rng(1)
-    commands = held(np.cumsum(rng.integers(50, 300, size=30)) * 1e-3, rng.normal(size=30))
+    commands = held_commands(np.cumsum(rng.integers(50, 300, size=30)) * 1e-3, rng.normal(size=30))
     if slew is not None:
         commands = slewed(commands, slew)
     at = np.arange(commands.time[0], commands.time[-1] + 1.0, 5e-4)

@@ -117,7 +117,7 @@ def test_a_claim_lapses_on_the_ground_and_not_in_control():
         lambda: at["setpoint"],
         every_frame_claims=False,
     )
-    rule.fix("vehicle")
+    rule.set_peer("vehicle")
     for now, setpoint, lapsed in (
         (104.9, -inf, False),
         (105.1, -inf, True),
@@ -182,7 +182,7 @@ def test_only_the_named_peer_is_heard(run):
             vehicle.send(heartbeat())
             assert (await link.wait_connected(5.0)).mode == "AUTO.LOITER"
             [notice] = notices
-            assert f"what 127.0.0.1:{stranger.address[1]} sends is ignored" in notice
+            assert f"frames from 127.0.0.1:{stranger.address[1]} are ignored" in notice
             stranger.close()
         vehicle.close()
 
@@ -293,7 +293,7 @@ def test_a_tcp_client_that_is_not_named_is_turned_away(run):
             with suppress(ConnectionResetError):
                 assert await reader.read() == b""
             assert link.stats.frames == 0
-            assert "is ignored" in notices[0]
+            assert "are ignored" in notices[0]
 
     run(scene())
 

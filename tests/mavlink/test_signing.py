@@ -131,7 +131,7 @@ def test_an_unsigned_vehicle_is_refused_and_that_is_said_once(run, caplog):
         async with Link(settings) as link:
             vehicle = await FakeVehicle(link.local_address).open_udp()
             vehicle.send(heartbeat(), heartbeat(), heartbeat())
-            with pytest.raises(LinkTimeout, match="3 frames not signed with our key"):
+            with pytest.raises(LinkTimeout, match="3 frames that are not signed with the key"):
                 await link.wait_connected(0.1)
             vehicle.close()
 

@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from itertools import pairwise
 
 import pytest
@@ -230,13 +231,22 @@ def test_control_channel():
             assert "error" in ask(control, bad)
 
 
+EVENTS = (410, 411)
+"""EVENT and CURRENT_EVENT_SEQUENCE, which are no telemetry: they go on."""
+
+
 def falls_silent(client):
-    """Whether nothing comes for a while, once what was under way has come."""
+    """Whether no telemetry comes for 0.3 s, once what was under way has come."""
     client.socket.settimeout(0.3)
+    silent_since = time.monotonic()
     for _ in range(1000):
         try:
-            client.receive()
+            datagram = client.receive()
         except TimeoutError:
+            return True
+        if datagram[7] | datagram[8] << 8 not in EVENTS:
+            silent_since = time.monotonic()
+        elif time.monotonic() - silent_since > 0.3:
             return True
     return False
 

@@ -1,6 +1,7 @@
 """What the estimate says against the truth: noise, delay, resets; and determinism."""
 
 from math import radians
+from random import Random
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.quaternion import yaw
+from sitl_mock.physics.sensors import WhiteNoise
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 PERFECT = {
@@ -68,6 +70,12 @@ def test_delays_show_the_past():
     assert estimate.body_rates == history[-6].body_rates
     assert estimate.position_ned == history[-21].position_ned
     assert estimate.velocity_ned == history[-21].velocity_ned
+
+
+def test_the_white_noise_is_that_of_random_gauss_however_it_is_drawn():
+    noise, judge = WhiteNoise("3/sensors"), Random("3/sensors")
+    for count in (15, 15, 0, 1, 2, 3, 8):
+        assert noise.draw(count) == [judge.gauss(0.0, 1.0) for _ in range(count)]
 
 
 def test_noise_has_the_configured_spread():

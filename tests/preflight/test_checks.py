@@ -65,7 +65,8 @@ GOOD = Evidence(
     resets=0,
     identity=Identity("1.18.0", ATTITUDE_TARGET_CAPABILITY, "00ab"),
 )
-CONFIG = changed(Config(), {"vehicle": {"lag_ms": 47.0, "dead_time_ms": 40.0}}, "test")
+TIMES = {"lag_ms": 47.0, "dead_time_ms": 40.0, "identified": "a flight"}
+CONFIG = changed(Config(), {"vehicle": TIMES}, "test")
 
 
 def found(check, evidence=GOOD, config=CONFIG):
@@ -391,3 +392,13 @@ def test_an_exception_lets_one_finding_pass_and_no_other():
     refused = [finding.key for finding in blocking(accepting, run_checks(accepting, evidence))]
     assert refused == [Key.ROUND_TRIP]
     assert len(blocking(CONFIG, run_checks(CONFIG, evidence))) == 2
+
+
+def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
+    wrong = {"vehicle": {"identified": None}, "limits": {"max_tilt_rate_deg_s": 1.57}}
+    config = changed(CONFIG, wrong, "test")
+    found = {one.key: one for one in configuration_checks.doubtful(config, GOOD)}
+    assert set(found) == {Key.IDENTIFIED, Key.UNITS}
+    assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
+    assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
+    assert list(configuration_checks.doubtful(CONFIG, GOOD)) == []

@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 
 from companion.config.files import changed
-from companion.mavlink import lockstep
 from companion.preflight.all_checks import run_checks
 from companion.preflight.parameter_survey import survey
 from companion.preflight.session import gather
+from companion.testing import open_wire, run
 from companion.vehicle.parameter_rules import CheckResult
-from tests.preflight.vehicles import FAMILIES, amiss, configured, met, shipped_vehicle
+from tests.preflight.vehicles import FAMILIES, amiss, configured, met, shipped_in_memory
 
 UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 NOT_READY = CheckResult.NOT_READY
@@ -112,13 +112,13 @@ FAULTS = [
 def visit(request, tmp_path_factory):
     """What was found on the good vehicle, and after each seed: verdicts by key."""
     folder = tmp_path_factory.mktemp(request.param)
-    with shipped_vehicle(folder, request.param) as mock:
-        return request.param, lockstep.run(_visit(folder, mock))
+    with shipped_in_memory(request.param) as mock:
+        return request.param, run(mock, _visit(folder, mock))
 
 
 async def _visit(folder, mock):
     config = configured(folder, mock)
-    async with met(config) as vehicle:
+    async with met(config, open_wire) as vehicle:
         evidence = await vehicle.gather(10.0)
         found = {"good": amiss(run_checks(config, evidence))}
         link = vehicle.link
@@ -136,12 +136,12 @@ async def _visit(folder, mock):
             ours = changed(config, changes, "the seed")
             found[section, str(keys)] = amiss(run_checks(ours, evidence))
         for fault, _, _ in FAULTS:
-            assert mock.ask({"fault": fault}) == {"ok": True}
+            mock.inject(fault)
             # Not before what was known is replaced: the autopilot tells its checks at 5 Hz.
             await asyncio.sleep(0.25)
             spoilt = run_checks(config, await gather(link, evidence.streams, 0.7, thorough=True))
             found[str(fault)] = amiss(spoilt)
-            mock.ask({"clear": True})
+            mock.clear_faults()
             if fault["kind"] == "refuse_arming":
                 found["words"] = " ".join(finding.sentence() for finding in spoilt)
             await asyncio.sleep(0.25)
@@ -159,10 +159,10 @@ async def _on_a_lossy_link(mock, config, link, evidence):
     before = {name: await link.read_parameter(name) for name in names}
     for name, value in names.items():
         await link.write_parameter(name, value)
-    assert mock.ask({"fault": {"kind": "drop", "probability": 0.5}}) == {"ok": True}
+    mock.inject({"kind": "drop", "probability": 0.5})
     await asyncio.sleep(0.25)
     seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-    mock.ask({"clear": True})
+    mock.clear_faults()
     await asyncio.sleep(0.25)
     for name, value in before.items():
         await link.write_parameter(name, value)

@@ -19,12 +19,12 @@ TRIES = 6
 DISTURBED = (
     "stood still",
     "deadman.deadline_ms",
-    "our own timer",
+    "timer is late",
     "arrives later than deadman",
     "comes too rarely",
     "clock went back",
     "jumped ahead",
-    "could not be answered",
+    "no setpoint could be sent",
 )
 """What a flight says that was ended by a busy computer, which stalls the simulator, too."""
 

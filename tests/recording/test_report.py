@@ -7,6 +7,7 @@ import pytest
 from rich.console import Console
 
 from companion.attitude import BodyRates
+from companion.recording.course import Course
 from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.report import flight_table
 from companion.recording.summary import LoopCounts, Summary
@@ -72,10 +73,10 @@ def test_dead_times_stand_beside_what_was_configured():
     assert "not as configured" not in " ".join(lines)
 
 
-def test_a_wrong_dead_time_is_told_below_the_table():
+def test_a_wrong_dead_time_stands_beside_the_configured_one():
     wrong = DeadTimes({**AS_CONFIGURED.axes, "pitch": AxisDeadTime(0.08, 0.04)}, lag_known=True)
     lines = table(FlightTrace(), wrong)
-    assert "pitch 80 ms, not 40" in " ".join(lines)
+    assert cells(lines, "pitch") == ["80 ms", "40 ms"]
     assert not any("sample's age" in line for line in lines)  # the clocks were never compared
 
 
@@ -84,3 +85,30 @@ def test_without_a_lag_it_says_where_one_comes_from():
     assert "vehicle.lag_ms is not set (`companion identify` finds it)" in " ".join(lines)
     assert not any(line.startswith("roll") for line in lines)
     assert math.isnan(DeadTimes().sample_age.p50)
+
+
+def test_each_maneuver_has_its_row():
+    trace = FlightTrace()
+    trace.begin_maneuver(0.0, 0.0, "hover")
+    for k in range(100):
+        trace.add_tracking(0.1 * k, (0.0, 0.0, -5.0), (0.03, 0.04, -5.02))
+    trace.begin_maneuver(10.0, 10.0, "steps")
+    for k in range(100):
+        trace.add_tracking(10.0 + 0.1 * k, (math.nan, math.nan, -5.0), (0.02 * k, 0.0, -5.01))
+    lines = table(trace)
+    assert cells(lines, "hover") == ["0.05 m", "0.05 m", "0.02 m", "0.02 m"]
+    assert cells(lines, "steps") == ["open loop", "1.98 m away", "0.01 m", "0.01 m"]
+
+
+def test_in_lockstep_no_latency_and_no_deadline_is_shown():
+    def words(lockstep):
+        course = Course(lockstep=lockstep)
+        summary = Summary("ok", "disarm", "exact", 5.0, COUNTS, {}, FlightTrace(), course=course)
+        out = io.StringIO()
+        Console(file=out, width=80).print(flight_table(summary))
+        return out.getvalue()
+
+    for sign in ("sample in → setpoint out", "deadline", "Control loop"):
+        assert sign in words(False)
+        assert sign not in words(True)
+    assert "6 setpoints for 7 samples" in words(True)

@@ -100,3 +100,9 @@ def test_json_of_a_flight_that_measured_nothing_is_null_not_nan():
     assert set(data["response"]["second_order"].values()) == {None}
     assert set(data["dead_time_s"].values()) == {None}
     assert data["tracking"]["position_max_m"] is None
+
+
+def test_every_key_is_explained_in_the_documentation():
+    page = (Path(__file__).parents[2] / "docs/getting-started.md").read_text("utf-8")
+    for key in summary(FlightTrace()).as_dict():
+        assert f"`{key}`" in page, key

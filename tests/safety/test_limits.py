@@ -97,7 +97,7 @@ SAID = [
     (
         autopilot_judges.estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
-        "the estimator was reset: 0.5 m and 17° of heading in sum; the references moved along",
+        "the estimator was reset: 0.5 m and 17° of heading in total; the references moved with it",
     ),
     (
         autopilot_judges.battery(0.2),
@@ -127,13 +127,12 @@ SAID = [
     (
         link_judges.starvation(0.2),
         at(health=Health(starved=0.6)),
-        "CPU starvation: our timer is late by 60 % of the time",
+        "CPU starvation: the program's timer is late by 60 % of the time",
     ),
     (
         link_judges.gaps(2),
         at(health=Health(gaps=3)),
-        "samples could not be answered 3 times within 5 s for longer than "
-        "deadman.telemetry_stale_ms",
+        "3 times within 5 s no setpoint could be sent for longer than deadman.telemetry_stale_ms",
     ),
 ]
 

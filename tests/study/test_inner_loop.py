@@ -224,7 +224,7 @@ def test_a_loop_of_one_lag_takes_its_time_constant():
 
 def test_a_rate_loop_that_never_gets_there_is_said():
     loop = InnerLoop(rate_loop=every_axis(proportional_n_m_s=0.0))
-    with pytest.raises(ValueError, match="the roll rate gets to 0"):
+    with pytest.raises(ValueError, match="the roll rate reaches only 0"):
         loop.rate_step_63()
 
 
@@ -236,7 +236,7 @@ def test_a_rate_that_does_not_divide_the_physics_rate_is_refused(rate_hz):
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf"), 1e-4])
 def test_a_flight_without_a_sample_is_refused(seconds):
-    with pytest.raises(ValueError, match="seconds must hold one sample"):
+    with pytest.raises(ValueError, match="seconds must be one sample period at least"):
         fly(seconds=seconds)
 
 

@@ -16,11 +16,11 @@ from companion.study.nmpc.variants import (
     CIRCLE,
     DRAG,
     EIGHT,
-    LOOKS,
     MAX_ITERATIONS,
     MAX_TILT,
     MODELS,
     RATE_HZ,
+    STYLES,
     UNLIMITED,
     Variant,
 )
@@ -89,7 +89,7 @@ def rows(out, name):
 
 @pytest.mark.slow
 def test_every_model_is_timed_by_one_iteration_and_to_the_end(out):
-    labels = [look.label for look in LOOKS.values()]
+    labels = [style.label for style in STYLES.values()]
     table = rows(out, "nmpc")
     assert [row["model"] for row in table] == labels
     for row in table:
@@ -104,7 +104,7 @@ def test_every_model_is_timed_by_one_iteration_and_to_the_end(out):
 @pytest.mark.slow
 def test_from_cold_ours_converges_from_every_state(out):
     *_, ours = table = rows(out, "nmpc-cold-start")
-    assert [row.pop("model") for row in table] == [look.label for look in LOOKS.values()]
+    assert [row.pop("model") for row in table] == [style.label for style in STYLES.values()]
     assert len(ours) == 5
     assert all(2 <= float(count) < 20 for count in ours.values())
     assert table[0]["the wrong way"] == "inf"
@@ -118,9 +118,9 @@ def test_the_tables_of_errors_are_those_of_the_flights(out):
         float(row["error, m"])
         for row in flights
         if (row["task"], row["model"], row["most iterations"])
-        == ("eight", LOOKS["limited"].label, "1")
+        == ("eight", STYLES["limited"].label, "1")
     ]
-    (row,) = [row for row in rows(out, "nmpc-error") if row["model"] == LOOKS["limited"].label]
+    (row,) = [row for row in rows(out, "nmpc-error") if row["model"] == STYLES["limited"].label]
     late = np.array(mine[25:])
     assert float(row["eight: RMS, m"]) == pytest.approx(np.sqrt(np.mean(late**2)))
     assert mine == pytest.approx(fly(EIGHT, Variant("limited"), 1.0).errors, abs=1e-6)

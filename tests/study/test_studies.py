@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from rich.console import Console
@@ -84,6 +85,16 @@ def test_the_table_of_figure_2_has_the_known_numbers(results, method, deviation,
     if cross_track is not None:
         assert number(table, method, "cross-track") == pytest.approx(cross_track, rel=0.02)
         assert number(table, method, "difference between headings") < 1e-9
+
+
+def test_figure_2_says_which_of_its_axes_are_magnified(monkeypatch):
+    short = replace(fig2.FIGURE_2, headings=EIGHT[:2], seconds=0.5)
+    monkeypatch.setattr(fig2, "FIGURE_2", short)
+    (north, east, away, plane) = fig2.run(lambda _: None).figure.axes
+    span = {axes: abs(np.subtract(*axes.get_ylim())) for axes in (north, east)}
+    assert f"magnified: this axis spans 1/{span[north] / span[east]:.0f}" in east.get_title()
+    assert "magnified: the $a_E$ axis spans 1/" in plane.get_title()
+    assert "magnified" not in north.get_title() + away.get_title()
 
 
 def test_the_table_of_figure_3_is_of_period_pi_and_spans_that_of_figure_2(results):
@@ -224,7 +235,7 @@ def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsy
         ({"strat": [0, 0]}, "`strat` is not a known key; did you mean `start`?"),
         ({"limits": {"max_tilt": 3}}, "`limits.max_tilt` is not a known key; did you mean"),
         ({"methods": ["so4"]}, "unknown method 'so4'"),
-        ({"methods": ["so3", "so3"]}, "names one twice"),
+        ({"methods": ["so3", "so3"]}, "names a value twice"),
         ({"methods": []}, "`methods`"),
         ({"start": [0.9, 0.9]}, "tilt below 75°"),
         ({"start": [0.4, 0.3]}, "nothing to fly"),
@@ -234,10 +245,10 @@ def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsy
         ({"transport_delay_ms": 5}, "needs inner_loop"),
         ({"seconds": float("inf")}, "`seconds`"),
         ({"seconds": 0.001}, "`seconds`"),
-        ({"rates_hz": [100, 100]}, "names one twice"),
-        ({"rates_hz": [1000], "seconds": 60, "headings_deg": list(range(360))}, "fit the memory"),
+        ({"rates_hz": [100, 100]}, "names a value twice"),
+        ({"rates_hz": [1000], "seconds": 60, "headings_deg": list(range(360))}, "fit into memory"),
         ({"rates_hz": [0]}, "`rates_hz.0`: input should be greater than or equal to 10 (got 0)"),
-        ({"methods": "so3"}, "valid list"),
+        ({"methods": "so3"}, "is a list"),
         ({"inner_loop": True, "transport_delay_ms": 0.5}, "`transport_delay_ms`"),
         ({"quickness": 3}, "needs inner_loop"),
     ],

@@ -43,7 +43,7 @@ class Link:
                 due += 1.0
                 if self.timesync and shuffle() >= self.lost:
                     self.compare()
-                self.clock.look(self.now)
+                self.clock.update(self.now)
         return self
 
     def arrive(self, vehicle):
@@ -266,7 +266,7 @@ def test_a_real_px4_with_a_slow_clock_is_not_late(timesync):
             received, vehicle_ms = float(row["received_s"]), float(row["vehicle_ms"])
             if not row["timesync_sent_s"]:
                 ages.append(clock.take(int(vehicle_ms), received).age)
-                clock.look(received)
+                clock.update(received)
             elif timesync:
                 clock.exchange(float(row["timesync_sent_s"]), received, round(1e6 * vehicle_ms))
     assert len(ages) > 900
@@ -335,7 +335,7 @@ def test_in_lockstep_there_is_one_clock_and_timesync_is_not_needed():
     clock.on_event = told.append
     for k in range(1000):
         age = clock.take(4 * k, 0.004 * k + (0.4 if k > 500 else 0.0)).age
-        clock.look(0.004 * k)
+        clock.update(0.004 * k)
     assert clock.age_known
     assert age == pytest.approx(0.4)
     assert told == []

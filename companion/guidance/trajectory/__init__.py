@@ -6,8 +6,8 @@
     >>> limits = Envelope(max_tilt=radians(35.0))
     >>> print(violations(path, limits)[0].limit)
     limits.max_tilt_deg
-    >>> slower, factor = slow_down(path, limits)
-    >>> violations(slower, limits)
+    >>> slowed = slow_down(path, limits)
+    >>> violations(slowed.trajectory, limits)
     ()
 
 World NED, SI units, radians; positions are relative to where the trajectory begins. Each name below
@@ -38,9 +38,11 @@ Made from a table
 Checked
     Envelope         limits; None is no limit
     violations       the limits that a trajectory breaks: each a `Violation`
-    slow_down        the trajectory stretched in time until it keeps them
+    slow_down        slowed down, where it must be, until it keeps them: a `SlowDown`
+    SlowDown         the slower trajectory, and what slowed it; parts: SlowedPart
+    evenly_slowed    all of a trajectory slowed down by one factor
     Violation        the limit, when it is broken, and what to do
-    Slowed           a trajectory stretched in time
+    Slowed           a trajectory in another time; SlowerTime: that time
     Motion, judge    the same for a motion given as arrays
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`

@@ -1,1 +1,1 @@
-"""Ways to the vehicle: UDP, TCP and serial ports, opened from an endpoint's notation."""
+"""Transports to the vehicle: UDP, TCP and serial ports, opened from the text of an endpoint."""

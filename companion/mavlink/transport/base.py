@@ -1,64 +1,64 @@
-"""The Protocol of a transport: bytes in, whole frames out, and no queue in between."""
+"""The interface of a transport: it receives bytes and sends whole frames, without a queue."""
 
 from collections.abc import Callable
 from typing import Protocol
 
 Receive = Callable[[bytes, int], bool]
-"""Takes bytes and the `perf_counter_ns` of their arrival; true if a frame in them was accepted."""
+"""Takes bytes and the `perf_counter_ns` of their arrival; returns whether it accepted a frame."""
 
 
 class Receiver(Protocol):
-    """What a transport hands its bytes to. `PeerRule` says what a claim is."""
+    """Takes the bytes that a transport receives. `PeerRule` says what a claim is."""
 
     def connect(self, *, streaming: bool) -> None:
-        """Forget a frame that has begun: what comes next is of another connection."""
+        """Forget an incomplete frame: the next bytes come over another connection."""
 
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes of the peer (`Receive`)."""
 
     def claim(self, data: bytes, received_ns: int, who: str) -> bool:
-        """Take bytes of `who`, who is not the peer; true if that makes it the peer.
+        """Take bytes of `who`, who is not the peer; return whether `who` becomes the peer.
 
-        Without a valid claim in them nothing is accepted.
+        Without a valid claim in the bytes, no frame in them is accepted.
         """
 
     def may_answer(self, who: str) -> bool:
-        """Whether `who`, whose claim failed, still receives what we send.
+        """Whether frames are sent to `who` although its claim was refused.
 
-        Its frames are refused, but its answer may prove that it is no recording.
+        The frames of `who` are refused, but its answer may prove that it is no recording.
         """
 
     def claim_lapsed(self) -> bool:
-        """Whether the peer's claim is so old that another sender may take its place."""
+        """Whether the peer's claim is so old that another sender may become the peer."""
 
-    def stranger(self, who: str) -> None:
-        """Bytes of `who`, which is not among the peers that the endpoint names, were ignored."""
+    def note_stranger(self, who: str) -> None:
+        """Note that bytes of `who`, whom the endpoint does not name as a peer, were ignored."""
 
 
 Lost = Callable[[str], None]
 """Takes the reason why the connection is gone."""
 
 Tap = Callable[[float, bytes], None]
-"""Takes the loop's time in s and one whole frame, received or sent. It must be quick."""
+"""Takes the event-loop time in s and one whole frame, received or sent. It must be quick."""
 
 OPEN_TIMEOUT_S = 5.0
-"""How long a TCP connection may take to come up."""
+"""Time allowed to open a TCP connection, s."""
 
 
 class Transport(Protocol):
-    """One open connection. A dropped one is never reused: the link opens a fresh one."""
+    """One open connection. A lost connection is not used again: the link opens a new one."""
 
     @property
     def reconnects(self) -> bool:
-        """True when a lost connection is to be opened again."""
+        """Whether the link must open a new connection after this one is lost."""
 
     def send(self, frame: bytes) -> bool:
-        """Hand one whole frame to the kernel now, or not at all.
+        """Pass one whole frame to the kernel now, or not at all.
 
         Returns:
-            False if it could not leave: no peer yet, the kernel's buffer full, no route. Such a
-            frame is gone; an old setpoint is worse than none.
+            False if the frame could not be sent: no peer yet, the kernel's buffer full, no route.
+            Such a frame is dropped: an old setpoint is worse than none.
         """
 
     def close(self) -> None:
-        """Close at once; what the kernel has not taken is discarded."""
+        """Close at once; bytes that the kernel has not taken are discarded."""

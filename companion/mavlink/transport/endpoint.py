@@ -1,4 +1,4 @@
-"""Endpoints in the usual notation, such as `udpin://0.0.0.0:14540`; opens nothing."""
+"""Parses endpoints in the usual notation, such as `udpin://0.0.0.0:14540`."""
 
 import re
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _OURSELVES = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 
 @dataclass(frozen=True)
 class PeerAddress:
-    """A host that may talk to a listening endpoint, from any port if that is `None`."""
+    """A host that may talk to a listening endpoint; a port of `None` is any port."""
 
     host: str
     port: int | None = None
@@ -39,7 +39,7 @@ class UdpIn:
 
 @dataclass(frozen=True)
 class UdpOut:
-    """Send to a known address and hear only it."""
+    """Send to a known address, and receive only from this address."""
 
     host: str
     port: int
@@ -55,7 +55,7 @@ class TcpClient:
 
 @dataclass(frozen=True)
 class TcpServer:
-    """Listen for one vehicle that connects to us; with `peers`, from one of them."""
+    """Listen for one vehicle that connects; if `peers` are given, only from one of them."""
 
     host: str
     port: int
@@ -85,15 +85,15 @@ _NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
 def parse_endpoint(text: str) -> Endpoint:
     """Read an endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`.
 
-    `udp://` at one of our own addresses is taken as `udpin://`, as MAVSDK and mavlink-router take
-    it. An empty host of a listening endpoint means every interface. A listening endpoint may name
-    who is let in: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in
-    `?peer=192.0.2.7:14580`, several with commas between.
+    `udp://` with an address of this computer means `udpin://`, as in MAVSDK and mavlink-router. An
+    empty host of a listening endpoint means every interface. A listening endpoint may name its
+    peers: `udpin://0.0.0.0:14540?peer=192.0.2.7`, with a port as in `?peer=192.0.2.7:14580`,
+    several separated by commas.
 
     Raises:
-        EndpointError: The text is not one of the five notations, or its port is not 1..65535
-            (a listening endpoint also takes 0: any free port). The message says what to write
-            instead for the notations of other programs.
+        EndpointError: The text is in none of the five notations, or its port is not 1..65535
+            (a listening endpoint also takes 0: any free port). If it is a notation of another
+            program, the message says what to write instead.
     """
     scheme, separator, rest = text.strip().partition("://")
     if separator and scheme == "serial":
@@ -164,7 +164,7 @@ def _serial(text: str, rest: str) -> SerialPort:
 
 
 def _remedy(text: str) -> str:
-    """What to write instead of a notation of another program; all of ours if it is unknown."""
+    """How to write the endpoint of another program here; if it is unknown, all notations."""
     text = text.strip()
     if device := _DEVICE.fullmatch(text):
         name, baud = device[1], device[2]
@@ -180,8 +180,8 @@ def _remedy(text: str) -> str:
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")
         if kind is not None and (scheme != "udp" or host in _OURSELVES):
-            ours = "udpin" if scheme == "udp" else scheme
-            return f"write {ours}://{host or '0.0.0.0'}:{port}"
+            usual = "udpin" if scheme == "udp" else scheme
+            return f"write {usual}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
             out = f", or udpout://{host}:{port} to send to {host} first" if host else ""
             return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"

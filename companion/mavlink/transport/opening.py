@@ -1,4 +1,4 @@
-"""From an endpoint's notation to an open transport."""
+"""Opens the transport of an endpoint."""
 
 from collections.abc import Awaitable, Callable
 
@@ -17,19 +17,19 @@ from companion.mavlink.transport.tcp import open_tcp_client, open_tcp_server
 from companion.mavlink.transport.udp import open_udp
 
 OpenTransport = Callable[[Endpoint, Receiver, Lost], Awaitable[Transport]]
-"""As `open_transport`, for a parsed endpoint."""
+"""A function like `open_transport`, for a parsed endpoint."""
 
 
 async def open_transport(endpoint: str | Endpoint, receiver: Receiver, lost: Lost) -> Transport:
-    """Open what the endpoint describes.
+    """Open the transport that the endpoint describes.
 
     Args:
-        endpoint: A parsed endpoint or its notation.
+        endpoint: A parsed endpoint or its text.
         receiver: Takes all bytes that arrive.
         lost: Called once if an open connection drops; never for UDP, nor after `close`.
 
     Raises:
-        EndpointError: With the reason and how to mend it.
+        EndpointError: The transport cannot be opened; the message says why and what to do.
     """
     where = parse_endpoint(endpoint) if isinstance(endpoint, str) else endpoint
     match where:

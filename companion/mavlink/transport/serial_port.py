@@ -18,8 +18,8 @@ _READ_BYTES = 4096
 class SerialTransport:
     """A serial port, read and written without blocking.
 
-    A frame is never cut short on the wire: when the driver takes only part of one, the rest
-    follows as soon as there is room, and frames that come meanwhile are dropped.
+    No frame is sent in part. If the driver takes only part of a frame, the rest is sent as soon as
+    there is room, and frames sent meanwhile are dropped.
 
     Raises:
         EndpointError: The device is missing, in use, or not permitted.
@@ -36,7 +36,7 @@ class SerialTransport:
                 endpoint.device, endpoint.baud, timeout=0, write_timeout=0, exclusive=True
             )
         except (OSError, ValueError) as error:  # SerialException is an OSError
-            raise EndpointError(_why(endpoint, error)) from error
+            raise EndpointError(_open_error(endpoint, error)) from error
         self._fd: int = self._port.fileno()
         watch(self._loop, self._fd, self._read)
 
@@ -46,15 +46,15 @@ class SerialTransport:
         except BlockingIOError:
             return
         except OSError as error:
-            self._drop(f"serial device failed: {error.strerror}")
+            self._report_lost(f"serial device failed: {error.strerror}")
             return
         if not data:
-            self._drop("serial device is gone")
+            self._report_lost("serial device is gone")
             return
         self._receive(data, time.perf_counter_ns())
 
     def send(self, frame: bytes) -> bool:
-        """Write one frame; false if the device is gone or the last frame is not out yet."""
+        """Write one frame; return False if the device is gone or the last frame is unfinished."""
         if self._fd < 0 or self._unsent:
             return False
         return self._write(frame)
@@ -65,32 +65,32 @@ class SerialTransport:
         except BlockingIOError:
             return False
         except OSError as error:
-            # Not from inside send(): its caller may be in the middle of anything.
-            self._loop.call_soon(self._drop, f"serial device failed: {error.strerror}")
+            # Not called from inside `send`, whose caller may be in the middle of anything.
+            self._loop.call_soon(self._report_lost, f"serial device failed: {error.strerror}")
             return False
         if written < len(data):
             self._unsent = data[written:]
-            self._loop.add_writer(self._fd, self._finish)
+            self._loop.add_writer(self._fd, self._write_rest)
         return True
 
-    def _finish(self) -> None:
+    def _write_rest(self) -> None:
         try:
             self._unsent = self._unsent[os.write(self._fd, self._unsent) :]
         except BlockingIOError:
             return
         except OSError as error:
-            self._drop(f"serial device failed: {error.strerror}")
+            self._report_lost(f"serial device failed: {error.strerror}")
             return
         if not self._unsent:
             self._loop.remove_writer(self._fd)
 
-    def _drop(self, reason: str) -> None:
+    def _report_lost(self, reason: str) -> None:
         if self._fd >= 0:
             self.close()
             self._lost(reason)
 
     def close(self) -> None:
-        """Close the device; a frame cut short is discarded."""
+        """Close the device; the rest of an unfinished frame is discarded."""
         if self._fd < 0:
             return
         unwatch(self._loop, self._fd)
@@ -99,7 +99,7 @@ class SerialTransport:
         self._port.close()
 
 
-def _why(endpoint: SerialPort, error: OSError | ValueError) -> str:
+def _open_error(endpoint: SerialPort, error: OSError | ValueError) -> str:
     where = f"serial {endpoint.device}"
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:

@@ -6,18 +6,19 @@ import socket
 import time
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, resolve, spelled
+from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve
 from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
-_MAX_UNSENT_BYTES = 2048  # some 40 setpoints; a vehicle that far behind must not get older ones
+_MAX_UNSENT_BYTES = 2048
+"""With more unsent bytes (about 40 setpoints), frames are dropped: they would arrive too late."""
 
 
 async def open_tcp_client(endpoint: TcpClient, receiver: Receiver, lost: Lost) -> "TcpTransport":
     """Connect to a listening vehicle.
 
     Raises:
-        EndpointError: Nobody listens there, host unknown, no answer within 5 s.
+        EndpointError: Nobody listens there, the host is unknown, or no answer came within 5 s.
     """
     transport = TcpTransport(receiver, lost)
     where = f"TCP {endpoint.host}:{endpoint.port}"
@@ -67,14 +68,14 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
 
 
 class TcpTransport:
-    """At most one TCP connection at a time.
+    """A TCP client or server with at most one connection at a time.
 
-    As a server it goes on listening when the vehicle drops, so it is never opened again from
-    outside. A client that connects meanwhile is turned away, unless the one before it made no
-    valid claim (`PeerRule`) within 5 s of connecting, or its claim has lapsed.
+    A server goes on listening when the vehicle's connection drops, so the link need not open it
+    again. While a client is connected, another one is refused. It is accepted only if the first
+    made no valid claim (`PeerRule`) within 5 s of connecting, or if its claim has lapsed.
 
     Attributes:
-        local: (host, port) listened on, or `None` for a client.
+        local: (host, port) of a listening server; `None` for a client.
     """
 
     def __init__(self, receiver: Receiver, lost: Lost, named: NamedPeers | None = None) -> None:
@@ -90,21 +91,21 @@ class TcpTransport:
 
     @property
     def reconnects(self) -> bool:
-        """A server waits by itself, a client must be opened again."""
+        """Whether the link must open a new connection: of a client, not of a server."""
         return self._server is None
 
     def listen(self, server: asyncio.Server) -> None:
-        """Make this a server."""
+        """Make this the transport of a listening `server`."""
         self._server = server
         self.local = server.sockets[0].getsockname()[:2]
 
     def accept(self, connection: asyncio.Transport) -> bool:
-        """Take a new connection; false if it is not to be let in."""
+        """Take a new connection; return False if it must be refused."""
         if self._closed:
             return False
         address = connection.get_extra_info("peername")
         if self._server is not None and not self._named.admit(address):
-            self._receiver.stranger(spelled(address))
+            self._receiver.note_stranger(host_and_port(address))
             return False
         if self._connection is not None:
             if not self._replaceable():
@@ -124,30 +125,30 @@ class TcpTransport:
         return self._loop.time() - self._connected_at > CLAIM_LASTS_S
 
     def data(self, connection: asyncio.Transport, data: bytes) -> None:
-        """Pass on what arrived."""
+        """Pass on the bytes that a connection received."""
         if connection is not self._connection:
-            return  # replaced, and not closed yet
+            return  # from a connection that was replaced and is not closed yet
         received = time.perf_counter_ns()
         if self._claimed or self._server is None:
             self._receiver.receive(data, received)
         else:
-            who = spelled(connection.get_extra_info("peername"))
+            who = host_and_port(connection.get_extra_info("peername"))
             self._claimed = self._receiver.claim(data, received, who)
 
     def dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
-        """The connection is gone."""
+        """Note that a connection is closed, for `reason`."""
         if self._connection is None or connection is not self._connection:
             return
         self._connection = None
         if self._closed:
             return
         if self._server is not None and not self._claimed:
-            self._receiver.connect(streaming=True)  # it was no peer, so nothing is lost
+            self._receiver.connect(streaming=True)  # not the peer, so the link is not lost
             return
         self._lost(reason)
 
     def send(self, frame: bytes) -> bool:
-        """Write one frame; false while nobody is connected or too much is unsent already."""
+        """Write one frame; return False if nobody is connected or too many bytes are unsent."""
         connection = self._connection
         if connection is None or connection.is_closing():
             return False
@@ -157,7 +158,7 @@ class TcpTransport:
         return True
 
     def close(self) -> None:
-        """Abort: what was not written yet never will be."""
+        """Close at once; unsent bytes are discarded."""
         self._closed = True
         if self._server is not None:
             self._server.close()

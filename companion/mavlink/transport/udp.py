@@ -1,4 +1,4 @@
-"""MAVLink over UDP: one non-blocking socket, read where the loop is fastest."""
+"""MAVLink over UDP: one non-blocking socket, read by a hot reader of the event loop."""
 
 import asyncio
 import contextlib
@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.peer import NamedPeers, resolve, spelled
+from companion.mavlink.peer import NamedPeers, host_and_port, resolve
 from companion.mavlink.transport.base import Receiver
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 
@@ -21,18 +21,19 @@ _MAX_DATAGRAM = 4096  # far above the largest MAVLink frame (280); routers pack 
 _SO_TIMESTAMPNS = getattr(socket, "SO_TIMESTAMPNS", 35)  # Linux; the module names it from 3.13 on
 _STAMP = struct.Struct("@qq")  # s and ns since 1970
 _STAMP_SPACE = socket.CMSG_SPACE(_STAMP.size)
-_OLDEST_NS = 1_000_000_000  # a stamp that seems older means that the computer's clock was set
+_OLDEST_NS = 1_000_000_000  # an older stamp means that the computer's clock was changed
 _BURST = 32  # datagrams read before the loop does other work
 
 PEER_SILENCE_S = 2.0
-"""After this silence of the peer, a vehicle at another address may take its place."""
+"""After this silence of the peer, a sender at another address may become the peer, s."""
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
     """Open a UDP endpoint.
 
     Raises:
-        EndpointError: Port in use, host unknown, address not ours, no permission.
+        EndpointError: The port is in use, the host is unknown, the address is not that of an
+            interface of this computer, or there is no permission.
     """
     loop = asyncio.get_running_loop()
     try:
@@ -50,18 +51,18 @@ async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTranspor
 class UdpTransport:
     """A socket that talks to one peer.
 
-    A listening socket connects itself to the first sender that makes a valid claim (`PeerRule`):
-    the kernel then finds the way faster (about 8 us of a round trip) and drops strangers. What
-    strangers sent before that is still in the kernel's queue, so the source of each datagram is
-    checked. When the peer has been silent for 2 s, or its claim has lapsed, the socket is opened
-    afresh, so that a vehicle which comes back from another port is heard. Refusals by ICMP
-    (vehicle not up yet) are no reason to stop.
+    A listening socket connects to the first sender that makes a valid claim (`PeerRule`). The
+    kernel then drops datagrams of other senders, and a round trip is about 8 us shorter. The
+    kernel's queue may still hold earlier datagrams of other senders, so the source of each datagram
+    is checked. If the peer is silent for 2 s, or its claim has lapsed, a new socket is opened, so
+    that a vehicle is heard that returns at another port. ICMP refusals (the vehicle has not started
+    yet) are ignored.
 
-    A datagram counts as received when the kernel took it from the network, not when we read it:
-    latency then includes a late wake-up of this process.
+    A datagram counts as received when the kernel received it, not when this process read it. So
+    latency includes a late wake-up of this process.
 
     Attributes:
-        local: The (host, port) the socket is bound to.
+        local: (host, port) to which the socket is bound.
     """
 
     reconnects = False
@@ -84,14 +85,14 @@ class UdpTransport:
         bound = self._socket.getsockname()
         self.local: tuple[str, int] = bound[:2]
         if isinstance(endpoint, UdpIn):
-            self._address = bound  # a port chosen by the kernel stays ours when reopened
+            self._address = bound  # a new socket takes the port that the kernel chose
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def _open(self) -> socket.socket:
         opened = socket.socket(self._family, socket.SOCK_DGRAM)
         try:
             opened.setblocking(False)
-            with contextlib.suppress(OSError):  # without stamps the time of reading has to do
+            with contextlib.suppress(OSError):  # without stamps, the time of reading is used
                 opened.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             if isinstance(self._endpoint, UdpIn):
                 opened.bind(self._address)
@@ -99,7 +100,7 @@ class UdpTransport:
                 opened.connect(self._address)
         except OSError as error:
             opened.close()
-            raise EndpointError(_why(self._endpoint, error)) from error
+            raise EndpointError(_open_error(self._endpoint, error)) from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
             self._peer = opened.getpeername()
@@ -122,18 +123,18 @@ class UdpTransport:
     def _read_first(self) -> None:
         try:
             data, stamps, _, address = self._socket.recvmsg(_MAX_DATAGRAM, _STAMP_SPACE)
-            if self._takes(data, _arrival_ns(stamps), address):
+            if self._take_unconnected(data, _arrival_ns(stamps), address):
                 self._socket.connect(address)
                 self._peer = self._socket.getpeername()
                 self._connected = self._heard = True
         except OSError:
             return
 
-    def _takes(self, data: bytes, received_ns: int, address: Any) -> bool:
-        """Whether the sender of a datagram is the peer from now on."""
-        who = spelled(address)
+    def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
+        """Take a datagram; return whether its sender is the peer from now on."""
+        who = host_and_port(address)
         if not self._named.admit(address):
-            self._receiver.stranger(who)
+            self._receiver.note_stranger(who)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
             taken = self._receiver.receive(data, received_ns)  # it was only silent
@@ -160,7 +161,7 @@ class UdpTransport:
             self._socket.close()
 
     def send(self, frame: bytes) -> bool:
-        """Send one datagram now; false if there is no peer yet or the kernel does not take it."""
+        """Send one datagram now; return False without a peer, or if the kernel refuses it."""
         if not self._connected:
             return False
         try:
@@ -176,7 +177,7 @@ class UdpTransport:
 
 
 def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
-    """When the kernel took the datagram, as a `perf_counter_ns`; now, if it does not say."""
+    """When the kernel received the datagram, as a `perf_counter_ns`; now, if it is not known."""
     now = time.perf_counter_ns()
     if not stamps:
         return now
@@ -185,7 +186,7 @@ def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
     return now - age if 0 <= age < _OLDEST_NS else now
 
 
-def _why(endpoint: UdpIn | UdpOut, error: OSError) -> str:
+def _open_error(endpoint: UdpIn | UdpOut, error: OSError) -> str:
     where = f"UDP {endpoint.host}:{endpoint.port}"
     if error.errno == errno.EADDRINUSE:
         return (

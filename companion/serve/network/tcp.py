@@ -4,7 +4,7 @@ import asyncio
 import socket
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import NamedPeers, plain_host, resolve, spelled
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
 from companion.mavlink.transport.endpoint import TcpClient as TcpOut
 from companion.mavlink.transport.endpoint import TcpServer
 from companion.serve.network.client import Client, Clients, Flood
@@ -96,7 +96,7 @@ class TcpPort:
         opened = transport.get_extra_info("socket")
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
-        name, host = f"tcp {spelled(address)}", plain_host(str(address[0]))
+        name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
         client = TcpClient(name, host, transport)
         self._open.add(client)
         self._clients.attach(client)

@@ -5,7 +5,7 @@ import socket
 from typing import Any
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import NamedPeers, plain_host, resolve, spelled
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
 from companion.serve.network.client import Client, Clients, Flood
 from companion.serve.network.refusal import refusal
@@ -150,7 +150,7 @@ class UdpClient(Client):
 
     def __init__(self, port: UdpPort, address: Any) -> None:
         host = plain_host(str(address[0]))
-        super().__init__(f"udp {spelled(address)}", host=host, streaming=False)
+        super().__init__(f"udp {host_and_port(address)}", host=host, streaming=False)
         self._port, self._address = port, address
         self.heard_at = asyncio.get_running_loop().time()
 

@@ -1,1 +1,1 @@
-"""Every planner behind a slow rate loop, beyond what the paper flies."""
+"""Every planner with a slow rate loop, which the paper does not study."""

@@ -1,4 +1,4 @@
-"""The figure of the study: the example, the grid, wrong times, the complete inner loop."""
+"""The figure of the study `lag`: example, grid, wrong times, complete inner loop."""
 
 from typing import Any
 
@@ -39,9 +39,9 @@ CAPTION = (
 _ENDS = np.array([FIGURE_2.start, FIGURE_2.target])
 _ACROSS = "largest distance from the line"
 _WORSE = "#A33C00"
-"""Cells where another method is the straighter; the page's colour of `does not hold`."""
+"""Colour of cells where another method is straighter, and of `does not hold` on the page."""
 _AT_HZ, _AT_LAG_MS, _AT_DEAD_TIME_MS = 100.0, 25, 40
-"""The line and the column of the grid that the second row shows."""
+"""Sample rate, lag and dead time of the cuts through the grid in the second row."""
 _SHADE: Line = {
     "facecolor": (FOLLOWING.colour, 0.15),
     "edgecolor": FOLLOWING.colour,
@@ -55,7 +55,7 @@ _BY_LAG: dict[float, Line] = {
     0.5: {"linestyle": "--", "marker": "^", "markersize": 6.0},
 }
 """Line style of each error of the lag."""
-_PANELS: list[Any] = [  # matplotlib types it as a nested list of its own
+_PANELS: list[Any] = [  # Any, because matplotlib has its own type for nested lists
     ["path"] * 3 + ["time"] * 3,
     ["dead time"] * 3 + ["lag"] * 3,
     ["50"] * 2 + ["100"] * 2 + ["250"] * 2,
@@ -65,13 +65,13 @@ _PANELS: list[Any] = [  # matplotlib types it as a nested list of its own
 
 
 def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
-    """All panels, as `CAPTION` describes them."""
+    """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
     responses = example.free[_AT_HZ]
     _draw_paths(panels["path"], responses)
     _draw_distance(panels["time"], responses)
-    dead_times, lags = _axes_of(grid)
+    dead_times, lags = _grid_values(grid)
     over_dead_time = [Cell(_AT_HZ, dead_time, _AT_LAG_MS) for dead_time in dead_times]
     _draw_cut(panels["dead time"], grid, over_dead_time, dead_times, "dead time")
     over_lag = [Cell(_AT_HZ, _AT_DEAD_TIME_MS, lag) for lag in lags]
@@ -87,7 +87,7 @@ def draw_figure(grid: Grid, example: Example, complete: Complete) -> Figure:
     return figure
 
 
-def _axes_of(grid: Grid) -> tuple[list[int], list[int]]:
+def _grid_values(grid: Grid) -> tuple[list[int], list[int]]:
     """The dead times and the lags of the grid, ms."""
     return sorted({cell.dead_time_ms for cell in grid}), sorted({cell.lag_ms for cell in grid})
 
@@ -105,7 +105,7 @@ def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
 
 
 def _draw_cut(axes: Axes, grid: Grid, cells: list[Cell], values_ms: list[int], words: str) -> None:
-    """Cross-track along one line of the grid."""
+    """Draw the cross-track along one line of the grid."""
     for method in METHODS:
         across = [grid[cell].right[method].cross_track for cell in cells]
         axes.plot(values_ms, across, marker=".", **method.line)
@@ -122,8 +122,8 @@ def _draw_cut(axes: Axes, grid: Grid, cells: list[Cell], values_ms: list[int], w
 
 
 def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
-    """Worst error of the times against the best other method, by dead time and lag."""
-    dead_times, lags = _axes_of(grid)
+    """Draw the cross-track with the worst error over that of the best other method, by cell."""
+    dead_times, lags = _grid_values(grid)
     ratios = np.array(
         [[grid[Cell(rate_hz, dead_time, lag)].ratio for dead_time in dead_times] for lag in lags]
     )
@@ -145,11 +145,11 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
 
 
 def _draw_errors(axes: Axes, scores: dict[TimesError, Score]) -> None:
-    """Cross-track over the error of the dead time, a line for each error of the lag."""
+    """Draw the cross-track over the error of the dead time, a line for each error of the lag."""
     errors = [100.0 * error for error in FINE_ERRORS]
-    for lag, look in _BY_LAG.items():
+    for lag, style in _BY_LAG.items():
         across = [scores[TimesError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
-        line = {"color": FOLLOWING.colour, "linewidth": 1.3, **look}
+        line = {"color": FOLLOWING.colour, "linewidth": 1.3, **style}
         axes.plot(errors, across, label=f"lag {in_percent(lag)}", **line)
     axes.set(xlabel="error of the assumed dead time, %", ylabel=_ACROSS, ylim=(0.0, None))
     axes.legend(ncols=2)

@@ -1,4 +1,4 @@
-"""What the numbers of the study say of the statements on its page."""
+"""The findings of the study `lag`: statements, and whether its numbers support them."""
 
 from companion.study.lag.flights import (
     COMPLETE_HZ,
@@ -26,7 +26,7 @@ def find(
 
     Args:
         grid: flights over dead times, lags and sample rates.
-        example: flights behind one of these loops, in full.
+        example: flights with one rate loop, in full.
         complete: flights with the complete inner loop.
         from_fit: largest deviation from the fitted second-order model, by method.
     """
@@ -34,7 +34,7 @@ def find(
         *_on_the_example(example),
         _over_the_grid(grid),
         _wrong_over_the_grid(grid),
-        _rather_too_long(grid, complete),
+        _too_long_or_too_short(grid, complete),
         *_with_the_complete_loop(complete, from_fit),
     )
 
@@ -103,7 +103,7 @@ def _wrong_over_the_grid(grid: Grid) -> Finding:
     )
 
 
-def _rather_too_long(grid: Grid, complete: Complete) -> Finding:
+def _too_long_or_too_short(grid: Grid, complete: Complete) -> Finding:
     short, long = TimesError(-0.5, -0.5), TimesError(0.5, 0.5)
     pairs = [
         (place.wrong[long], place.wrong[short])

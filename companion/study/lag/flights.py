@@ -1,4 +1,4 @@
-"""The flights: every planner behind a slow rate loop, model-following also with wrong times."""
+"""The flights: every planner with a slow rate loop, model-following also with wrong times."""
 
 from dataclasses import replace
 from itertools import product
@@ -15,13 +15,13 @@ from companion.study.step import FIGURE_2, Loop, Response, Step, fly_loop
 
 METHODS = (*PAPERS, EXACT, FOLLOWING)
 OTHERS = tuple(method for method in METHODS if method is not FOLLOWING)
-"""The methods that know nothing of the rate loop."""
+"""The methods that do not use the times of the rate loop."""
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
 
 EXAMPLE_LOOP = LagLoop(lag_ms=25, dead_time_ms=45)
-"""Between what was measured on PX4 and on ArduPilot."""
+"""Lag and dead time between those measured on PX4 and on ArduPilot."""
 EXAMPLE_RATES_HZ = (100.0, 250.0)
 EXAMPLE_ERRORS_HZ = 100.0
 MAX_TILT_RATE = pi / 2.0
@@ -81,7 +81,7 @@ class Score(NamedTuple):
 
     Attributes:
         cross_track: largest distance from the straight line, in coefficients.
-        time: until no more than 5 % of the step is left for good, s; inf if never.
+        time: time after which no more than 5 % of the step is ever left, s; inf if never.
     """
 
     cross_track: float
@@ -89,11 +89,11 @@ class Score(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """All methods behind one rate loop at one sample rate.
+    """All methods with one rate loop at one sample rate.
 
     Attributes:
-        right: every method; model-following with the right times.
-        wrong: model-following by the error of its times. Without a dead time there are fewer.
+        right: score of every method; model-following has the right times.
+        wrong: score of model-following by the error of its times.
     """
 
     right: dict[Method, Score]
@@ -101,27 +101,27 @@ class Comparison(NamedTuple):
 
     @property
     def best_other(self) -> Method:
-        """The straightest of the methods that know nothing of the rate loop."""
+        """The straightest of `OTHERS`."""
         return min(OTHERS, key=lambda method: self.right[method].cross_track)
 
     @property
     def worst_error(self) -> TimesError:
-        """The error with the largest cross-track."""
+        """The error of the times with the largest cross-track."""
         return max(self.wrong, key=lambda error: self.wrong[error].cross_track)
 
     @property
     def worst(self) -> float:
-        """Cross-track of model-following with that error."""
+        """Cross-track of model-following with `worst_error`."""
         return self.wrong[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
-        """That cross-track over the best other method's; below 1 model-following is better."""
+        """`worst` over the cross-track of `best_other`; below 1 model-following is better."""
         return self.worst / self.right[self.best_other].cross_track
 
 
 class Cell(NamedTuple):
-    """One cell of the grid."""
+    """One cell of the grid: sample rate, and dead time and lag of the rate loop."""
 
     rate_hz: float
     dead_time_ms: int
@@ -135,12 +135,12 @@ Grid = dict[Cell, Comparison]
 
 
 class Example(NamedTuple):
-    """The flights behind `EXAMPLE_LOOP`.
+    """The flights with `EXAMPLE_LOOP`.
 
     Attributes:
-        free: every method by rate (Hz), without limits.
-        limited: model-following with W_M, by rate.
-        wrong: model-following at 100 Hz by the error of its times, no error included.
+        free: responses of every method by sample rate (Hz), without limits.
+        limited: responses of model-following with the limit W_M, by sample rate (Hz).
+        wrong: score of model-following at 100 Hz by the error of its times, including no error.
     """
 
     free: dict[float, dict[Method, Response]]
@@ -152,7 +152,7 @@ class Complete(NamedTuple):
     """The flights with the complete inner loop.
 
     Attributes:
-        by_rate: the comparison at each sample rate (Hz), no error included among the wrong times.
+        by_rate: comparison at each sample rate (Hz); `wrong` there has right times as well.
         shown: responses of every method at `COMPLETE_HZ`.
     """
 
@@ -161,17 +161,17 @@ class Complete(NamedTuple):
 
 
 def in_percent(error: float) -> str:
-    """An error as tables and legends show it."""
+    """A relative error in words for tables and legends."""
     return f"{100.0 * error:+.0f} %".replace("-", "−") if error else "right"
 
 
 def score(response: Response) -> Score:
-    """The score at the only heading."""
+    """The score of a response at one heading."""
     return Score(float(cross_track(response)[0]), float(time_to(response)[0]))
 
 
 def step_at(rate_hz: float) -> Step:
-    """The step of figure 2 at heading 0; of all methods only `euler` depends on heading."""
+    """The step of figure 2 at heading 0; only `euler` would respond differently at others."""
     return replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)
 
 

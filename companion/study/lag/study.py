@@ -1,4 +1,4 @@
-"""The study `lag`: what is flown, its tables, and its section of the page."""
+"""The study `lag`: flights, tables, and section of the page."""
 
 from itertools import product
 from typing import NamedTuple
@@ -48,7 +48,7 @@ class _Fitted(NamedTuple):
     """The second-order model fitted to a response."""
 
     fit: SecondOrderFit
-    deviation: float  # largest, of the response from the model
+    deviation: float  # largest deviation of the response from the model
 
 
 def run(tick: Tick) -> Outcome:
@@ -108,7 +108,7 @@ def _fitted(response: Response) -> _Fitted:
 
 
 def _example_table(example: Example) -> Table:
-    """Every method by rate, and model-following with the rate limit."""
+    """Every method by sample rate, and model-following with the limit of the tilt rate."""
     rows: list[tuple[TableCell, ...]] = []
     for rate, responses in example.free.items():
         flown = [(method.label, response) for method, response in responses.items()]
@@ -142,7 +142,7 @@ def _errors_table(name: str, caption: str, scores: dict[TimesError, Score]) -> T
 
 
 def _worst_table(grid: Grid) -> Table:
-    """The worst error of the times beside the best other method, a row for each rate and lag."""
+    """Cross-track with the worst error, and of the best other method, by sample rate and lag."""
     dead_times = sorted({cell.dead_time_ms for cell in grid})
     rows: list[tuple[TableCell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
@@ -179,7 +179,7 @@ def _fit_table(complete: Complete, fitted: dict[Method, _Fitted]) -> Table:
 
 
 def _rates_table(complete: Complete) -> Table:
-    """Cross-track of every method by rate, and of model-following with the worst errors."""
+    """Cross-track of every method by sample rate, and of model-following with the worst error."""
     by_rate = complete.by_rate
     rows: list[tuple[TableCell, ...]] = [
         (m.label, *(at.right[m].cross_track for at in by_rate.values())) for m in METHODS
@@ -222,7 +222,7 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
 
 
 def _complete_series(complete: Complete) -> Table:
-    """Every error at every rate."""
+    """Cross-track of model-following for every error at every sample rate."""
     return Table(
         "lag-inner-loop-beliefs",
         "Cross-track of model-following with the complete inner loop, by rate and error.",

@@ -1,4 +1,4 @@
-"""What the numbers of the study say of the statements on its page."""
+"""The findings of the study `nmpc`: statements, and whether its numbers support them."""
 
 from collections.abc import Sequence
 from math import isinf
@@ -11,17 +11,17 @@ from companion.study.nmpc.timing import STATES, ColdStarts, ProcessTimes
 from companion.study.nmpc.variants import (
     CIRCLE,
     EIGHT,
-    LOOKS,
     MAX_ITERATIONS,
     MODELS,
     RATE_HZ,
+    STYLES,
     UNLIMITED,
     Variant,
 )
 from companion.study.outcome import Finding, Source
 
 _SETTLED_M = 0.1
-"""Largest error over the last seconds of a flight that has settled."""
+"""Largest error in the last 2 s of a flight that has settled, m."""
 _LAST = round(2.0 * RATE_HZ)
 _MAX_ANSWER_MS = 10.0
 
@@ -41,18 +41,18 @@ def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Findi
 
 
 def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) -> Finding:
-    """Whether the proposed model is, with one iteration and to the end."""
+    """Whether the proposed model is solved faster than `others`, with one and all iterations."""
     shares = {
-        (model, most): _typical(model, most, flown) / _typical("proposed", most, flown)
+        (model, most): _median_ms(model, most, flown) / _median_ms("proposed", most, flown)
         for model in others
         for most in (1, MAX_ITERATIONS)
     }
     medians = "; ".join(
-        f"{LOOKS[model].label} takes {shares[model, 1]:.2f} × its time with one iteration,"
+        f"{STYLES[model].label} takes {shares[model, 1]:.2f} × its time with one iteration,"
         f" {shares[model, MAX_ITERATIONS]:.2f} × to the end"
         for model in others
     )
-    names = " and ".join(LOOKS[model].label for model in others)
+    names = " and ".join(STYLES[model].label for model in others)
     return Finding(
         source,
         f"The proposed model is solved faster than {names}.",
@@ -61,14 +61,14 @@ def _solved_faster(source: Source, others: Sequence[ModelName], flown: Flights) 
     )
 
 
-def _typical(model: ModelName, iterations: int, flown: Flights) -> float:
+def _median_ms(model: ModelName, iterations: int, flown: Flights) -> float:
     return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
 def _from_cold(counts: ColdStarts) -> Finding:
     reached = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
     others = max(reached[model] for model in UNLIMITED)
-    reaching = ", ".join(f"{LOOKS[model].label} {reached[model]}" for model in MODELS)
+    reaching = ", ".join(f"{STYLES[model].label} {reached[model]}" for model in MODELS)
     return Finding(
         "ours",
         "With limits as constraints the solver converges from more states.",
@@ -82,7 +82,7 @@ def _settles(model: ModelName, flown: Flights) -> Finding:
     last = max(flight.errors[-_LAST:])
     return Finding(
         "ours",
-        f"From a standing start, {LOOKS[model].label} settles on the circle within 4 s.",
+        f"From a standing start, {STYLES[model].label} settles on the circle within 4 s.",
         last < _SETTLED_M,
         f"The error is {max(flight.errors):.2g} m at most, and {last:.2g} m in the last 2 s of 6 s"
         f" (bound {_SETTLED_M:g} m).",
@@ -93,7 +93,7 @@ def _smallest_error(flown: Flights) -> Finding:
     compared = []
     for task in (CIRCLE, EIGHT):
         errors = {model: flown[task.name, Variant(model)].rms for model in MODELS}
-        other = min((errors[model], LOOKS[model].label) for model in UNLIMITED)
+        other = min((errors[model], STYLES[model].label) for model in UNLIMITED)
         compared.append((task.name, errors["limited"], *other))
     return Finding(
         "ours",
@@ -108,13 +108,13 @@ def _smallest_error(flown: Flights) -> Finding:
 
 
 def _dead_time(flown: Flights) -> Finding:
-    """How much knowing the dead time reduces the error on the figure-eight."""
+    """Whether knowing the dead time reduces the error on the figure-eight, and by how much."""
     gains = {
         model: flown[EIGHT.name, Variant(model, knows_dead_time=False)].rms
         / flown[EIGHT.name, Variant(model)].rms
         for model in UNLIMITED
     }
-    ratios = ", ".join(f"{LOOKS[model].label} {gain:.2g} ×" for model, gain in gains.items())
+    ratios = ", ".join(f"{STYLES[model].label} {gain:.2g} ×" for model, gain in gains.items())
     return Finding(
         "ours",
         "Predicting past the dead time helps every model.",

@@ -35,22 +35,22 @@ from companion.study.step import Floats
 
 SECONDS = 6
 SETTLED = 4.0
-"""Errors count from this time on, s."""
+"""Time from which errors count, s."""
 _INPUTS = 8
-"""Latest inputs given to the solver: more than dead time and lead need."""
+"""Number of latest inputs given to the solver; they cover dead time plus lead."""
 _PLANNER_HZ = 250
 _STEPS = STEP_HZ // _PLANNER_HZ
 
 
 class Vehicle:
-    """A point mass with drag, turned by model-following behind a rate loop with lag.
+    """A point mass with drag, whose attitude is controlled by model-following through a `LagBody`.
 
     It begins at rest, level, at the origin.
 
     Attributes:
         position: m, NED.
         velocity: m/s, NED.
-        body: its attitude and body rates.
+        body: attitude and body rates.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class Vehicle:
         )
 
     def fly(self, target: Target, thrust: float, seconds: float) -> None:
-        """Hold a target and a specific thrust (m/s²) for this time."""
+        """Simulate `seconds` with a constant target and specific thrust (m/s²)."""
         dt = 1.0 / _PLANNER_HZ
         for _ in range(round(seconds * _PLANNER_HZ)):
             before = _lift(self.body.q, thrust)
@@ -77,7 +77,7 @@ class Vehicle:
             self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
 
     def _move(self, lift: tuple[float, ...], dt: float) -> None:
-        """Thrust, gravity and drag over a short time, by the midpoint rule."""
+        """Integrate `lift` (thrust and gravity, m/s²) and drag over `dt` s by the midpoint rule."""
         position, velocity = [], []
         for p, v, push in zip(self.position, self.velocity, lift, strict=True):
             middle = v + 0.5 * dt * (push - DRAG * v)
@@ -94,13 +94,13 @@ def _lift(q: Quaternion, thrust: float) -> Vector:
 
 
 class Flight:
-    """One variant at one task.
+    """The flight of one variant on one task.
 
     Attributes:
         errors: distance from the trajectory after each period, m.
         path: position after each period, m, NED.
-        seconds: processor time of each solve.
-        iterations: of each solve.
+        seconds: processor time of each solve, s.
+        iterations: number of iterations of each solve.
         failures: number of solves without a usable answer.
     """
 
@@ -120,7 +120,7 @@ class Flight:
         self._periods = 0
 
     def step(self) -> None:
-        """One period: solve, and meanwhile fly the previous answer."""
+        """Simulate one period: solve, and fly the previous answer."""
         now, vehicle, flown = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
         known = KnownState(
             now,
@@ -156,12 +156,12 @@ class Flight:
 
     @property
     def rms(self) -> float:
-        """Of the settled errors, m."""
+        """Root mean square of the settled errors, m."""
         return float(np.sqrt(np.mean(self.settled**2)))
 
     @property
     def worst(self) -> float:
-        """Of the settled errors, m."""
+        """Largest settled error, m."""
         return float(self.settled.max())
 
     def solve_ms(self, percentile: float) -> float:
@@ -170,13 +170,13 @@ class Flight:
 
 
 Flights = dict[tuple[str, Variant], Flight]
-"""By the name of the task and the variant."""
+"""Flights by name of the task and variant."""
 
 
 def fly_all(tick: Tick) -> Flights:
     """Fly all variants, one period of each in turn.
 
-    A disturbance of the machine then hits all of them. The order rotates with every period.
+    So other load on the computer slows all of them equally. The order rotates with every period.
     """
     flown = _all_flights()
     turns = list(flown.values())
@@ -190,7 +190,7 @@ def fly_all(tick: Tick) -> Flights:
 
 
 def _all_flights() -> Flights:
-    """Every flight, before its first period."""
+    """All flights, each before its first period."""
     unlimited = [
         Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED
     ]

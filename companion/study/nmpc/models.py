@@ -1,11 +1,11 @@
 """The prediction models of the study; the equations are those of Xu & Pei, Sensors 2026, 26(9).
 
 The paper has `proposed` (34), `euler` (37) and `quaternion` (39), none with a limit of tilt or
-rate. `limited` is the model that flies, and `euler-reduced` the fair baseline of `euler`. The paper
-leaves drag and disturbance out; here they are the same in all models.
+rate. `limited` is the model used in flight, and `euler-reduced` a simplified `euler` for a fair
+comparison. The paper has neither drag nor disturbance; here they are the same in all models.
 
-The controls of the attitude models are body rates. Their answers are converted to the target for
-which the planner commands these rates (`_led_target`): the same inner loop flies all models.
+The controls of the attitude models are body rates. `_led_target` converts them to the target for
+which the planner commands these rates, so that the same inner loop flies all models.
 """
 
 from collections.abc import Callable
@@ -52,7 +52,7 @@ def proposed(settings: Settings) -> Model:
 def euler(settings: Settings) -> Model:
     """Equation 37: p, v, and the Euler angles Z-Y-X; control (body rates, specific thrust).
 
-    The angles turn with M(φ, θ)⁻¹·ω, the inverse of the matrix in section 4.2.
+    The rates of the angles are M(φ, θ)⁻¹·ω, with the matrix M of section 4.2.
     """
     state, control, constants = ca.SX.sym("x", 9), ca.SX.sym("u", 4), constants_symbols()
     roll, pitch, yaw = state[6], state[7], state[8]
@@ -86,10 +86,10 @@ def euler(settings: Settings) -> Model:
 
 
 def euler_reduced(settings: Settings) -> Model:
-    """Equation 37 with its matrix cancelled and the yaw held: the fair baseline.
+    """Equation 37 without its matrix and with constant yaw, for a fair comparison.
 
-    Since ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards, the controls may be φ̇ and θ̇ themselves.
-    Then the matrix drops out, and the yaw is a constant of the horizon: the one at its start.
+    The controls are φ̇ and θ̇ themselves, since ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards. So
+    the matrix drops out. The yaw stays that at the start of the horizon.
     """
     state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own=1)
     yaw = own_constant(constants)
@@ -145,7 +145,7 @@ def quaternion(settings: Settings) -> Model:
         constants=constants,
         derivative=derivative,
         aim=aim,
-        # Twice the sine of half the error of the tilt-yaw heading: smooth, where an angle jumps.
+        # Twice the sine of half the heading error, which is smooth where an angle would jump.
         heading_error=2.0 * (z * aim[0] - w * aim[1]) / ca.sqrt(w * w + z * z),
         turning_error=control[0:3] - aim[2:5],
         target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
@@ -171,11 +171,11 @@ MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
     "euler-reduced": euler_reduced,
     "quaternion": quaternion,
 }
-"""What makes each model."""
+"""The function that makes each model."""
 
 
 def _conditions_only(conditions: Conditions, _start: Motion) -> Floats:
-    """The constants of a model that has none of its own."""
+    """The constants of a model that needs only `Conditions`."""
     return conditions
 
 
@@ -201,7 +201,7 @@ def _led_target(
 
 
 def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
-    """M(φ, θ)⁻¹·ω of body rates (x, y, z); symbols or numbers."""
+    """Rates of the Euler angles, M(φ, θ)⁻¹·ω, at body rates (x, y, z); symbols or numbers."""
     turning = ca.sin(roll) * y + ca.cos(roll) * z
     return (
         x + ca.tan(pitch) * turning,
@@ -230,7 +230,7 @@ def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 
 
 def _euler_near(north: float, east: float, heading: float) -> tuple[float, float, float]:
-    """Roll, pitch, and yaw within π of the heading, which may be unwrapped; rad."""
+    """Roll, pitch, and a yaw within π of the heading, which may be unwrapped; rad."""
     roll, pitch, yaw = euler_angles(attitude_of(north, east, heading))
     return roll, pitch, heading + wrap_angle(yaw - heading)
 

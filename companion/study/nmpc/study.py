@@ -1,4 +1,4 @@
-"""The study `nmpc`: what is flown, its tables, its figure, its section of the page."""
+"""The study `nmpc`: flights, tables, figure, and section of the page."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,10 +18,10 @@ from companion.study.nmpc.timing import (
 from companion.study.nmpc.variants import (
     CIRCLE,
     EIGHT,
-    LOOKS,
     MAX_ITERATIONS,
     MODELS,
     RATE_HZ,
+    STYLES,
     Task,
     Variant,
 )
@@ -72,14 +72,14 @@ def run(tick: Tick) -> Outcome:
 
 
 def _time_table(flown: Flights) -> Table:
-    """Solve times of every model: one iteration, and to the end."""
+    """Solve times of every model, with one iteration and with all."""
     rows: list[tuple[Cell, ...]] = []
     for model in MODELS:
         single = flown[EIGHT.name, Variant(model)]
         whole = flown[EIGHT.name, Variant(model, MAX_ITERATIONS)]
         rows.append(
             (
-                LOOKS[model].label,
+                STYLES[model].label,
                 single.solve_ms(50),
                 single.solve_ms(99),
                 whole.solve_ms(50),
@@ -106,13 +106,13 @@ def _time_table(flown: Flights) -> Table:
 
 
 def _cold_start_table(counts: ColdStarts) -> Table:
-    """Iterations from every state."""
+    """Iterations of every model from every state."""
     return Table(
         "nmpc-cold-start",
         "SQP iterations to the tolerance, by the state of the vehicle while it should be on the"
         " circle at 5 m/s. The first guess is the circle.",
         ("model", *STATES),
-        tuple((LOOKS[model].label, *of_model.values()) for model, of_model in counts.items()),
+        tuple((STYLES[model].label, *of_model.values()) for model, of_model in counts.items()),
     )
 
 
@@ -157,7 +157,7 @@ def _process_table(times: ProcessTimes) -> Table:
 
 
 def _series(flown: Flights) -> Table:
-    """Every period of every flight."""
+    """Table of every period of every flight."""
     return Table(
         "nmpc-flights",
         "All flights.",
@@ -189,7 +189,7 @@ def _series(flown: Flights) -> Table:
 
 
 def _draw_figure(flown: Flights) -> Figure:
-    """All panels, as `_CAPTION` describes them."""
+    """Draw the figure that `_CAPTION` describes."""
     figure, ((path, eight), (circle, times)) = new_figure(2, 2)
     _draw_paths(path, flown)
     _draw_errors(circle, flown, CIRCLE, "Error after the standing start")
@@ -203,7 +203,7 @@ def _draw_figure(flown: Flights) -> Figure:
 def _draw_paths(axes: Axes, flown: Flights) -> None:
     for model in MODELS:
         north, east, _ = np.array(flown[CIRCLE.name, Variant(model)].path).T
-        axes.plot(east, north, **LOOKS[model].line)
+        axes.plot(east, north, **STYLES[model].line)
     begin = CIRCLE.trajectory.at(CIRCLE.begin).position
     times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
     wanted = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
@@ -224,7 +224,7 @@ def _draw_errors(axes: Axes, flown: Flights, task: Task, title: str) -> None:
     for model in MODELS:
         errors = np.array(flown[task.name, Variant(model)].errors)
         time = (np.arange(len(errors)) + 1) / RATE_HZ
-        draw(axes, time, errors, LOOKS[model].line, LOOKS[model].label)
+        draw(axes, time, errors, STYLES[model].line, STYLES[model].label)
     axes.set(title=title, xlabel="time, s", ylabel="distance, m")
 
 
@@ -233,7 +233,7 @@ def _draw_times(axes: Axes, flown: Flights) -> None:
         for iterations, width in ((1, 1.0), (MAX_ITERATIONS, 2.5)):
             times = np.sort(flown[EIGHT.name, Variant(model, iterations)].seconds)
             share = (np.arange(len(times)) + 1) / len(times)
-            axes.plot(1e3 * times, share, **{**LOOKS[model].line, "linewidth": width})
+            axes.plot(1e3 * times, share, **{**STYLES[model].line, "linewidth": width})
     axes.set(
         title="Processor time of a solve",
         xlabel="time, ms",

@@ -1,4 +1,4 @@
-"""What a solve costs beside the flights: iterations from a cold start, and the solver process."""
+"""Cost of a solve outside flights: iterations from a cold start, and times of the process."""
 
 from math import inf
 from time import monotonic, sleep
@@ -24,9 +24,9 @@ class State(NamedTuple):
     """A state of the vehicle while it should be on the circle at 5 m/s.
 
     Attributes:
-        offset: from its place on the circle, m, NED.
+        offset: position relative to its place on the circle, m, NED.
         velocity: m/s, NED.
-        coefficients: of its attitude.
+        coefficients: coefficients of its attitude.
         body_rates: rad/s.
     """
 
@@ -83,11 +83,11 @@ def _from_state(state: State) -> Request:
 
 
 class ProcessTimes(NamedTuple):
-    """What the solver process needs at 50 Hz, n answers.
+    """Times of the solver process at 50 Hz, for n answers.
 
     Attributes:
-        answer_ms: (n,), from before a request is packed until its answer is unpacked.
-        solve_ms: (n,), the part in `Worker.answer`.
+        answer_ms: (n,), time from before a request is packed until its answer is unpacked, ms.
+        solve_ms: (n,), time in `Worker.answer`, ms.
         troubles: number of requests without an answer in time.
     """
 
@@ -97,7 +97,7 @@ class ProcessTimes(NamedTuple):
 
 
 def time_process() -> ProcessTimes:
-    """Ask the solver process for a vehicle on the figure-eight, and wait for each answer.
+    """Send requests for a vehicle on the figure-eight to the solver process, and time the answers.
 
     Raises:
         ChildProcessError: the process does not start; the message says why.

@@ -1,1 +1,1 @@
-"""The experiments of the paper, one file each: figures 2 to 5, sample rates, appendix A."""
+"""The experiments of the paper, one module each: figures 2 to 5, sample rates, appendix A."""

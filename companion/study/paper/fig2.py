@@ -14,6 +14,7 @@ from companion.study.drawing import (
     draw_reference,
     draw_response,
     new_figure,
+    say_magnified,
 )
 from companion.study.measures import (
     best_and_worst,
@@ -37,7 +38,7 @@ from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _SAME = 1e-9
-"""Paths at two headings that differ by less are the same."""
+"""Paths at two headings that differ by less count as the same."""
 _METHODS = (*PAPERS, EXACT)
 PARTS = len(_METHODS) + 1
 
@@ -45,10 +46,10 @@ PARTS = len(_METHODS) + 1
 def _printed_quaternion_law(
     q: Quaternion, target: Target, dt: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error that section 4.2 prints.
+    """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the error as printed in section 4.2.
 
-    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹: this is the body-frame error rotated to the world
-    frame. Using it as body rates shows the effect of the misprint.
+    vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹ is the body-frame error rotated to the world frame.
+    Using it as body rates shows the effect of this misprint.
     """
     w, x, y, z = q
     i, j, k = body_error.quaternion(q, target, dt, constants)
@@ -87,7 +88,8 @@ def run(tick: Tick) -> Outcome:
         figure=_figure(responses, reference),
         caption=(
             "Every method at one heading, for Euler angles the worst: both coefficients, distance"
-            " from the first-order reference, and the path in the plane of the coefficients."
+            " from the first-order reference, and the path in the plane of the coefficients. In the"
+            " panels `Response, east` and `Path` the axis of a_E is magnified."
         ),
         tables=(
             Table(
@@ -146,8 +148,16 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         ylim=(1e-5, 0.1),
     )
     draw_plane(plane, curves, np.array([FIGURE_2.start, FIGURE_2.target]))
+    north_span, east_span = _span(north.get_ylim()), _span(east.get_ylim())
+    say_magnified(east, "this axis", east_span, "that of north", north_span)
+    east_span, north_span = _span(plane.get_xlim()), _span(plane.get_ylim())
+    say_magnified(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
     north.legend(loc="lower right")
     return figure
+
+
+def _span(limits: tuple[float, float]) -> float:
+    return limits[1] - limits[0]
 
 
 def _findings(

@@ -15,7 +15,7 @@ from companion.study.outcome import Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _FOLDED = colormaps["viridis"]
-"""Colours by the angle between the heading and the axis of the step, 0° to 90°."""
+"""Colour map over the angle between the heading and the axis of the step, 0° to 90°."""
 PARTS = 2
 
 

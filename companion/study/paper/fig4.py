@@ -38,7 +38,7 @@ PARTS = len(_METHODS)
 
 
 def run(tick: Tick) -> Outcome:
-    """Fly the step of figure 4 with every method; the proposed one with each of its limits."""
+    """Fly the step of figure 4 with every method, and `first-order` with both forms of limit."""
     tight = Limits(MAX_TILT, MAX_TILT_RATE)
     paper = replace(tight, shape="paper")
     responses = {}

@@ -161,7 +161,7 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
 
 
 def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
-    """Straightness and order of the response with each loop, and the effect of heading."""
+    """Findings on straightness, on the order of the response, and on the effect of heading."""
     others = [method for method in PAPERS if method is not PROPOSED]
     ahead = [t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)]
     return (

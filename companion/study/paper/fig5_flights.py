@@ -19,12 +19,12 @@ from companion.study.step import FIGURE_2, Floats, Response, fly_loop
 STEP = replace(FIGURE_2, headings=tuple(k * pi / 4.0 for k in range(-3, 5)))
 METHODS = (*PAPERS, EXACT)
 QUICK, MEASURED = 5, 1
-"""How many times faster than the bundled vehicle, which responds as measured on a PX4."""
+"""Speed of the inner loops relative to the mock vehicle, which responds as measured on a PX4."""
 _SWEEP = (10, 5, 3, 2, 1)
 PARTS = 2 * len(METHODS) + len(_SWEEP)
 
 Sweep = dict[float, dict[Method, float]]
-"""Cross-track of every method of the paper at heading 0, by the 63 % time (s) of the loop."""
+"""Cross-track of each method of the paper at heading 0, by `LoopFlights.time_63` of the loop, s."""
 
 
 class LoopFlights(NamedTuple):
@@ -32,8 +32,8 @@ class LoopFlights(NamedTuple):
 
     Attributes:
         time_63: time in which a step of the roll rate reaches 63 %, s.
-        responses: by method.
-        fits: second-order models of the responses, each at the heading `worst`.
+        responses: response of each method.
+        fits: second-order model fitted to each response, at the heading `worst`.
     """
 
     time_63: float

@@ -14,14 +14,14 @@ from companion.study.step import Floats
 
 TILTS = tuple(radians(angle) for angle in (0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0))
 PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
-"""K_max as the paper prints it, by tilt in degrees."""
+"""K_max as printed in the paper, by tilt in degrees."""
 
 _LIMIT = radians(60.0)
 _DIRECTIONS = 72
 PARTS = 2
 
 _Row = tuple[int, float, float, float, float]
-"""Tilt in degrees, largest K, its bound, smallest K, mean body rate over the largest."""
+"""Tilt in degrees, largest K, bound of K, smallest K, mean body rate / largest body rate."""
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
@@ -36,7 +36,7 @@ def bound(max_tilt: float) -> float:
 
 
 def run(tick: Tick) -> Outcome:
-    """Compute K with the formulas that fly, over tilts and directions."""
+    """Compute K over tilts and directions, with the formulas used in flight."""
     tick("tilts")
     directions = np.linspace(0.0, 2.0 * pi, _DIRECTIONS, endpoint=False)
     by_tilt = {

@@ -1,4 +1,4 @@
-"""The paper's error from sampling, by sample rate, beside the planner `exact` without it."""
+"""Discretisation error of the paper's planner by sample rate; the planner `exact` has none."""
 
 from dataclasses import replace
 

@@ -1,1 +1,1 @@
-"""Position error on trajectories: every planner, over speed, with and without lead, in wind."""
+"""Position error on trajectories: every planner, several speeds, with and without lead, in wind."""

@@ -1,4 +1,4 @@
-"""The figure of the study: paths, error over speed, lead and wind."""
+"""The figure of the study `track`: paths, error over speed, lead and wind."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -35,11 +35,11 @@ _STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewid
 _IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
 _ROUND_MM = (10, 20, 50, 100, 200, 500, 1000)
 _MARKERS = ("o", "s")
-"""For each of `GUIDANCES`."""
+"""Marker of each of `GUIDANCES`."""
 
 
 def draw_figure(flown: Flown) -> Figure:
-    """All panels, as `CAPTION` describes them."""
+    """Draw the figure that `CAPTION` describes."""
     telemetry = {task: 1e3 * tracked.telemetry.rms for task, tracked in flown.items()}
     truth = {task: 1e3 * tracked.truth.rms for task, tracked in flown.items()}
     figure, panels = new_figure(4, 2)
@@ -56,7 +56,7 @@ def draw_figure(flown: Flown) -> Figure:
 
 
 def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
-    """The reference path, and the paths flown with and without lead."""
+    """Draw the reference path, and the paths flown with and without lead."""
     led = flown[Task(course, MODEL_FOLLOWING)]
     not_led = flown[Task(course, MODEL_FOLLOWING, lead=False)]
     draw(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
@@ -67,7 +67,7 @@ def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
 
 
 def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
-    """Error (mm) of every planner with every guidance over speed, in still air."""
+    """Draw the error (mm) of every planner with every guidance over speed, in still air."""
     for (guidance, marker), method in product(zip(GUIDANCES, _MARKERS, strict=False), _METHODS):
         if method.planner not in planners(guidance):
             continue
@@ -78,13 +78,13 @@ def _draw_planners(axes: Axes, errors: dict[Task, float], courses: Sequence[Cour
 
 
 def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence[Course]) -> None:
-    """Error (mm) over speed, with and without lead, in still air and in wind."""
-    for wind, look in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
+    """Draw the error (mm) over speed, with and without lead, in still air and in wind."""
+    for wind, style in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
         where = f", wind of {wind:g} m/s" if wind else ""
         for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):
             tasks = [Task(course, MODEL_FOLLOWING, LINEAR, wind, lead) for course in courses]
             label = f"model-following{'' if lead else ', not led'}{where}"
-            _draw_over_speed(axes, tasks, errors, {**look, "color": colour}, label)
+            _draw_over_speed(axes, tasks, errors, {**style, "color": colour}, label)
     tasks = [Task(course, PROPOSED.planner, LINEAR, WINDY) for course in courses]
     line = {**_IN_WIND, "color": PROPOSED.colour}
     _draw_over_speed(axes, tasks, errors, line, f"first-order, wind of {WINDY:g} m/s")

@@ -1,4 +1,4 @@
-"""What the numbers of the study say of the statements on its page."""
+"""The findings of the study `track`: statements, and whether its numbers support them."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -19,10 +19,10 @@ from companion.study.track.tasks import (
 )
 
 _EQUAL = 2e-4
-"""Errors that differ by less count as equal, m: another seed of the noise can reverse them."""
+"""Errors that differ by less count as equal, m; another seed of the noise changes them as much."""
 _OTHERS = tuple(planner for planner in PLANNER_NAMES if planner != MODEL_FOLLOWING)
 _REQUIRED_RATIO = 3.0
-"""Of the error without lead to the error with lead."""
+"""Required ratio of the error without lead to the error with lead."""
 _REQUIRED = {
     Task(CIRCLE_AT_5, MODEL_FOLLOWING): 0.08,
     Task(EIGHT_AT_5, MODEL_FOLLOWING): 0.06,

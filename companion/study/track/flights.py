@@ -1,4 +1,4 @@
-"""The flights: the bundled vehicle follows one course, in lockstep over a socket."""
+"""The flights: the mock vehicle follows one course, in lockstep over a socket."""
 
 import asyncio
 import json
@@ -29,11 +29,11 @@ from companion.study.track.tasks import Task
 
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
-"""The circle at 7 m/s needs 51° of tilt against its own drag, and more in wind."""
+"""Limits of the flights: on the circle at 7 m/s, drag makes 51° of tilt necessary, wind more."""
 GUSTS = 1.0 / 3.0
 """Standard deviation of the gusts north and east, as a share of the mean wind."""
 HOLD_S = 2.0
-"""Hover before the course, so that the takeover is not part of the measurement."""
+"""Duration of the hover before the course, s, so that the takeover is not measured."""
 _HEIGHT_M = 3.0
 _SHORT_PHASES = {
     "prearm_delay_s": 0.2,
@@ -47,9 +47,9 @@ _SHORT_PHASES = {
 }
 """Vehicle settings that shorten take-off and landing."""
 _TRUTH_PERIOD = 0.02
-"""Between two requests of the true position, s of vehicle time."""
+"""Time between two requests of the true position, s of vehicle time."""
 _TRUTH_TIMEOUT = 1.0
-"""For an answer, s of wall time; an answer takes about 0.1 ms."""
+"""Time allowed for an answer, s of wall time; it takes about 0.1 ms."""
 _MEASURED_PHASE = "maneuvers"
 
 
@@ -67,7 +67,7 @@ class Tracked(NamedTuple):
         result: "ok", or why the flight ended.
         telemetry: error of the position that guidance received.
         truth: error of the vehicle's true position.
-        path: (n, 4): reference north and east, true north and east, m.
+        path: (n, 4), reference north and east, true north and east, m.
     """
 
     result: str
@@ -85,10 +85,10 @@ Flown = dict[Task, Tracked]
 
 
 def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
-    """Fly every task, one flight for each core; ticks as each begins.
+    """Fly every task, one flight per core at a time; `tick` is called when each begins.
 
-    A flight is the same to the bit whether it flies alone or beside others. On Ctrl-C this waits
-    for the flights in progress, so that no vehicle process is left behind.
+    The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
+    flights in progress, so that no vehicle process is left behind.
 
     Raises:
         ConfigError, VehicleStoppedError: a flight raised it (see `fly`); no more are started.
@@ -106,7 +106,7 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Processes started here inherit the block, so Ctrl-C reaches only the first process."""
+    """Block SIGINT; processes started meanwhile inherit this, so Ctrl-C does not reach them."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -120,14 +120,14 @@ def _await_a_free_core(flights: Sequence[Future[Tracked]], cores: int) -> None:
         wait(flying, return_when=FIRST_COMPLETED)
     for flight in flights:
         if flight.done():
-            flight.result()  # raises here what went wrong, before more flights are started
+            flight.result()  # raises the flight's exception before more flights are started
 
 
 def fly(task: Task) -> Tracked:
-    """Start the bundled vehicle, fly the task with it, and measure.
+    """Start the mock vehicle, fly the task with it, and measure the errors.
 
     Raises:
-        ConfigError: the configuration that ships cannot be found or used.
+        ConfigError: the shipped configuration cannot be found or used.
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     with tempfile.TemporaryDirectory(prefix="companion-track-") as name:
@@ -139,7 +139,7 @@ def fly(task: Task) -> Tracked:
         course.write_text(bounded_yaml.dump(task.course.file))
         config = _configured(shipped, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
-        session = Session(config, folder, truth, _never)
+        session = Session(config, folder, truth, _decline_landing)
         with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
             summary = lockstep.run(session.fly())
     if summary.result != "ok":
@@ -149,13 +149,13 @@ def fly(task: Task) -> Tracked:
 
 
 def _vehicle(shipped: Config, task: Task, truth_port: int) -> dict[str, Any]:
-    """The bundled vehicle as it ships, in the wind of the task."""
+    """Settings of the shipped mock vehicle, with the wind of the task."""
     wind = {"speed_m_s": task.wind, "gust_m_s": GUSTS * task.wind}
     return {**(shipped.mock or {}), **_SHORT_PHASES, "control_port": truth_port, "wind": wind}
 
 
 def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Config:
-    """The configuration that ships, with the changes that the task needs."""
+    """The shipped configuration with the changes for the task."""
     changes: dict[str, dict[str, Any]] = {
         "link": {
             "endpoint": endpoint,
@@ -180,18 +180,18 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
     return changed(shipped, changes, "study track")
 
 
-async def _never() -> bool:
+async def _decline_landing() -> bool:
     return False
 
 
 class TruthRecorder(Silent):
-    """Asks the vehicle's control channel for its true position during the measured phase.
+    """Requests the true position from the vehicle's control channel during the measured phase.
 
-    In lockstep vehicle time stops until its sample is answered. So a request may block our event
+    In lockstep, vehicle time stops until `companion` answers. So a request may block the event
     loop, and its answer belongs to the present vehicle time.
 
     Args:
-        port: of the control channel, on this machine.
+        port: port of the control channel on this computer.
     """
 
     def __init__(self, port: int) -> None:
@@ -200,7 +200,7 @@ class TruthRecorder(Silent):
         self._asking: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Start with the measured phase, stop with the next one."""
+        """Start requests with the measured phase, and stop them with the next phase."""
         if name == _MEASURED_PHASE:
             self._asking = asyncio.create_task(self._ask())
         elif self._asking is not None:
@@ -223,11 +223,11 @@ class TruthRecorder(Silent):
 
 
 def _measured(tracking: Floats, truth: Floats) -> Tracked:
-    """Measure over the course alone: from the end of the hold to the last true position.
+    """Measure the errors on the course: from the end of the hover to the last true position.
 
     Args:
-        tracking: rows as `FlightTrace.tracking`.
-        truth: rows as `TruthRecorder.rows`.
+        tracking: rows of `FlightTrace.tracking_rows`.
+        truth: rows of `TruthRecorder.rows`.
     """
     time = truth[:, 0]
     flown = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]

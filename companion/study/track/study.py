@@ -1,4 +1,4 @@
-"""The study `track`: what is flown, its tables, its rows for `--json`, its section of the page."""
+"""The study `track`: flights, tables, rows for `--json`, and section of the page."""
 
 from math import isfinite
 from typing import Any
@@ -70,9 +70,10 @@ def run(tick: Tick) -> Outcome:
 
 
 def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
-    """What `--json` prints: one row for each flight with lead; m, null if the flight failed.
+    """The rows that `--json` prints, one for each flight with lead.
 
-    The row also has the errors of the same flight without lead, if there was one.
+    Errors are in m, and null if the flight failed. A row also has the errors of the same flight
+    without lead, if there was one.
     """
     listed = []
     for task, tracked in flown.items():
@@ -99,7 +100,7 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
 
 
 def _tables(flown: Flown) -> tuple[Table, ...]:
-    """Every planner in still air by telemetry and by the truth; lead and wind."""
+    """Tables of all planners in still air, by telemetry and by true position; of lead and wind."""
     return (
         _planners_table(
             "track",
@@ -121,7 +122,7 @@ def _tables(flown: Flown) -> tuple[Table, ...]:
 
 
 def _series(flown: Flown) -> Table:
-    """Every flight."""
+    """Table of every flight."""
     return Table(
         "track-flights",
         "Every flight.",

@@ -1,4 +1,4 @@
-"""What the study flies: trajectories, speeds, planners and winds."""
+"""The tasks of the study: trajectories, speeds, planners and winds."""
 
 from typing import Any, NamedTuple
 
@@ -20,8 +20,8 @@ class Course(NamedTuple):
 
     Attributes:
         trajectory: `CIRCLE` or `EIGHT`.
-        speed: m/s; on the figure-eight the largest.
-        laps: enough to hold the speed for a while.
+        speed: steady speed on the circle, largest speed on the figure-eight, m/s.
+        laps: number of laps, enough to hold the speed for a while.
     """
 
     trajectory: str
@@ -33,7 +33,7 @@ class Course(NamedTuple):
 
     @property
     def file(self) -> dict[str, Any]:
-        """The content of its trajectory file."""
+        """The content of the trajectory file."""
         if self.trajectory == CIRCLE:
             return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
         eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
@@ -45,10 +45,11 @@ class Task(NamedTuple):
 
     Attributes:
         course: the trajectory and its speed.
-        planner: by name.
-        guidance: the outer loop.
-        wind: mean, m/s, with gusts; 0 is still air.
-        lead: whether linear guidance leads its targets by the response of the attitude loop.
+        planner: name of the planner.
+        guidance: `LINEAR` or `PREDICTIVE`.
+        wind: mean wind with gusts, m/s; 0: still air.
+        lead: whether linear guidance compensates the response of the attitude loop
+            (`guidance.lead`).
     """
 
     course: Course
@@ -75,7 +76,7 @@ COURSES = (*CIRCLES, *EIGHTS)
 
 
 def planners(guidance: str) -> tuple[str, ...]:
-    """The planners flown with this guidance in still air; predictive control needs its own."""
+    """The planners flown with this guidance in still air; predictive control has one only."""
     return PLANNER_NAMES if guidance == LINEAR else (MODEL_FOLLOWING,)
 
 

@@ -1,1 +1,1 @@
-"""All that this program knows of ArduPilot's copter."""
+"""Everything specific to ArduCopter."""

@@ -1,6 +1,6 @@
-"""ArduPilot's copter: its mode numbers, the messages it needs asking for, and its commands.
+"""ArduCopter: its mode numbers, the messages to request from it, and its commands.
 
-Sources: ArduCopter's `mode.h`, `GCS_MAVLink_Copter.cpp`, `mode_guided.cpp`; the figures are
+Sources: ArduCopter's `mode.h`, `GCS_MAVLink_Copter.cpp`, `mode_guided.cpp`. The figures were
 measured on ArduCopter 4.7 in simulation, 2025.
 """
 
@@ -26,7 +26,7 @@ from companion.vehicle.autopilot import (
 _ARMED, _GUIDED = 128, 8  # MAV_MODE_FLAG
 _CUSTOM_MODE_ENABLED = 1.0
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x10  # attitude, both velocities, absolute position
-_NO_POSITION = 0x80  # constant position mode: it only pretends to have one
+_NO_POSITION = 0x80  # constant position mode: the estimator has no position measurement
 _PREFIX = "COPTER_MODE_"
 
 _MODES: dict[str, int] = {
@@ -47,9 +47,9 @@ _ROLES = {
 class ArduPilot:
     """ArduCopter's `Autopilot`.
 
-    GUIDED serves take-off and offboard. The first setpoint ends the take-off, so none may be sent
-    during the climb. The guided bit of `base_mode` tells the two apart: it is set while the
-    position controller runs, and clear while body rates are obeyed.
+    GUIDED is the mode of both take-off and offboard control. The first setpoint ends the take-off,
+    so none may be sent during the climb. The guided bit of `base_mode` tells the two apart: it is
+    set while the position controller runs, and clear while body rates are obeyed.
     """
 
     name = "ArduPilot"
@@ -59,16 +59,17 @@ class ArduPilot:
     offboard_mode = "GUIDED"
     control_entry = ControlEntry.BY_FIRST_SETPOINT
     bytewise_parameters = False
-    # Silent until asked. ODOMETRY it does not send, so there is no count of estimator resets.
+    # ArduPilot sends only what is requested. It has no ODOMETRY, so estimator resets are not
+    # counted.
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
             **FLIGHT_RATES,
-            # By itself it comes at 1 Hz; we must see sooner that a pilot takes over.
+            # The default is 1 Hz; a pilot's takeover must be noticed sooner.
             "HEARTBEAT": 10.0,
-            "ATTITUDE_TARGET": 50.0,  # it turns at up to 1 rad/s, and we predict it between
+            "ATTITUDE_TARGET": 50.0,  # it turns at up to 1 rad/s; between messages it is predicted
             "EKF_STATUS_REPORT": 5.0,
             "HOME_POSITION": 1.0,
-            "HIGHRES_IMU": 50.0,  # the thrust is identified by the accelerometer
+            "HIGHRES_IMU": 50.0,  # the thrust is identified from the accelerometer
         }
     )
     interval_step_us = 1000
@@ -81,13 +82,13 @@ class ArduPilot:
     parameters = ARDUPILOT_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of a heartbeat's mode; GUIDED that obeys rates has its own name."""
+        """Name of the mode in a heartbeat; GUIDED while it obeys body rates has its own name."""
         name = _NAMES.get(custom_mode, f"mode {custom_mode}")
         by_rates = name == "GUIDED" and base_mode & _ARMED and not base_mode & _GUIDED
         return _BY_RATES if by_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """What a mode is to a flight."""
+        """Roles of a mode in a flight."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
@@ -95,9 +96,9 @@ class ArduPilot:
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(self.modes[name]))
 
     def not_ready(self, readiness: Readiness) -> str | None:
-        """The estimator, position, home and ArduPilot's own pre-arm checks.
+        """What is missing: estimator, position, home or ArduPilot's own pre-arm checks.
 
-        The pre-arm checks of STABILIZE, in which it boots, ask for no position; GUIDED's do.
+        ArduPilot boots in STABILIZE, whose pre-arm checks need no position; those of GUIDED do.
         """
         flags = readiness.estimator_flags
         if flags is None:
@@ -113,19 +114,19 @@ class ArduPilot:
         return None
 
     def arm(self) -> tuple[Command, ...]:
-        """Into GUIDED, then arm with all checks, which are GUIDED's then."""
+        """Enter GUIDED, then arm with all of GUIDED's checks."""
         return self.set_mode("GUIDED"), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def disarm(self) -> Command:
-        """Disarm on the ground; in the air it is refused."""
+        """Disarm on the ground; ArduPilot refuses this in the air."""
         return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
-        """Take off here, to a height above home."""
+        """Take off here, to a height above home (m)."""
         return Command(MAV_CMD_NAV_TAKEOFF, p7=height_m)
 
     def hold(self) -> Command:
-        """BRAKE: it stops and holds; LOITER would obey the sticks of a transmitter that is off."""
+        """Enter BRAKE, which stops and holds; LOITER would follow the transmitter's sticks."""
         return self.set_mode("BRAKE")
 
     def land(self) -> Command:

@@ -1,7 +1,7 @@
 """ArduCopter's parameters that matter to a flight by body rates.
 
 Sources: the parameter reference; ArduCopter 4.7 in simulation, 2025 ("measured"). Version 4.7
-renamed some; a new name with another unit or sense has its own rule.
+renamed some parameters; a new name with another unit or meaning has its own rule.
 """
 
 from companion.vehicle.parameter_checks import (
@@ -14,10 +14,10 @@ from companion.vehicle.parameter_checks import (
     bit_set,
     forbidden,
     hover_thrust,
-    our_system,
     positive,
     rates_held,
     required,
+    system_id,
     thrust_curve,
 )
 from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
@@ -31,15 +31,15 @@ def _angle_boost(value: float, _: Values, settings: CompanionSettings) -> Proble
     if value and not settings.tilt_compensated:
         return Problem(
             UNSAFE,
-            "ArduPilot divides thrust by cos(tilt) and so do we, so that the vehicle climbs when "
+            "both ArduPilot and companion divide thrust by cos(tilt), so the vehicle climbs when "
             "it tilts (thrust.autopilot_compensates_tilt is false)",
             0.0,
         )
     if not value and settings.tilt_compensated:
         return Problem(
             UNSAFE,
-            "neither ArduPilot nor we divide thrust by cos(tilt), so that the vehicle sinks when "
-            "it tilts; set thrust.autopilot_compensates_tilt to false",
+            "neither ArduPilot nor companion divides thrust by cos(tilt), so the vehicle sinks "
+            "when it tilts; set thrust.autopilot_compensates_tilt to false",
         )
     return None
 
@@ -49,8 +49,8 @@ def _transmitter_failsafe(value: float, values: Values, _: CompanionSettings) ->
         return None
     return Problem(
         UNSAFE,
-        "nothing is done when the pilot's transmitter is lost, nor (FS_GCS_ENABLE) when the ground "
-        "station is",
+        "ArduPilot does nothing when the pilot's transmitter is lost, nor when the ground station "
+        "is (FS_GCS_ENABLE)",
         1.0,
     )
 
@@ -60,8 +60,8 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
         return None
     return Problem(
         INEFFECTIVE,
-        f"our own heartbeat, of system {settings.source_system}, counts as the ground "
-        "station's, so that its loss is not noticed",
+        f"companion's own heartbeat, of system {settings.source_system}, counts as the ground "
+        "station's, so ArduPilot does not notice that the ground station is lost",
         255.0 if settings.source_system != 255 else None,
     )
 
@@ -69,18 +69,18 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
 def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     if value >= settings.attitude_rate_hz:
         return None
-    asked = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"no message is sent more often, so {asked} is denied; lower it")
+    wanted = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
+    return Problem(INEFFECTIVE, f"no message is sent more often, so {wanted} is denied; lower it")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
     if value or not values.get("FENCE_ENABLE"):
         return None
-    return Problem(INEFFECTIVE, "the fence is on (FENCE_ENABLE) and only reports", 1.0)
+    return Problem(INEFFECTIVE, "the fence (FENCE_ENABLE) only reports a breach", 1.0)
 
 
 def _any_value(_: float, __: Values, ___: CompanionSettings) -> None:
-    """Read for `_fence` only: without ArduPilot's fence there is still ours."""
+    """Accept every value: the parameter is read only because `_fence` uses it."""
 
 
 def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Problem | None:
@@ -90,7 +90,7 @@ def _battery_failsafe(value: float, values: Values, _: CompanionSettings) -> Pro
         return None
     return Problem(
         INEFFECTIVE,
-        "ArduPilot does nothing about an empty battery; nobody lands should our program end",
+        "ArduPilot does nothing about an empty battery; if companion ends, nobody lands",
         set_to=1.0,
     )
 
@@ -111,11 +111,11 @@ def _acceleration(axis: str, name: str) -> tuple[ParameterRule, ParameterRule]:
 ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("GUID_OPTIONS",),
-        "whether our thrust is a thrust or a climb rate",
+        "whether ArduPilot takes the thrust of a setpoint as thrust or as climb rate",
         bit_set(
             UNSAFE,
             8,
-            "our thrust would be obeyed as a climb rate (bit 3, value 8, sets thrust)",
+            "thrust would be obeyed as a climb rate (bit 3, value 8, makes it thrust)",
         ),
         f"{_REFERENCE}; {_MEASURED}",
         vital=True,
@@ -133,13 +133,13 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("ATC_RATE_FF_ENAB",),
         "whether body rates are fed forward",
-        required(INEFFECTIVE, 1.0, "our rates are followed late, by the attitude alone"),
+        required(INEFFECTIVE, 1.0, "body rates are followed late, only through the attitude"),
         _REFERENCE,
     ),
     ParameterRule(
         ("ATC_INPUT_TC",),
         "how softly ArduPilot levels by itself",
-        at_most(INEFFECTIVE, 0.3, "levelling takes long when our setpoints stop", 0.15),
+        at_most(INEFFECTIVE, 0.3, "levelling takes long when setpoints stop", 0.15),
         _REFERENCE,
     ),
     *_acceleration("R", "roll"),
@@ -150,7 +150,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "what ArduPilot does when the ground station's heartbeat stops",
         forbidden(
             INEFFECTIVE,
-            {2.0: "the value 2 was given up in 4.0; what it does now depends on the version"},
+            {2.0: "the value 2 was removed in 4.0; its effect depends on the version"},
             1.0,
         ),
         f"{_REFERENCE}; {_MEASURED}",
@@ -162,7 +162,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         _MEASURED,
     ),
     ParameterRule(
-        ("MAV_SYSID", "SYSID_THISMAV"), "the vehicle's system id", our_system, "MAVLink routing"
+        ("MAV_SYSID", "SYSID_THISMAV"), "the vehicle's system id", system_id, "MAVLink routing"
     ),
     ParameterRule(
         ("FS_THR_ENABLE",),

@@ -1,1 +1,1 @@
-"""All that this program knows of PX4."""
+"""Everything specific to PX4."""

@@ -1,6 +1,6 @@
-"""PX4: its mode numbers, the messages it needs asking for, and its commands.
+"""PX4: its mode numbers, the messages to request from it, and its commands.
 
-Sources: PX4's `px4_custom_mode.h` and `commander`; the figures are measured on PX4 main in
+Sources: PX4's `px4_custom_mode.h` and `commander`. The figures were measured on PX4 main in
 simulation, 2026.
 """
 
@@ -50,8 +50,8 @@ _MODES = {
     "STABILIZED": _custom_mode(7),
 }
 _DESCEND = "AUTO.DESCEND"
-"""Its failsafe's landing without a position; cannot be commanded. It takes over from AUTO.LAND
-4.8 s after GPS is lost (measured)."""
+"""Mode in which PX4's failsafe lands without a position; it cannot be commanded. It replaces
+AUTO.LAND 4.8 s after GPS is lost (measured)."""
 _NAMES = {number: name for name, number in _MODES.items()} | {_custom_mode(_AUTO, 20): _DESCEND}
 _ROLES = {
     "AUTO.TAKEOFF": frozenset({Role.TAKEOFF, Role.READY}),
@@ -65,9 +65,9 @@ _ROLES = {
 class Px4:
     """PX4's `Autopilot`.
 
-    OFFBOARD may be entered once setpoints have streamed at 2 Hz or more for a second. The last
-    rates are held after the stream stops until COM_OF_LOSS_T is over, so stop the rotation first.
-    While the intended mode is OFFBOARD a later setpoint enters it again; only a mode command
+    OFFBOARD can be entered after setpoints have streamed at 2 Hz or more for a second. When they
+    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the caller must stop the rotation first.
+    While the intended mode is OFFBOARD, a later setpoint enters it again; only a mode command
     releases control for good.
     """
 
@@ -78,13 +78,13 @@ class Px4:
     offboard_mode = "OFFBOARD"
     control_entry = ControlEntry.BY_COMMAND
     bytewise_parameters = True
-    # PX4 rounds the interval to its inner loop: asked 250 Hz, a 250 Hz loop gives 197 and an
-    # 800 Hz loop 196; asked 400 Hz they give 191 and 392.
+    # PX4 rounds the interval to its inner loop. For 250 Hz, a 250 Hz loop gives 197 Hz and an
+    # 800 Hz loop 196 Hz; for 400 Hz they give 191 and 392 Hz.
     wanted_rates: Mapping[str, float] = MappingProxyType(
         {
             **FLIGHT_RATES,
-            # Its HEARTBEAT stays at 1 Hz whatever is asked (ACK 4). This one comes at 2 Hz, and
-            # within 65 ms when the mode, arming or a failsafe changes; PX4 1.14 does not have it.
+            # PX4 sends HEARTBEAT at 1 Hz whatever is requested (ACK 4). CURRENT_MODE comes at 2 Hz,
+            # and within 65 ms of a change of mode, arming or failsafe; PX4 1.14 does not have it.
             "CURRENT_MODE": 20.0,
             "ESTIMATOR_STATUS": 5.0,
             "HOME_POSITION": 1.0,
@@ -101,11 +101,11 @@ class Px4:
     parameters = PX4_PARAMETERS
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
-        """Name of a heartbeat's `custom_mode`, which says it all."""
+        """Name of the mode in a heartbeat, from `custom_mode` alone."""
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """What a mode is to a flight."""
+        """Roles of a mode in a flight."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
@@ -115,7 +115,7 @@ class Px4:
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(main), float(sub))
 
     def not_ready(self, readiness: Readiness) -> str | None:
-        """Position, home, the estimator and PX4's own pre-arm checks."""
+        """What is missing: position, estimator, home or PX4's own pre-arm checks."""
         if not readiness.position:
             return "a local position (LOCAL_POSITION_NED)"
         if readiness.estimator_flags is None:
@@ -129,20 +129,20 @@ class Px4:
         return None
 
     def arm(self) -> tuple[Command, ...]:
-        """Into AUTO.LOITER, whatever the sticks had chosen, and arm with all checks."""
+        """Enter AUTO.LOITER, then arm with all checks."""
         return (self.hold(), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
 
     def disarm(self) -> Command:
-        """Disarm on the ground; in the air it is refused."""
+        """Disarm on the ground; PX4 refuses this in the air."""
         return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
-        """Take off here, keeping the heading: NaN means "as it is" to PX4."""
+        """Take off here, to a height above home (m), keeping the heading: NaN means no change."""
         altitude = home_altitude_m + height_m
         return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
 
     def hold(self) -> Command:
-        """Into AUTO.LOITER."""
+        """Enter AUTO.LOITER."""
         return self.set_mode("AUTO.LOITER")
 
     def land(self) -> Command:

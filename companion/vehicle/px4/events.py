@@ -1,8 +1,8 @@
-"""PX4's events (EVENT, 410) in words, for a link on which it sends no STATUSTEXT.
+"""PX4's events (EVENT, 410) as texts, for a link on which PX4 sends no STATUSTEXT.
 
-PX4 numbers an event by a hash of its name; the words are in metadata that a companion in the air
-does not have. So here are those that matter to a flight, with PX4's own words (source: PX4 main,
-2026; the numbers of those that were recorded agree). Any other is named by its number, once.
+PX4 numbers an event by a hash of its name. The texts are in metadata that is not sent over the
+link, so this module has the texts that matter to a flight (source: PX4 main, 2026; checked against
+recorded events). Any other event is reported by its number, once.
 """
 
 import struct
@@ -53,8 +53,14 @@ _CAUSES = {
 }
 
 
-class _Words(NamedTuple):
-    """Words with ``{}`` for the values; how those are packed, and what their numbers mean."""
+class _Text(NamedTuple):
+    """The text of an event.
+
+    Attributes:
+        text: The text with ``{}`` for each value.
+        layout: `struct` format of the values in the event's arguments.
+        meanings: For each value, a text for each number; None: the number itself is shown.
+    """
 
     text: str
     layout: str = ""
@@ -62,54 +68,54 @@ class _Words(NamedTuple):
 
 
 _EVENTS = {
-    "commander_armed_by": _Words("Armed by {}", "<B", (_REASONS,)),
-    "commander_disarmed_by": _Words("Disarmed by {}", "<B", (_REASONS,)),
-    "commander_arm_denied_resolve_failures": _Words(
+    "commander_armed_by": _Text("Armed by {}", "<B", (_REASONS,)),
+    "commander_disarmed_by": _Text("Disarmed by {}", "<B", (_REASONS,)),
+    "commander_arm_denied_resolve_failures": _Text(
         "Arming denied: Resolve system health failures first"
     ),
-    "commander_disarm_denied_not_landed": _Words("Disarming denied: not landed"),
-    "commander_modeswitch_not_avail": _Words("Switching to that mode is currently not possible"),
-    "commander_takeoff_detected": _Words("Takeoff detected"),
-    "commander_landing_current_pos": _Words("Landing at current position"),
-    "commander_landing_detected": _Words("Landing detected"),
-    "commander_rtl": _Words("Returning to launch"),
-    "navigator_takeoff_default_alt": _Words(
+    "commander_disarm_denied_not_landed": _Text("Disarming denied: not landed"),
+    "commander_modeswitch_not_avail": _Text("Switching to that mode is currently not possible"),
+    "commander_takeoff_detected": _Text("Takeoff detected"),
+    "commander_landing_current_pos": _Text("Landing at current position"),
+    "commander_landing_detected": _Text("Landing detected"),
+    "commander_rtl": _Text("Returning to launch"),
+    "navigator_takeoff_default_alt": _Text(
         "Using default takeoff altitude: {:.1f} m", "<f", (None,)
     ),
-    "commander_failsafe_enter": _Words(
+    "commander_failsafe_enter": _Text(
         "Failsafe activated due to {1}, triggering {0}", "<4xBB", (_ACTIONS, _CAUSES)
     ),
-    "commander_failsafe_enter_generic": _Words(
+    "commander_failsafe_enter_generic": _Text(
         "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
     ),
-    "commander_failsafe_enter_autopilot_disengaged": _Words(
+    "commander_failsafe_enter_autopilot_disengaged": _Text(
         "Failsafe activated, triggering {}", "<4xB", (_ACTIONS,)
     ),
-    "commander_failsafe_enter_hold": _Words(
+    "commander_failsafe_enter_hold": _Text(
         "Failsafe activated due to {2}, triggering {0} in {1} seconds",
         "<4xBHB",
         (_ACTIONS, None, _CAUSES),
     ),
-    "commander_failsafe_enter_generic_hold": _Words(
+    "commander_failsafe_enter_generic_hold": _Text(
         "Failsafe activated, triggering {} in {} seconds", "<4xBH", (_ACTIONS, None)
     ),
-    "commander_failsafe_enter_warn": _Words(
+    "commander_failsafe_enter_warn": _Text(
         "Failsafe warning triggered due to {}", "<4xB", (_CAUSES,)
     ),
-    "commander_failsafe_enter_generic_warn": _Words("Failsafe warning triggered"),
-    "commander_failsafe_enter_low_bat": _Words("Low battery level, return advised"),
-    "commander_failsafe_enter_crit_bat_warn": _Words("Critical battery level, land now"),
-    "commander_failsafe_enter_crit_low_bat_warn": _Words(
+    "commander_failsafe_enter_generic_warn": _Text("Failsafe warning triggered"),
+    "commander_failsafe_enter_low_bat": _Text("Low battery level, return advised"),
+    "commander_failsafe_enter_crit_bat_warn": _Text("Critical battery level, land now"),
+    "commander_failsafe_enter_crit_low_bat_warn": _Text(
         "Emergency battery level, land immediately"
     ),
-    "commander_rc_lost": _Words("Manual control lost"),
-    "commander_rc_regained": _Words("Manual control regained"),
-    "commander_rc_override": _Words("Pilot took over using sticks"),
-    "failsafe_rc_override": _Words("Pilot took over using sticks"),
-    "commander_gcs_lost": _Words("Connection to ground control station lost"),
-    "commander_dl_regained": _Words("GCS connection regained"),
-    "commander_mission_comp_lost": _Words("Connection to mission computer lost"),
-    "commander_onboard_ctrl_regained": _Words("Onboard controller regained"),
+    "commander_rc_lost": _Text("Manual control lost"),
+    "commander_rc_regained": _Text("Manual control regained"),
+    "commander_rc_override": _Text("Pilot took over using sticks"),
+    "failsafe_rc_override": _Text("Pilot took over using sticks"),
+    "commander_gcs_lost": _Text("Connection to ground control station lost"),
+    "commander_dl_regained": _Text("GCS connection regained"),
+    "commander_mission_comp_lost": _Text("Connection to mission computer lost"),
+    "commander_onboard_ctrl_regained": _Text("Onboard controller regained"),
 }
 
 _CHECKS = {
@@ -124,27 +130,28 @@ _CHECKS = {
     "check_modes_cannot_takeoff": "Mode not suitable for arming",
     "check_rc_dl_no_dllink": "No connection to the ground control station",
 }
-"""What a health report names as failing."""
+"""Texts of the checks that a health report names as failing."""
 
 _OUR_STREAM = (
     "check_modes_offboard_signal",
     "check_modes_offboard_no_signal",
     "check_modes_offboard_signal_lost",
 )
-"""Fails whenever we do not stream, which we know."""
+"""Checks that fail while no setpoints are sent; they are not reported."""
 
 
 def event_id(name: str) -> int:
-    """The number of an event: its component in the top byte, 24 bits of FNV-1a of its name."""
+    """The number of an event: the component in the top byte, then 24 bits of FNV-1a of its name."""
     value = _FNV_OFFSET
     for byte in name.encode():
         value = (value ^ byte) * _FNV_PRIME & 0xFFFFFFFF
     return _AUTOPILOT | value & 0xFFFFFF
 
 
-# Two whose names are not known; recorded together with the STATUSTEXT that says the same.
+# The names of 17980399 and 30203637 are not known. Their texts come from the STATUSTEXTs that PX4
+# sent together with them.
 _WORDS_BY_ID = {event_id(name): words for name, words in _EVENTS.items()} | {
-    17980399: _Words("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
+    17980399: _Text("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
 }
 _CHECKS_BY_ID = {event_id(name): words for name, words in _CHECKS.items()} | {
     30203637: "No heading reference",
@@ -155,14 +162,15 @@ _REPORT_ENDS = event_id("commander_health_summary")
 
 
 class EventReader:
-    """Puts events into words, beside the autopilot's texts.
+    """Turns events into texts, which join the autopilot's STATUSTEXTs.
 
-    A health report names all that fails each time that anything changes; what it named the time
-    before is not said again, nor what is no more than a remark, nor that our stream is missing.
+    PX4 sends a health report with all failing checks whenever one of them changes. A check is
+    reported if it did not fail in the report before and its severity is warning or higher. Checks
+    that fail only because no setpoints are sent are never reported.
 
     Args:
-        texts: takes the words.
-        clock: event-loop time, s.
+        texts: takes the texts.
+        clock: returns the event-loop time, s.
     """
 
     def __init__(self, texts: TextAssembler, clock: Callable[[], float]) -> None:
@@ -190,12 +198,12 @@ class EventReader:
             self._failing.add(number)
             known = self._failed_before | _OUR_STREAM_IDS
             if number not in known and severity <= _WARNING:
-                self._say(severity, number, _CHECKS_BY_ID.get(number))
+                self._report(severity, number, _CHECKS_BY_ID.get(number))
         elif severity < _FOR_PROGRAMS:
             words = _WORDS_BY_ID.get(number)
-            self._say(severity, number, words and _put(words, arguments))
+            self._report(severity, number, words and _filled_in(words, arguments))
 
-    def _say(self, severity: int, number: int, words: str | None) -> None:
+    def _report(self, severity: int, number: int, words: str | None) -> None:
         if words is not None:
             self._texts.take_event(severity, words, self._clock())
         elif number not in self._unknown:
@@ -203,8 +211,8 @@ class EventReader:
             self._texts.take_event(severity, f"event {number}", self._clock())
 
 
-def _put(words: _Words, arguments: bytes) -> str:
-    """The words with an event's values in them."""
+def _filled_in(words: _Text, arguments: bytes) -> str:
+    """The text with the values of an event filled in."""
     values = struct.unpack_from(words.layout, arguments)
     named = (
         value if meaning is None else meaning.get(value, str(value))

@@ -14,10 +14,10 @@ from companion.vehicle.parameter_checks import (
     bit_set,
     forbidden,
     hover_thrust,
-    our_system,
     positive,
     rates_held,
     required,
+    system_id,
     thrust_curve,
 )
 from companion.vehicle.parameter_rules import CompanionSettings, ParameterRule, Problem, Values
@@ -32,7 +32,7 @@ _FAILURE_ANGLES = ("FD_FAIL_R", "FD_FAIL_P")
 _NAMED_ANGLES = ", ".join(_FAILURE_ANGLES)
 _DEFAULT_FAILURE_ANGLE = 60.0
 _OVERSHOOT = 15.0
-"""By which a gust or a step may carry the tilt over its limit, degrees."""
+"""Tilt beyond the limit that a gust or a step may cause, degrees."""
 
 
 def _attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
@@ -49,13 +49,13 @@ def _attitude_rate(value: float, _: Values, settings: CompanionSettings) -> Prob
 
 
 def _termination(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-    """Flight termination is only to be armed where our own tilt cannot set it off."""
+    """Check that the largest tilt of a flight cannot trigger flight termination."""
     if value == _TERMINATION_OFF:
         return None
     if not all(name in values for name in _FAILURE_ANGLES):
         return Problem(
             UNSAFE,
-            f"the motors stop at a tilt ({_NAMED_ANGLES}) that is not known; fix the link",
+            f"the tilt at which the motors stop ({_NAMED_ANGLES}) is not known; fix the link",
         )
     angles = [values[name] for name in _FAILURE_ANGLES if values[name] > 0.0]
     if not angles or min(angles) > degrees(settings.max_tilt) + _OVERSHOOT:
@@ -69,7 +69,7 @@ def _termination(value: float, values: Values, settings: CompanionSettings) -> P
 
 
 def _failure_tilt(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-    """The failure detector's angle matters by itself only where it is below our own tilt."""
+    """Check that the failure detector's angle is larger than the largest tilt of a flight."""
     if value == 0.0 or value > degrees(settings.max_tilt):
         return None
     raised = degrees(settings.max_tilt) < _DEFAULT_FAILURE_ANGLE
@@ -77,17 +77,21 @@ def _failure_tilt(value: float, values: Values, settings: CompanionSettings) -> 
         INEFFECTIVE,
         f"PX4 reports a failure at a tilt that limits.max_tilt_deg {degrees(settings.max_tilt):g} "
         "allows" + ("" if raised else f"; lower limits.max_tilt_deg below {value:g}"),
-        # Beyond PX4's own default a detector would be weakened for the sake of our limit.
+        # The detector is never weakened beyond PX4's default angle.
         _DEFAULT_FAILURE_ANGLE if raised else None,
     )
 
 
 def _signing(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-    """The reverse needs no rule: if we sign, frames of a vehicle that does not are refused."""
+    """Check that `companion` signs if PX4 requires it.
+
+    The reverse needs no rule: with signing, unsigned frames of the vehicle are refused anyway.
+    """
     if not value or settings.signs:
         return None
     return Problem(
-        INEFFECTIVE, "PX4 obeys only what is signed, and we sign nothing; set link.signing_key_file"
+        INEFFECTIVE,
+        "PX4 obeys only signed frames, and companion does not sign; set link.signing_key_file",
     )
 
 
@@ -101,7 +105,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("COM_OBL_RC_ACT",),
-        "what PX4 does when our setpoints stop",
+        "what PX4 does when setpoints stop",
         forbidden(
             UNSAFE,
             {
@@ -116,7 +120,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("COM_RC_OVERRIDE",),
-        "whether the pilot's sticks take the vehicle from us (before 1.18)",
+        "whether the pilot can take over by moving the sticks (before 1.18)",
         bit_set(INEFFECTIVE, 2, _STICKS_DO_NOTHING),
         _REFERENCE,
     ),
@@ -144,12 +148,12 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("MAV_FWDEXTSP",),
         "whether setpoints that arrive by MAVLink are obeyed",
-        required(INEFFECTIVE, 1.0, "our setpoints are not obeyed, and OFFBOARD is not entered"),
+        required(INEFFECTIVE, 1.0, "setpoints are not obeyed, and OFFBOARD is not entered"),
         _REFERENCE,
     ),
     ParameterRule(
         ("NAV_DLL_ACT",),
-        "what PX4 does when the ground station's heartbeat stops, although our setpoints continue",
+        "what PX4 does when the ground station's heartbeat stops, even if setpoints continue",
         forbidden(UNSAFE, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
@@ -186,10 +190,10 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
     ),
-    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", our_system, "MAVLink routing"),
+    ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", system_id, "MAVLink routing"),
     ParameterRule(
         ("MAV_SIGN_CFG",),
-        "whether PX4 obeys only what is signed",
+        "whether PX4 obeys only signed frames",
         _signing,
         _REFERENCE,
         reboot=True,
@@ -213,7 +217,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "what PX4 does about an empty battery",
         forbidden(
             INEFFECTIVE,
-            {0.0: "PX4 only warns; nobody lands should our program have ended"},
+            {0.0: "PX4 only warns; if companion has ended, nobody lands"},
             set_to=3.0,
         ),
         _REFERENCE,

@@ -1,0 +1,137 @@
+"""The state of a flight in three lines at the bottom of a terminal, rewritten in place."""
+
+import codecs
+import os
+from collections.abc import Sequence
+from math import degrees, isinf
+from typing import IO
+
+from companion.files.ascii_text import ascii_for
+from companion.flight.status import FlightStatus
+
+_COLUMNS = 80
+"""Width where the terminal does not tell its own."""
+_ALARM = "\x1b[1;31m{}\x1b[0m"
+
+
+def can_redraw(file: IO[str]) -> bool:
+    """Whether lines can be rewritten there: a terminal with ANSI codes, and none are forbidden."""
+    dumb = os.environ.get("TERM", "dumb") in ("", "dumb", "unknown")
+    return file.isatty() and not dumb and not os.environ.get("NO_COLOR")
+
+
+def status_lines(status: FlightStatus) -> list[str]:
+    """The three lines: what is flown, how the vehicle moves, and safety, setpoints and battery."""
+    return [
+        f"{status.phase:<9} {_times(status)}   {_doing(status)}",
+        f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
+        f"speed {_number(status.speed, '.1f', 'm/s')}   "
+        f"tilt {_number(None if status.tilt is None else degrees(status.tilt), '.0f', '°')}   "
+        f"tracking error {_number(status.error, '.2f', 'm')}",
+        f"{'':<9} safety {_safety(status)}  {_loop(status)}  battery {_battery(status)}",
+    ]
+
+
+def _doing(status: FlightStatus) -> str:
+    if status.maneuver is not None:
+        known = "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
+        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{known} s"
+    return f"{status.detail or 'working'} ({allowed_time(status.elapsed, status.timeout)})"
+
+
+def allowed_time(elapsed: float, timeout: float) -> str:
+    """How long a phase has lasted, and may last, s."""
+    return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
+
+
+def _times(status: FlightStatus) -> str:
+    if status.airborne is None:
+        return f"{status.time:.0f} s"
+    return f"{status.time:.0f} s, {status.airborne:.0f} s since take-off"
+
+
+def _loop(status: FlightStatus) -> str:
+    rate = "no setpoints" if status.rate is None else f"{status.rate:.0f} Hz"
+    if status.latency is None:
+        return rate
+    return f"{rate}  latency {1e3 * status.latency:.2f} ms ({status.missed} late)"
+
+
+def _battery(status: FlightStatus) -> str:
+    battery = status.battery
+    if battery is None or battery.remaining is None:
+        return "–"
+    volts = "" if battery.voltage_v is None else f" {battery.voltage_v:.1f} V"
+    return f"{100.0 * battery.remaining:.0f} %{volts}"
+
+
+def _safety(status: FlightStatus) -> str:
+    if status.alarms:
+        return "ALARM: " + ", ".join(status.alarms)
+    return "quiet" if status.monitored else "not on"
+
+
+def _number(value: float | None, digits: str, unit: str) -> str:
+    if value is None:
+        return "–"
+    text = f"{value:{digits}}"
+    text = text.removeprefix("-") if float(text) == 0.0 else text
+    return f"{text}{'' if unit == '°' else ' '}{unit}"
+
+
+class LiveLines:
+    """Lines that stay at the bottom, while other text goes above them.
+
+    Each change is one write, so nothing flickers. It writes no more than the terminal's width.
+
+    Args:
+        file: of a terminal.
+    """
+
+    def __init__(self, file: IO[str]) -> None:
+        self._file = file
+        encoding = getattr(file, "encoding", None) or "ascii"
+        self._takes_all = codecs.lookup(encoding).name.startswith("utf")
+        self._lines: list[str] = []
+
+    def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
+        """Replace the lines.
+
+        Args:
+            lines: in order.
+            alarm: whether the last one is an alarm.
+        """
+        back, columns = self._back(), self._columns()
+        plain = lines if self._takes_all else [ascii_for(line) for line in lines]
+        self._lines = [line[: columns - 1] for line in plain]
+        drawn = list(self._lines)
+        if alarm and drawn:
+            drawn[-1] = _ALARM.format(drawn[-1])
+        self._write(back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
+
+    def above(self, text: str) -> None:
+        """Write `text`, whole lines, above the lines."""
+        kept = "".join(f"{line}\n" for line in self._lines)
+        self._write(f"{self._back()}\x1b[J{text}{kept}")
+
+    def clear(self) -> None:
+        """Remove the lines."""
+        if self._lines:
+            self._write(f"{self._back()}\x1b[J")
+            self._lines = []
+
+    def _back(self) -> str:
+        """To the beginning of the first line, also where a narrower terminal has wrapped them."""
+        columns = self._columns()
+        rows = sum(max(1, -(-len(line) // columns)) for line in self._lines)
+        return f"\x1b[{rows}F" if rows else "\r"
+
+    def _columns(self) -> int:
+        try:
+            return os.get_terminal_size(self._file.fileno()).columns or _COLUMNS
+        except (OSError, ValueError):
+            return _COLUMNS
+
+    def _write(self, text: str) -> None:
+        self._file.write(text)
+        self._file.flush()

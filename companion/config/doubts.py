@@ -1,0 +1,69 @@
+"""Values that are allowed and yet most likely not meant, or not measured on this vehicle."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from companion.config.reference import keys
+from companion.config.root import Config
+from companion.files.yaml_faults import other_unit
+
+_TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
+"""By the end of a key whose default is null: a value of the usual size."""
+_FAR, _NEAR = 20.0, 5.0
+"""A value is doubted if it is so many times smaller than usual, and in the other unit it is within
+so many times of it."""
+
+
+class Doubt(NamedTuple):
+    """A value to look at again.
+
+    Attributes:
+        key: of the configuration.
+        found: what is written, one clause.
+        because: what follows from it.
+        fix: what to do.
+    """
+
+    key: str
+    found: str
+    because: str
+    fix: str
+
+    def sentence(self) -> str:
+        """For the user."""
+        return f"{self.found}: {self.because}; {self.fix}"
+
+
+def doubts(config: Config) -> Iterator[Doubt]:
+    """All doubts about a configuration."""
+    yield from _units(config)
+    if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
+        yield Doubt(
+            "vehicle.identified",
+            "the times of `vehicle` are not this vehicle's own, for no `companion identify` wrote "
+            "them",
+            "the response is less exact, and in the steps that docs/identify.md names still "
+            "straighter than with first-order",
+            "run `companion identify` before raising planner.gain_per_s, and include its file",
+        )
+
+
+def _units(config: Config) -> Iterator[Doubt]:
+    """Values in radians for degrees, in seconds for milliseconds, in parts of 1 for percent."""
+    for key in keys(config):
+        if isinstance(key.value, bool) or not isinstance(key.value, int | float) or key.value <= 0:
+            continue
+        usual = key.default
+        if usual is None:
+            usual = next((v for end, v in _TYPICAL.items() if key.name.endswith(end)), None)
+        if key.value == key.default or not isinstance(usual, int | float) or not usual:
+            continue
+        unit, meant = other_unit(key.name, key.value)
+        if meant > key.value and key.value < usual / _FAR and meant > usual / _NEAR:
+            name = f"{key.section}.{key.name}"
+            yield Doubt(
+                name,
+                f"{name} is {key.value:g} {key.unit}",
+                f"that is unusually small; {key.value:g} {unit} would be {meant:.4g} {key.unit}",
+                f"write {meant:.4g} if that was meant",
+            )

@@ -1,0 +1,135 @@
+"""Predicts the step response of a configuration, and finds which setting or delay limits it."""
+
+from dataclasses import dataclass, replace
+from math import asin, degrees, hypot
+
+from companion.attitude import PLANNER_NAMES
+from companion.attitude.reference_model import rates_along
+from companion.config import Config
+from companion.control.inner_loop import slower_tilt, tilt_response
+from companion.control.outer_loop import attitude_delay, hold_gains, hold_weights
+from companion.guidance import InnerResponse
+
+LARGEST_PRODUCT = 0.45
+"""Largest sensible gain · (lag + dead time); above it, a higher gain is hardly quicker."""
+
+_NOTICEABLE = 0.99
+"""A change is reported if it reduces the time constant to less than this share."""
+
+_GAIN, _RATE = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
+_LAG, _DEAD_TIME = "the vehicle's lag", "the vehicle's dead time"
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedResponse:
+    """The response to the largest step of the maneuver `steps`, from −coefficient to coefficient.
+
+    Attributes:
+        coefficient: coefficient at which the step ends.
+        time_constant: time until 63 % of the step is covered, s.
+        otherwise: time constant (s) if one cause of delay changes, by the name of this cause:
+            with twice the gain, or without the rate limit, the lag or the dead time.
+        gain: p, 1/s.
+        quickest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
+    """
+
+    coefficient: float
+    time_constant: float
+    otherwise: dict[str, float]
+    gain: float
+    quickest_gain: float | None
+
+    @property
+    def limited_by(self) -> str:
+        """Name of the cause whose change reduces the time constant most."""
+        return min(self.otherwise, key=self.otherwise.__getitem__)
+
+    @property
+    def too_quick(self) -> bool:
+        """Whether the gain is larger than the largest sensible gain."""
+        return self.quickest_gain is not None and self.gain > self.quickest_gain
+
+    def sentence(self) -> str:
+        """The time constant, its main limit, and the effect of each change, for the user."""
+        changes = ", ".join(
+            f"{time:.2f} s {'with twice' if name == _GAIN else 'without'} {name}"
+            for name, time in self.otherwise.items()
+            if time < _NOTICEABLE * self.time_constant
+        )
+        tilt = degrees(asin(self.coefficient))
+        return (
+            f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
+            f"expected to have a time constant of {self.time_constant:.2f} s; "
+            f"{self.limited_by} limits it most ({changes})"
+        )
+
+    def gain_sentence(self) -> str:
+        """The largest sensible gain, for the user."""
+        if self.quickest_gain is None:
+            return "the quickest sensible gain is not known before `companion identify`"
+        remedy = "; lower it, for the response overshoots and is hardly quicker"
+        return (
+            f"planner.gain_per_s is {self.gain:g}, and {self.quickest_gain:.1f} is the quickest "
+            f"sensible one ({LARGEST_PRODUCT} / (lag + dead time))"
+            f"{remedy if self.too_quick else ''}"
+        )
+
+
+def expected_response(config: Config) -> ExpectedResponse:
+    """Predict the response with the linear model of planner and rate loop, and the rate limit."""
+    step, response = 2.0 * config.steps.coefficient, tilt_response(config)
+    speed = _largest_speed(config)
+    twice = config.planner.model_copy(update={"gain_per_s": 2.0 * config.planner.gain_per_s})
+    quicker = tilt_response(config.model_copy(update={"planner": twice}))
+    otherwise = {
+        _GAIN: quicker.step_time(step, speed),
+        _RATE: response.step_time(step),
+        **_without_the_vehicle(config, response, speed),
+    }
+    lag, dead_time = slower_tilt(config)
+    delay = lag + dead_time
+    known = config.vehicle.known and delay > 0.0
+    return ExpectedResponse(
+        config.steps.coefficient,
+        response.step_time(step, speed),
+        otherwise,
+        config.planner.gain_per_s,
+        LARGEST_PRODUCT / delay if known else None,
+    )
+
+
+def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:
+    """Time constants (s) without lag and without dead time; empty if these are not known."""
+    if not config.vehicle.known:
+        return {}
+    step = 2.0 * config.steps.coefficient
+    axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
+    unlagged = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
+    return {
+        _LAG: tilt_response(unlagged).step_time(step, speed),
+        _DEAD_TIME: replace(response, dead_time=0.0).step_time(step, speed),
+    }
+
+
+def _largest_speed(config: Config) -> float:
+    """Speed (1/s) of the coefficients at the largest tilt rate, at half the largest coefficient."""
+    roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
+    return config.limits.max_tilt_rate / hypot(roll, pitch)
+
+
+def expectations(config: Config) -> list[str]:
+    """Expected response, largest sensible gain and gains of the position hold, for the user."""
+    if config.planner_name not in PLANNER_NAMES:
+        return [hold_sentence(config)]
+    response = expected_response(config)
+    return [response.sentence(), response.gain_sentence(), hold_sentence(config)]
+
+
+def hold_sentence(config: Config) -> str:
+    """The gains of the position hold, and the weights from which they follow, for the user."""
+    gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
+    return (
+        f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "
+        f"velocity and {gains.acceleration:.2f} on acceleration, from the weights "
+        f"{weights.position:.4g} 1/s⁴ and {weights.velocity:.3g} 1/s² (T = {delay:.2f} s)"
+    )

@@ -1,0 +1,69 @@
+"""A readable ASCII form of any text, for what takes no other characters."""
+
+import unicodedata
+
+_WORDS = {
+    "°": " deg",
+    "µ": "u",
+    "μ": "u",
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "×": "x",
+    "·": "*",
+    "⁄": "/",
+    "→": "->",
+    "←": "<-",
+    "…": "...",
+    "±": "+-",
+    "√": "sqrt",
+    "∫": "integral of ",
+    "⊗": "(x)",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "~",
+    "●": "*",
+    "★": "*",
+    "•": "*",
+    "‘": "'",
+    "’": "'",
+    "“": "'",
+    "”": "'",
+    "─": "-",
+    "━": "-",
+    "│": "|",
+    "┃": "|",
+    "█": "#",
+}
+"""No double quotation mark or backslash among them: JSON must stay JSON."""
+
+
+def ascii_for(text: str) -> str:
+    """A readable ASCII form of a text: m/s² as m/s^2, ω as omega, ċ as c."""
+    out: list[str] = []
+    raised = False
+    for char in text:
+        was_raised, raised = raised, unicodedata.decomposition(char).startswith("<super>")
+        if raised and not was_raised:
+            out.append("^")
+        out.append(char if char.isascii() else _one(char))
+    return "".join(out)
+
+
+def _one(char: str) -> str:
+    """One character that is not ASCII."""
+    if char in _WORDS:
+        return _WORDS[char]
+    kept = [one for one in unicodedata.normalize("NFKD", char) if not unicodedata.combining(one)]
+    return "".join(one if one.isascii() else _WORDS.get(one) or _named(one) for one in kept)
+
+
+def _named(char: str) -> str:
+    """A Greek letter by its name, a part of a frame as a plus; `?` for what has no ASCII."""
+    name = unicodedata.name(char, "")
+    if name.startswith("GREEK "):
+        letter = name.split(" WITH ")[0].rsplit(" ", 1)[-1].lower()
+        return letter.capitalize() if "CAPITAL" in name else letter
+    if name.startswith("BOX DRAWINGS"):
+        return "+"
+    return "*" if name.startswith("BRAILLE PATTERN") else "?"

@@ -1,0 +1,104 @@
+"""What a flight that is over says of its course: phases, where it ended, what to set."""
+
+import asyncio
+from collections.abc import Sequence
+
+from companion.flight.assembly import Assembled
+from companion.flight.context import FlightContext
+from companion.recording.course import Course, EarlyEnd
+from companion.recording.dead_time import DeadTimes
+from companion.recording.trace import ManeuverMark
+
+
+def advice(assembled: Assembled, dead_times: DeadTimes) -> tuple[str, ...]:
+    """What differs from the configuration and which key to set, one sentence each."""
+    guidance_loop = assembled.context.guidance_loop
+    warnings = (
+        guidance_loop.learning.mismatch_warning(),
+        guidance_loop.estimate.mismatch_warning(),
+        dead_times.warning(),
+        assembled.trace.lost_rows_warning(),
+    )
+    return tuple(warning for warning in warnings if warning is not None)
+
+
+def _settings(context: FlightContext) -> dict[str, str]:
+    """The keys that the advice names, and their values."""
+    learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
+    settings: dict[str, str] = {}
+    if learning.mismatch_warning() is not None:
+        settings["thrust.hover_thrust"] = f"{learning.hover:.2f}"
+    if estimate.mismatch_warning() is not None:
+        drag = estimate.drag.drag
+        settings["guidance.drag_per_s"] = f"{drag.linear:.2f}"
+        settings["guidance.quadratic_drag_per_m"] = f"{drag.quadratic:.3f}"
+    return settings
+
+
+def course_of(
+    assembled: Assembled,
+    phases: Sequence[tuple[float, str]],
+    result: str,
+    advised: tuple[str, ...],
+) -> Course:
+    """The course of a flight that is over.
+
+    Args:
+        assembled: what has flown.
+        phases: when each began, s on our clock, and its name.
+        result: of the flight.
+        advised: its `advice`.
+    """
+    flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
+    state, began, config = context.link.state, flight.began, context.config
+    end = None if state.battery is None else state.battery.remaining
+    takeoff = None if reporter.takeoff is None else reporter.takeoff - began
+    early_end = None
+    if flight.failed_in is not None:
+        now = asyncio.get_running_loop().time() - began  # of a flight that was left, without event
+        time = next((at for at, text in flight.events if text == result), now)
+        early_end = _early_end(
+            time,
+            began,
+            takeoff,
+            flight.failed_in.name,
+            assembled.trace.maneuvers,
+            assembled.ladder.breaches,
+            result,
+        )
+    return Course(
+        began=began,
+        phases=tuple((at - began, name) for at, name in phases),
+        takeoff=takeoff,
+        early_end=early_end,
+        armed=state.armed,
+        mode=state.mode,
+        battery=(reporter.battery_at_takeoff, end),
+        min_battery=config.limits.min_battery,
+        deadline=config.deadman.deadline,
+        lockstep=not reporter.real_time,
+        advice=advised,
+        settings=_settings(context),
+    )
+
+
+def _early_end(
+    time: float,
+    began: float,
+    takeoff: float | None,
+    phase: str,
+    marks: list[ManeuverMark],
+    breaches: dict[str, str],
+    result: str,
+) -> EarlyEnd:
+    """`time` and `takeoff` in s since the flight began."""
+    name, into = None, None
+    if phase == "maneuvers":
+        for mark in marks:  # a hold may have ended the maneuver before the flight ended
+            if mark.name is not None:
+                name, begun = mark.name, mark.time
+                into = time + began - begun
+            elif name is not None and mark.time <= time + began:
+                into = mark.time - begun
+    since = None if takeoff is None or takeoff > time else time - takeoff
+    return EarlyEnd(time, since, phase, name, into, breaches.get(result))

@@ -1,0 +1,200 @@
+"""The state of a flight for the screen and its record, taken ten times a second."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from math import degrees, hypot, inf, nan
+from typing import NamedTuple
+
+from companion.attitude.kinematics import tilt_angle
+from companion.control.loop_record import LoopRecord
+from companion.control.tracking_record import flown_part
+from companion.flight.context import FlightContext
+from companion.recording.trace import FlightTrace
+from companion.safety import SafetyLadder
+from companion.vehicle.records import Battery
+
+_PERIOD = 0.1
+_SHOWN_EACH = 2
+"""Each second row is shown."""
+_WINDOW = 1.0
+"""The rate of setpoints is counted over this time, s."""
+
+
+class FlightStatus(NamedTuple):
+    """The state of a flight at one time; None: unknown, or does not apply.
+
+    Attributes:
+        time: s since the flight began.
+        airborne: s since the vehicle left the ground.
+        phase: its name.
+        detail: what the phase waits for.
+        elapsed: time in this phase, s.
+        timeout: of this phase, s; may be infinite.
+        maneuver: name of the maneuver that is flown.
+        maneuver_elapsed: time in this maneuver, s.
+        maneuver_duration: of this maneuver, s; None: another program ends it.
+        height: above home, m.
+        speed: m/s.
+        tilt: rad.
+        error: distance from the reference, m.
+        rate: setpoints a second, Hz.
+        latency: sample in → setpoint out of the last answer, s; None in lockstep.
+        missed: deadlines missed so far; None in lockstep.
+        battery: of the vehicle.
+        monitored: whether the safety monitors judge now.
+        alarms: names of the safety monitors whose alarm is raised.
+    """
+
+    time: float
+    airborne: float | None
+    phase: str
+    detail: str
+    elapsed: float
+    timeout: float
+    maneuver: str | None = None
+    maneuver_elapsed: float = 0.0
+    maneuver_duration: float | None = None
+    height: float | None = None
+    speed: float | None = None
+    tilt: float | None = None
+    error: float | None = None
+    rate: float | None = None
+    latency: float | None = None
+    missed: int | None = None
+    battery: Battery | None = None
+    monitored: bool = False
+    alarms: tuple[str, ...] = ()
+
+
+class PhaseNow(NamedTuple):
+    """The running phase.
+
+    Attributes:
+        name: shown to the user.
+        timeout: s.
+        monitored: whether the safety monitors judge in it.
+        entered: when it began, s on our clock.
+    """
+
+    name: str
+    timeout: float
+    monitored: bool
+    entered: float
+
+
+class StatusReporter:
+    """Records the motion in all phases, and shows the state of the flight.
+
+    Attributes:
+        takeoff: when the vehicle left the ground, s on our clock; None: it has not.
+        battery_at_takeoff: share that was left then, or None.
+        real_time: see below.
+
+    Args:
+        context: of the flight.
+        ladder: of the safety monitors.
+        trace: takes the motion.
+        began: when the flight began, s on our clock.
+        phase: returns the running phase.
+        show: takes the state; it must return at once.
+        clock: ours, s.
+        real_time: whether latencies mean anything: not where the vehicle waits for us.
+    """
+
+    def __init__(
+        self,
+        context: FlightContext,
+        ladder: SafetyLadder,
+        trace: FlightTrace,
+        began: float,
+        phase: Callable[[], PhaseNow],
+        show: Callable[[FlightStatus], None],
+        clock: Callable[[], float],
+        *,
+        real_time: bool,
+    ) -> None:
+        self.takeoff: float | None = None
+        self.battery_at_takeoff: float | None = None
+        self._context, self._ladder, self._trace = context, ladder, trace
+        self.real_time = real_time
+        self._began, self._phase, self._show, self._clock = began, phase, show, clock
+        self._counted: deque[tuple[float, int]] = deque()
+
+    async def run(self) -> None:
+        """Record and show until cancelled; steps that came too late are left out."""
+        due, count = self._clock(), 0
+        while True:
+            self.record()
+            if count % _SHOWN_EACH == 0:
+                self._show(self.status())
+            count += 1
+            due = max(due + _PERIOD, self._clock())
+            await asyncio.sleep(due - self._clock())
+
+    def record(self) -> None:
+        """Record the motion, and note the take-off."""
+        now, context, state = self._clock(), self._context, self._context.link.state
+        ground = context.ground
+        if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
+            self.takeoff = now
+            self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
+        speed, tilt = self._speed(), self._tilt()
+        vehicle_time = context.loop.record.last_vehicle_time
+        row = (
+            None if vehicle_time == -inf else vehicle_time,
+            state.height,
+            speed,
+            None if tilt is None else degrees(tilt),
+            self._error(),
+        )
+        self._trace.add_motion((now - self._began, *(nan if one is None else one for one in row)))
+
+    def status(self) -> FlightStatus:
+        """The state now."""
+        now, context, phase = self._clock(), self._context, self._phase()
+        record = context.loop.record
+        flown = flown_part(context.guidance_loop.flown, now)
+        return FlightStatus(
+            time=now - self._began,
+            airborne=None if self.takeoff is None else now - self.takeoff,
+            phase=phase.name,
+            detail=context.detail,
+            elapsed=now - phase.entered,
+            timeout=phase.timeout,
+            maneuver=None if flown is None else flown.name,
+            maneuver_elapsed=0.0 if flown is None else flown.elapsed,
+            maneuver_duration=None if flown is None else flown.duration,
+            height=context.link.state.height,
+            speed=self._speed(),
+            tilt=self._tilt(),
+            error=self._error(),
+            rate=self._rate(now, record),
+            latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
+            missed=record.missed_deadlines if self.real_time else None,
+            battery=context.link.state.battery,
+            monitored=phase.monitored and context.loop.offboard_active,
+            alarms=self._ladder.raised,
+        )
+
+    def _rate(self, now: float, record: LoopRecord) -> float | None:
+        """Setpoints a second over the last second, Hz; None while none is sent."""
+        counted = self._counted
+        counted.append((now, record.setpoints))
+        while len(counted) > 2 and now - counted[1][0] >= _WINDOW:
+            counted.popleft()
+        since, before = counted[0]
+        sent = record.setpoints - before
+        return sent / (now - since) if sent and now > since else None
+
+    def _speed(self) -> float | None:
+        position = self._context.link.state.position
+        return None if position is None else hypot(*position.velocity_ned)
+
+    def _tilt(self) -> float | None:
+        sample = self._context.loop.resets.newest
+        return None if sample is None else tilt_angle(sample.q[1], sample.q[2])
+
+    def _error(self) -> float | None:
+        loop = self._context.loop
+        return self._context.guidance_loop.off_course if loop.offboard_active else None

@@ -1,0 +1,149 @@
+"""What a flight's end says in words: what flew, whether it was good, and what to do next."""
+
+import shlex
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from companion.recording.verdict import Check, Figures, checks, is_good
+from companion.recording.what_to_do import what_to_do
+
+_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
+_INTERRUPTED = ("interrupted by ", "left at once by the user")
+
+
+class Invocation(NamedTuple):
+    """How the program was called, for the command that comes next.
+
+    Attributes:
+        program: as a shell finds it.
+        arguments: of the command that flew.
+        config: the configuration's file; None: of the bundled vehicle.
+    """
+
+    program: str
+    arguments: Sequence[str]
+    config: str | None
+
+
+class ClosingWords(NamedTuple):
+    """The words, one a line.
+
+    Attributes:
+        headline: what flew and whether it was good.
+        lines: the reasons.
+        next_command: a command line, or None.
+        good: as `is_good`.
+        flown: whether the maneuvers were flown to their end.
+    """
+
+    headline: str
+    lines: tuple[str, ...]
+    next_command: str | None
+    good: bool
+    flown: bool
+
+
+def closing_words(figures: Figures, called: Invocation | None) -> ClosingWords:
+    """The words for the figures of a flight.
+
+    Args:
+        figures: as `Summary.as_dict` makes them.
+        called: None: what comes next is said elsewhere.
+    """
+    flown, good = figures["result"] == "ok", is_good(figures)
+    headline, lines = _judged(figures) if flown else _ended_early(figures)
+    return ClosingWords(
+        headline, tuple(lines), None if called is None else _next(figures, called), good, flown
+    )
+
+
+def _judged(figures: Figures) -> tuple[str, list[str]]:
+    judged, advice = checks(figures), list(figures["advice"])
+    beyond = [check for check in judged if not check.good]
+    names = _enumerated([maneuver["name"] for maneuver in figures["maneuvers"]])
+    if is_good(figures):
+        headline = f"The flight was good: {names}, all {len(judged)} figures within their limits."
+    elif beyond:
+        headline = (
+            f"The flight was not good: {names}, {len(beyond)} of {len(judged)} figures beyond "
+            "their limits."
+        )
+    else:
+        headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
+    lines = [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
+    lines += [f"! {text}" for text in advice]
+    lines += _together([check for check in judged if check.good])
+    return headline, [*lines, _extent(figures)]
+
+
+def _together(good: Sequence[Check]) -> list[str]:
+    """One line for each thing that was checked."""
+    found: dict[str, list[str]] = {}
+    for check in good:
+        found.setdefault(check.what, []).append(check.found)
+    return [f"  {what}: {'; '.join(words)}" for what, words in found.items()]
+
+
+def _extent(figures: Figures) -> str:
+    extent = figures["extent"]
+    parts = [f"{extent['under_control_s']:.0f} s under our control"]
+    for key, words in (
+        ("height_max_m", "up to {:.1f} m high"),
+        ("speed_max_m_s", "{:.1f} m/s fast"),
+        ("tilt_max_deg", "{:.0f}° tilted"),
+    ):
+        if extent[key] is not None:
+            parts.append(words.format(extent[key]))
+    return f"  {', '.join(parts)}"
+
+
+def _ended_early(figures: Figures) -> tuple[str, list[str]]:
+    end = figures["early_end"]
+    interrupted = figures["result"].startswith(_INTERRUPTED)
+    remedy = "nothing is to be mended" if interrupted else what_to_do(end["monitor"], end["phase"])
+    if figures["at_the_end"]["armed"] and end["since_takeoff_s"] is not None:
+        remedy = f"take the vehicle over or land it, for it is armed; then: {remedy}"
+    return f"The flight ended early: {figures['result'].rstrip('.')}.", [
+        f"  when: {_when(end)}",
+        f"  vehicle now: {_vehicle(figures['at_the_end'])}",
+        f"  what to do: {remedy}",
+        *(f"! {text}" for text in figures["advice"]),
+    ]
+
+
+def _when(end: dict[str, Any]) -> str:
+    since = end["since_takeoff_s"]
+    words = "before take-off" if since is None else f"{since:.1f} s after take-off"
+    words += f" ({end['time_s']:.1f} s after the start), in phase `{end['phase']}`"
+    if end["maneuver"] is not None:
+        words += f", {end['into_maneuver_s']:.1f} s into {end['maneuver']}"
+    return words
+
+
+def _vehicle(state: dict[str, Any]) -> str:
+    armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
+    return armed if state["mode"] is None else f"{armed}, in mode {state['mode']}"
+
+
+def _next(figures: Figures, called: Invocation) -> str | None:
+    def command(*words: str) -> str:
+        return f"{called.program} {shlex.join(words)}"
+
+    again = called.arguments
+    if figures["result"].startswith(_INTERRUPTED):
+        return command(*again)
+    end = figures["early_end"]
+    if end is not None and end["phase"] in _BEFORE_TAKEOFF and end["since_takeoff_s"] is None:
+        return None if called.config is None else command("doctor", "--config", called.config)
+    if end is None and figures["settings"]:
+        changes = [f"{key}={value}" for key, value in figures["settings"].items()]
+        return command(*again, *(word for change in changes for word in ("--set", change)))
+    if end is None and called.config is not None and figures["planner"] == "first-order":
+        return command("identify", "--config", called.config)
+    return command("plot", figures["log"]) if figures["log"] is not None else None
+
+
+def _enumerated(names: Sequence[str]) -> str:
+    if not names:
+        return "no maneuver"
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,88 @@
+"""The course of a flight: its phases, how it ended, and the circumstances it is judged by."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class EarlyEnd:
+    """Where and why a flight ended before its maneuvers did.
+
+    Attributes:
+        time: s since the flight began.
+        since_takeoff: s since the vehicle left the ground; None: it had not.
+        phase: the phase that failed.
+        maneuver: that was flown then, or None.
+        into_maneuver: for how long it had been flown, s.
+        monitor: name of the safety monitor that ended the flight, or None.
+    """
+
+    time: float
+    since_takeoff: float | None
+    phase: str
+    maneuver: str | None = None
+    into_maneuver: float | None = None
+    monitor: str | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "time_s": _rounded(self.time),
+            "since_takeoff_s": _rounded(self.since_takeoff),
+            "phase": self.phase,
+            "maneuver": self.maneuver,
+            "into_maneuver_s": _rounded(self.into_maneuver),
+            "monitor": self.monitor,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What happened besides the figures. Times in s since the flight began.
+
+    Attributes:
+        began: s on our clock.
+        phases: when each phase began, and its name.
+        takeoff: when the vehicle left the ground; None: it did not.
+        early_end: None: the flight was flown to its end.
+        armed: whether the vehicle is armed at the end; None: unknown.
+        mode: of the vehicle at the end; None: unknown.
+        battery: share that is left at take-off and at the end; None: unknown.
+        min_battery: smallest share allowed, `limits.min_battery_percent`.
+        deadline: longest latency allowed, `deadman.deadline_ms`, s.
+        lockstep: whether the vehicle waited for us, so that no latency means anything.
+        advice: each key to set that differs from what was measured, one sentence each.
+        settings: these keys and what to set them to, as for `--set`.
+    """
+
+    began: float = 0.0
+    phases: tuple[tuple[float, str], ...] = ()
+    takeoff: float | None = None
+    early_end: EarlyEnd | None = None
+    armed: bool | None = None
+    mode: str | None = None
+    battery: tuple[float | None, float | None] = (None, None)
+    min_battery: float = 0.0
+    deadline: float = 0.004
+    lockstep: bool = False
+    advice: tuple[str, ...] = ()
+    settings: dict[str, str] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        begin, end = self.battery
+        return {
+            "lockstep": self.lockstep,
+            "deadline_ms": _rounded(1e3 * self.deadline),
+            "phases": [{"time_s": _rounded(time), "name": name} for time, name in self.phases],
+            "takeoff_s": _rounded(self.takeoff),
+            "early_end": None if self.early_end is None else self.early_end.as_dict(),
+            "at_the_end": {"armed": self.armed, "mode": self.mode},
+            "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
+            "advice": list(self.advice),
+            "settings": self.settings,
+        }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 3)

@@ -1,0 +1,135 @@
+"""Tracking by maneuver: a hover, a circle and open-loop steps have no error in common."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isnan, nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.recording.trace import ManeuverMark
+
+Floats = NDArray[np.float64]
+
+BEGINNING = 2.0
+"""Left out at the beginning of a maneuver, s: until then the vehicle comes from what was flown
+before, which is no error of this maneuver."""
+_MOST_OF_IT = 0.25
+"""At most this share of a maneuver is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class ManeuverFigures:
+    """How one maneuver was tracked; NaN: not measured.
+
+    Level means north and east. In open loop no position is meant: `level_rms` and `level_max` are
+    NaN, and `drift` says how far the vehicle went.
+
+    Attributes:
+        name: of the maneuver.
+        begin: s since the flight began.
+        duration: for which it was flown, s.
+        open_loop: whether a part of it is flown in open loop.
+        beginning: left out of RMS and largest errors, s.
+        level_rms: m.
+        level_max: m.
+        height_rms: m.
+        height_max: m.
+        beginning_max: largest distance in the part left out, m.
+        drift: largest level distance from where it began, m.
+        speed: largest of the reference, m/s.
+    """
+
+    name: str
+    begin: float
+    duration: float
+    open_loop: bool
+    beginning: float
+    level_rms: float
+    level_max: float
+    height_rms: float
+    height_max: float
+    beginning_max: float
+    drift: float
+    speed: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON; what was not measured is null."""
+        numbers = {
+            "begin_s": self.begin,
+            "duration_s": self.duration,
+            "beginning_left_out_s": self.beginning,
+            "level_rms_m": self.level_rms,
+            "level_max_m": self.level_max,
+            "height_rms_m": self.height_rms,
+            "height_max_m": self.height_max,
+            "beginning_max_m": self.beginning_max,
+            "drift_max_m": self.drift,
+            "reference_speed_max_m_s": self.speed,
+        }
+        return {
+            "name": self.name,
+            "open_loop": self.open_loop,
+            **{key: None if isnan(value) else round(value, 4) for key, value in numbers.items()},
+        }
+
+
+def measure_maneuvers(
+    rows: Floats, marks: Sequence[ManeuverMark], began: float
+) -> tuple[ManeuverFigures, ...]:
+    """Measure each maneuver that was flown.
+
+    Args:
+        rows: (N, 7) of `FlightTrace.tracking`.
+        marks: of `FlightTrace.maneuvers`.
+        began: when the flight began, s on our clock.
+    """
+    ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
+    measured = []
+    for mark, end in zip(marks, ends, strict=False):  # without marks there is an end too many
+        part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
+        if mark.name is not None and len(part) > 1:
+            measured.append(_measured(mark.name, mark.time - began, part))
+    return tuple(measured)
+
+
+def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
+    time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
+    duration = float(time[-1] - time[0])
+    open_loop = bool(np.isnan(reference[:, 0]).any())
+    beginning = 0.0 if open_loop else min(BEGINNING, _MOST_OF_IT * duration)
+    early = time < time[0] + beginning
+    error = position - reference
+    level, height = np.hypot(error[:, 0], error[:, 1]), np.abs(error[:, 2])
+    held = ~np.isnan(height)  # another program may command the thrust
+    away = position[:, :2] - position[0, :2]
+    return ManeuverFigures(
+        name,
+        begin,
+        duration,
+        open_loop,
+        beginning,
+        level_rms=nan if open_loop else _rms(level[~early]),
+        level_max=nan if open_loop else float(level[~early].max()),
+        height_rms=_rms(height[~early & held]),
+        height_max=float(height[~early & held].max(initial=0.0)) if held.any() else nan,
+        beginning_max=float(np.nanmax(np.hypot(level, height)[early], initial=0.0))
+        if early.any()
+        else nan,
+        drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
+        speed=_speed(time, reference),
+    )
+
+
+def _speed(time: Floats, reference: Floats) -> float:
+    """The largest speed of the reference, m/s; NaN where it has none."""
+    spans = np.diff(time)
+    steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
+    speeds = steps[spans > 0.0] / spans[spans > 0.0]
+    # A percentile: one row that came late must not count as a sprint.
+    return float(np.percentile(speeds, 95)) if np.isfinite(speeds).all() and len(speeds) else nan
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else nan

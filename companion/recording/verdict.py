@@ -1,0 +1,146 @@
+"""Whether a flight was good: each figure beside its limit, from what `--json` prints."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+Figures = Mapping[str, Any]
+"""As `Summary.as_dict` makes them."""
+
+LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
+"""Largest level RMS error of a maneuver: at rest, m, and per speed of the reference, s."""
+HEIGHT_RMS = 0.15
+"""Largest RMS error of the height, m."""
+STRAIGHTNESS = 0.03
+"""Largest distance from a step's line, as a share of the step."""
+MODEL_DEVIATION = 0.20
+"""Largest distance from the nearest second-order model, as a share of the step."""
+UNANSWERED = 0.01
+"""Largest share of attitude samples without an answer."""
+LOST = 0.02
+"""Largest share of the vehicle's frames that may be lost."""
+BATTERY_MARGIN = 0.10
+"""Least battery above `limits.min_battery_percent` at the end, as a share of the whole."""
+
+
+class Check(NamedTuple):
+    """One figure beside its limit.
+
+    Attributes:
+        what: it is about.
+        found: the figure and its limit, in words.
+        good: whether it is within the limit.
+        remedy: what to do if it is not.
+    """
+
+    what: str
+    found: str
+    good: bool
+    remedy: str
+
+
+def checks(figures: Figures) -> list[Check]:
+    """All checks that the figures of a flight allow; none where nothing was measured."""
+    return [
+        *_maneuvers(figures),
+        *_steps(figures),
+        *_answers(figures),
+        *_latency(figures),
+        *_battery(figures),
+    ]
+
+
+def is_good(figures: Figures) -> bool:
+    """Whether a flight was flown to its end, with every figure within its limit."""
+    good = all(check.good for check in checks(figures))
+    return figures["result"] == "ok" and good and not figures["advice"]
+
+
+def _maneuvers(figures: Figures) -> Iterator[Check]:
+    for maneuver in figures["maneuvers"]:
+        level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
+        if level is not None:
+            limit = LEVEL_RMS + LEVEL_RMS_PER_SPEED * (maneuver["reference_speed_max_m_s"] or 0.0)
+            yield Check(
+                maneuver["name"],
+                f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
+                f"at most {maneuver['level_max_m']:.2f} m",
+                level <= limit,
+                "fly it slower; against wind and drag see guidance and `companion identify`",
+            )
+        if height is not None:
+            yield Check(
+                maneuver["name"],
+                f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
+                height <= HEIGHT_RMS,
+                "set thrust.hover_thrust to the thrust at which the vehicle hovers",
+            )
+
+
+def _steps(figures: Figures) -> Iterator[Check]:
+    response = figures["response"]
+    size, across = response["step_size"], response["cross_axis_max"]
+    if not size or across is None:
+        return
+    limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
+    yield Check(
+        "straightness of the steps",
+        f"{across:.4f} from their lines (limit {limit:.4f})",
+        across <= limit,
+        "run `companion identify` and fly planner.name: model-following with its times",
+    )
+    deviation = response["second_order"]["deviation_max"]
+    if deviation is None:
+        return
+    yield Check(
+        "linearity of the steps",
+        f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
+        deviation <= deviation_limit,
+        "a rate limit distorts large steps: lower steps.coefficient or raise "
+        "limits.max_tilt_rate_deg_s",
+    )
+
+
+def _answers(figures: Figures) -> Iterator[Check]:
+    samples, unanswered = figures["samples"], sum(figures["unanswered"].values())
+    if samples:
+        yield Check(
+            "attitude samples",
+            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED:g} %)",
+            unanswered <= UNANSWERED * samples,
+            "the reasons are below the table `Control loop`",
+        )
+    frames, lost = figures["link"].get("frames", 0), figures["link"].get("lost", 0)
+    if frames:
+        yield Check(
+            "link",
+            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST:g} %)",
+            lost <= LOST * (frames + lost),
+            "raise the baud rate, lower the rates of other streams, or mend the radio link",
+        )
+
+
+def _latency(figures: Figures) -> Iterator[Check]:
+    late = figures["latency_us"]["p99"]
+    if figures["lockstep"] or late is None:
+        return  # the vehicle waits for us
+    deadline = figures["deadline_ms"]
+    yield Check(
+        "latency",
+        f"{1e-3 * late:.2f} ms in 99 % of the answers (deadline {deadline:g} ms)",
+        1e-3 * late <= deadline,
+        "end other programs on this computer, or set realtime.scheduler: fifo",
+    )
+
+
+def _battery(figures: Figures) -> Iterator[Check]:
+    battery = figures["battery"]
+    end = battery["end"]
+    if end is None:
+        return
+    limit = battery["min"] + BATTERY_MARGIN
+    yield Check(
+        "battery",
+        f"{100.0 * end:.0f} % at the end (at least {100.0 * limit:.0f} %)",
+        end >= limit,
+        "charge it before the next flight: below limits.min_battery_percent the vehicle lands",
+    )

@@ -1,0 +1,53 @@
+"""What to do after a flight that ended early: by the safety monitor or the phase that ended it."""
+
+from collections.abc import Mapping
+
+BY_MONITOR: Mapping[str, str] = {
+    "unheard": "check cable, radio and power: the vehicle was not heard any more",
+    "silence": "find why no setpoint left: the events name the reason",
+    "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
+    "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",
+    "landed": "check the autopilot's land detector, or fly higher: it reported the ground",
+    "failsafe": "mend what the autopilot's failsafe names in the events",
+    "battery": "charge the battery; the limit is limits.min_battery_percent",
+    "gps": "wait for a better GPS fix, or fly where more of the sky is seen",
+    "estimator": "let the autopilot's estimator settle; check its sensors and calibration",
+    "reset": "check GPS and compass: the autopilot's estimate jumped",
+    "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
+    "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor",
+    "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",
+    "fence": "make the maneuver smaller, begin it elsewhere, or widen the fence: limits.fence_*",
+    "braking": "make the maneuver smaller or slower near the fence, or widen it: limits.fence_*",
+    "speed": "fly slower; the limit is safety.max_speed_m_s",
+    "tracking": "fly slower or in less wind; the limit is safety.max_tracking_error_m",
+    "thrust": "carry less or fly in less wind; the limits are limits.min_thrust and max_thrust",
+    "answer gaps": "find what interrupts the telemetry or this computer",
+    "answer rate": "find what slows ATTITUDE_QUATERNION; the limit is link.min_attitude_rate_hz",
+    "position rate": "find what slows LOCAL_POSITION_NED; the limit is link.min_position_rate_hz",
+    "link loss": "mend the radio link or lower its load; the limit is safety.max_loss",
+    "round trip": "find what slows the link; the limit is safety.max_round_trip_ms",
+    "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",
+    "starvation": "end other programs on this computer, or set realtime.scheduler: fifo",
+}
+"""By name of the monitor."""
+
+BY_PHASE: Mapping[str, str] = {
+    "connect": "check power, cable and link.endpoint; nothing else may use the same port",
+    "checks": "mend what the message names; `companion doctor` explains each check",
+    "stream": "check the link: the autopilot sent too little telemetry to answer",
+    "arm": "mend what the autopilot names in the events; --arm lets the program arm",
+    "takeoff": "read the autopilot's words in the events; the pilot may have taken over",
+    "offboard": "mend what the message names; the autopilot must accept our setpoints",
+    "maneuvers": "read the events before it; if the pilot took over, nothing is to be mended",
+    "hand back": "read the events before it; the pilot may have taken over",
+    "land": "read the events before it; the pilot may have taken over",
+    "disarm": "disarm by the pilot's switch",
+}
+"""By name of the phase."""
+
+
+def what_to_do(monitor: str | None, phase: str) -> str:
+    """One sentence for the user, without a full stop."""
+    if monitor is not None and monitor in BY_MONITOR:
+        return BY_MONITOR[monitor]
+    return BY_PHASE.get(phase, "read the events before it")

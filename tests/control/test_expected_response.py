@@ -1,0 +1,106 @@
+"""The expected response against planners that fly a rate loop, and the words about it."""
+
+from math import exp
+
+import numpy as np
+import pytest
+
+from companion.attitude import Coefficients, Target, attitude, coefficients
+from companion.config import Config
+from companion.config.files import changed
+from companion.control.expected_response import expectations, expected_response
+from companion.control.inner_loop import planner
+from companion.control.outer_loop import hold_gains, linear_settings
+from companion.study.lag_loop import LagLoop
+
+PX4 = {"lag_ms": 47, "dead_time_ms": 40}
+BASE = Config.model_validate({"vehicle": PX4})
+STEP = 0.25
+
+
+def configured(name, gain, rate=90.0, **vehicle):
+    changes = {
+        "planner": {"name": name, "gain_per_s": gain},
+        "limits": {"max_tilt_rate_deg_s": rate},
+        "vehicle": {**PX4, **vehicle},
+    }
+    return changed(BASE, changes, "test")
+
+
+def flown(config, lag_ms, dead_time_ms, begin=(-STEP, 0.0), end=(STEP, 0.0)):
+    """Coefficients (n, 2) of a step, 250 times a second."""
+    start, target = attitude(Coefficients(*begin), 0.0), Target(*end, 0.0)
+    loop = LagLoop(lag_ms, dead_time_ms)
+    flight = loop.fly(planner(config), start, target, seconds=2.0, rate_hz=250)
+    return np.array([coefficients(tuple(q)) for q in flight.q])
+
+
+@pytest.mark.parametrize("name", ["model-following", "first-order"])
+@pytest.mark.parametrize("rate", [60.0, 90.0, 400.0])
+@pytest.mark.parametrize("gain", [2.5, 5.0, 10.0])
+def test_the_time_constant_is_that_of_a_simulated_step(name, rate, gain):
+    config = configured(name, gain, rate)
+    north = flown(config, 47, 40)[:, 0]
+    covered = np.argmax(north >= -STEP + 2.0 * STEP * (1.0 - exp(-1.0))) / 250.0
+    assert expected_response(config).time_constant == pytest.approx(covered, abs=0.012)
+
+
+@pytest.mark.parametrize(
+    ("gain", "rate", "vehicle", "limit"),
+    [
+        (2.5, 400.0, {}, "planner.gain_per_s"),
+        (10.0, 90.0, {}, "limits.max_tilt_rate_deg_s"),
+        (10.0, 400.0, {"dead_time_ms": 90}, "the vehicle's dead time"),
+        (10.0, 400.0, {"lag_ms": 150, "dead_time_ms": 15}, "the vehicle's lag"),
+    ],
+)
+def test_what_limits_the_response_is_what_makes_it_quicker_when_changed(gain, rate, vehicle, limit):
+    config = configured("model-following", gain, rate, **vehicle)
+    found = expected_response(config)
+    assert found.limited_by == limit
+    assert f"{limit} limits it most (" in found.sentence()
+    changes = {
+        "planner.gain_per_s": {"planner": {"gain_per_s": 2.0 * gain}},
+        "limits.max_tilt_rate_deg_s": {"limits": {"max_tilt_rate_deg_s": 1000.0}},
+        "the vehicle's lag": {"vehicle": {"lag_ms": 0.0}},
+        "the vehicle's dead time": {"vehicle": {"dead_time_ms": 0.0}},
+    }
+    for name, change in changes.items():
+        now = expected_response(changed(config, change, "test")).time_constant
+        assert now == pytest.approx(found.otherwise[name], abs=0.004)
+
+
+def test_the_quickest_sensible_gain_and_a_warning_above_it():
+    assert expected_response(configured("model-following", 5.0)).quickest_gain == pytest.approx(
+        0.45 / 0.087
+    )
+    assert not expected_response(configured("model-following", 5.0)).too_quick
+    quick = expected_response(configured("first-order", 6.0))
+    assert quick.too_quick
+    assert "6, and 5.2 is the quickest sensible one (0.45 / (lag + dead time)); lower it" in (
+        quick.gain_sentence()
+    )
+    unknown = expected_response(Config())
+    assert unknown.quickest_gain is None
+    assert "not known before `companion identify`" in unknown.gain_sentence()
+
+
+def test_the_gains_that_are_told_are_those_that_fly():
+    config = configured("model-following", 5.0)
+    gains = linear_settings(config).gains
+    assert gains == hold_gains(config)
+    told = expectations(config)[-1]
+    assert f"{gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on velocity" in told
+
+
+@pytest.mark.parametrize(("lag", "dead_time"), [(20, 15), (47, 40), (73, 54), (100, 80)])
+def test_the_times_of_another_vehicle_do_less_harm_than_none(lag, dead_time):
+    """The decision behind the shipped files, at their gain and their tilt: docs/identify.md."""
+    bends, overshoots = [], []
+    for name in ("model-following", "first-order"):
+        config = configured(name, 4.0)
+        found = flown(config, lag, dead_time, (-0.15, -0.2), (0.15, -0.2))
+        bends.append(np.abs(found[:, 1] + 0.2).max())
+        overshoots.append(found[:, 0].max() - 0.15)
+    assert bends[0] < bends[1] <= 0.0035
+    assert overshoots[0] <= overshoots[1] + 1e-4

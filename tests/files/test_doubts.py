@@ -1,0 +1,66 @@
+"""Values that are allowed and most likely not meant."""
+
+import pytest
+
+from companion.cli.main import main
+from companion.config import Config
+from companion.config.doubts import doubts
+from companion.config.files import load, shipped
+
+MOCK = {"mock": {}}
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "meant"),
+    [
+        ("limits", "max_tilt_rate_deg_s", 1.57, "89.95"),
+        ("limits", "max_yaw_rate_deg_s", 1.05, "60.16"),
+        ("limits", "min_battery_percent", 0.4, "40"),
+        ("vehicle", "lag_ms", 0.047, "47"),
+        ("vehicle", "acceleration_limit_deg_s2", 19.2, "1100"),
+        ("thrust", "lag_ms", 0.05, "50"),
+    ],
+)
+def test_a_value_in_another_unit_is_doubted(section, key, value, meant):
+    (doubt,) = doubts(Config.model_validate({**MOCK, section: {key: value}}))
+    assert doubt.key == f"{section}.{key}"
+    assert f"{value:g}" in doubt.found
+    assert doubt.fix == f"write {meant} if that was meant"
+
+
+def test_no_shipped_value_is_doubted():
+    for name in ("px4", "ardupilot", "mock-px4", "mock-ardupilot"):
+        found = {doubt.key for doubt in doubts(load(shipped(f"{name}.yaml")))}
+        assert found == (set() if "mock" in name else {"vehicle.identified"})
+
+
+def test_times_that_identify_wrote_are_the_vehicles_own():
+    times = {"lag_ms": 47.0, "dead_time_ms": 40.0}
+    assert [doubt.key for doubt in doubts(Config.model_validate({"vehicle": times}))] == [
+        "vehicle.identified"
+    ]
+    own = {"vehicle": {**times, "identified": "2026-11-22T10-54-16Z"}}
+    assert list(doubts(Config.model_validate(own))) == []
+    assert list(doubts(Config())) == []
+
+
+def test_a_key_of_ones_own_beside_identified_times_takes_the_mark_away(tmp_path):
+    (tmp_path / "own.yaml").write_text(
+        "vehicle: {identified: a flight, lag_ms: 40, dead_time_ms: 30}\n"
+    )
+    path = tmp_path / "c.yaml"
+    for text, mark in (("", "a flight"), ("vehicle: {lag_ms: 47}\n", None)):
+        path.write_text(f"include: own.yaml\n{text}")
+        assert load(path).vehicle.identified == mark
+
+
+def test_check_config_says_what_to_expect_and_what_to_look_at_again(tmp_path, capsys):
+    path = tmp_path / "c.yaml"
+    path.write_text("vehicle: {lag_ms: 47, dead_time_ms: 40}\nplanner: {gain_per_s: 10}\n")
+    assert main(["check-config", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "expected to have a time constant of 0.29 s; limits.max_tilt_rate_deg_s limits" in out
+    assert "5.2 is the quickest sensible one" in out
+    assert "the hold has gains of " in out
+    assert "look again: the times of `vehicle` are not this vehicle's own" in out
+    assert out.endswith(f"{path}: ok\n")

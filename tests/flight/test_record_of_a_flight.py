@@ -1,0 +1,168 @@
+"""What a flight leaves behind besides its figures: events in the log, motion, phases, its end."""
+
+import json
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+
+from companion.flight.observer import Silent
+from companion.recording.closing_words import closing_words
+from companion.testing import MockVehicle, fly
+from tests.flight.fly import QUICK_FLIGHT, QUICK_MOCK, QUICK_PARAMETERS, merged
+
+SHORT = {
+    "flight": {"maneuvers": ["hover", "steps"]},
+    "hover": {"duration_s": 2.0},
+    "steps": {"duration_s": 0.3, "settle_s": 0.5},
+}
+LOG = mavutil.mavlink.MAV_COMP_ID_LOG
+
+
+class Watching(Silent):
+    """Keeps the states and the events that are shown."""
+
+    def __init__(self):
+        self.states, self.events = [], []
+
+    def status(self, status):
+        self.states.append(status)
+
+    def event(self, time, text):
+        self.events.append(text)
+
+
+def flown(folder, **changes):
+    quick = {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]}
+    observer = Watching()
+    config = merged(merged(QUICK_FLIGHT, SHORT), changes)
+    return fly(config, MockVehicle("px4", **quick), folder, observer), observer
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    return flown(tmp_path_factory.mktemp("good"))
+
+
+def own_texts(summary):
+    """(time, text) of our STATUSTEXTs, as pymavlink reads them, with their pieces joined."""
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    texts, times = [], []
+    while (message := log.recv_match()) is not None:
+        times.append(message._timestamp)
+        if message.get_type() != "STATUSTEXT" or message.get_srcComponent() != LOG:
+            continue
+        if message.chunk_seq:
+            texts[-1] = texts[-1][0], texts[-1][1] + message.text
+        else:
+            texts.append((message._timestamp, message.text))
+    assert times == sorted(times)
+    return texts
+
+
+def test_every_event_and_phase_is_in_the_log_at_its_time(good):
+    summary, _ = good
+    texts = own_texts(summary)
+    began = texts[0][0]
+    phases = [text for _, text in texts if text.startswith("phase: ")]
+    assert phases == [f"phase: {each['name']}" for each in summary.as_dict()["phases"]]
+    events = [(time - began, text) for time, text in texts if not text.startswith("phase: ")]
+    assert [text for _, text in events] == [text for _, text in summary.events]
+    assert [time for time, _ in events] == pytest.approx(
+        [time for time, _ in summary.events], abs=0.01
+    )
+    assert any(len(text) > 100 for _, text in events)  # in several pieces
+
+
+def test_the_vehicle_receives_no_text_of_ours(good):
+    summary, _ = good
+    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    sent = {
+        message.get_type()
+        for message in iter(log.recv_match, None)
+        if message.get_srcComponent() == 191
+    }
+    assert "SET_ATTITUDE_TARGET" in sent
+    assert "STATUSTEXT" not in sent
+
+
+def test_the_summary_tells_each_maneuver_and_keeps_the_old_keys(good):
+    summary, _ = good
+    told = json.loads((summary.log / "summary.json").read_text())
+    hover, steps = told["maneuvers"]
+    assert (hover["name"], hover["open_loop"], steps["name"]) == ("hover", False, "steps")
+    assert hover["level_rms_m"] < 0.1
+    assert (steps["level_rms_m"], steps["open_loop"]) == (None, True)
+    assert steps["begin_s"] - hover["begin_s"] == pytest.approx(2.0, abs=0.05)
+    assert told["tracking"].keys() == {"position_rms_m", "position_max_m", "height_rms_m"}
+    assert told["verdict"]["good"] == all(check["good"] for check in told["verdict"]["checks"])
+    assert told["lockstep"]
+    assert told["early_end"] is None
+
+
+def test_the_motion_is_recorded_from_the_ground_to_the_ground(good):
+    summary, _ = good
+    rows = np.genfromtxt(summary.log / "motion.csv", delimiter=",", names=True)
+    assert np.diff(rows["time_s"]) == pytest.approx(0.1, abs=0.03)
+    heights = rows["height_m"][~np.isnan(rows["height_m"])]
+    assert heights[0] == pytest.approx(0.0, abs=0.2)
+    assert heights.max() == pytest.approx(2.0, abs=0.2)
+    assert heights[-1] == pytest.approx(0.0, abs=0.2)
+    assert summary.extent()["tilt_max_deg"] > 5.0
+    takeoff = summary.course.takeoff
+    begun = {name: time for time, name in summary.course.phases}
+    assert begun["takeoff"] < takeoff < begun["offboard"]
+
+
+def test_the_state_is_shown_in_every_phase(good):
+    _summary, observer = good
+    shown = {state.phase for state in observer.states}
+    assert {"checks", "takeoff", "maneuvers", "land"} <= shown
+    flying = [state for state in observer.states if state.maneuver == "hover"]
+    assert len(flying) == pytest.approx(10, abs=2)
+    assert all(state.monitored and state.alarms == () for state in flying)
+    assert flying[-1].rate == pytest.approx(250.0, rel=0.05)
+    assert {state.latency for state in observer.states} == {None}  # in lockstep
+    times = [state.time for state in observer.states]
+    assert np.diff(times) == pytest.approx(0.2, abs=0.05)
+
+
+def test_a_flight_that_a_monitor_ends_says_when_where_and_why(tmp_path):
+    summary, observer = flown(tmp_path, safety={"max_body_rate_deg_s": 15.0})
+    end = summary.course.early_end
+    assert (end.phase, end.maneuver, end.monitor) == ("maneuvers", "steps", "body rate")
+    steps = summary.maneuvers()[1]
+    assert end.into_maneuver == pytest.approx(steps.duration, abs=0.1)
+    assert end.into_maneuver > 1.0  # the rest before the first step
+    assert end.since_takeoff == pytest.approx(end.time - summary.course.takeoff)
+    words = closing_words(summary.as_dict(), None)
+    assert "safety.max_body_rate_deg_s" in "\n".join(words.lines)
+    assert "s into steps" in words.lines[0]
+    # It is still at the state when an alarm is raised.
+    assert observer.states[-1].phase in ("hand back", "maneuvers")
+
+
+def test_a_wrong_hover_thrust_is_advised_once_and_not_among_the_events_shown(tmp_path):
+    summary, observer = flown(
+        tmp_path, thrust={"hover_thrust": 0.35}, flight={"maneuvers": ["hover"]}
+    )
+    (sentence,) = summary.course.advice
+    assert sentence not in observer.events
+    assert [text for _, text in summary.events].count(sentence) == 1
+    assert any(text == sentence for _, text in own_texts(summary))
+    value = float(summary.course.settings["thrust.hover_thrust"])
+    assert value == pytest.approx(0.49, abs=0.02)
+    assert f"set it to {value:.2f}" in sentence
+    assert not summary.as_dict()["verdict"]["good"]
+
+
+def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
+    class Broken(Silent):
+        def status(self, status):
+            raise ZeroDivisionError("the screen")
+
+    quick = {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]}
+    config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
+    summary = fly(config, MockVehicle("px4", **quick), tmp_path, Broken())
+    assert summary.result == "ok"
+    assert any("ZeroDivisionError('the screen')" in text for _, text in summary.events)

@@ -1,0 +1,249 @@
+"""The words at the end of a flight, over a grid of what can come of one."""
+
+import copy
+import itertools
+
+import pytest
+
+from companion.config import Config
+from companion.config.flight import FlightConfig
+from companion.flight.phases import Exit, exit_phases, flight_phases, ground_phases
+from companion.recording.closing_words import Invocation, closing_words
+from companion.recording.verdict import checks, is_good
+from companion.recording.what_to_do import BY_MONITOR, BY_PHASE
+from companion.safety.table import monitors
+from companion.vehicle.registry import AUTOPILOTS
+
+DEMO = Invocation("companion", ["demo", "--lockstep"], None)
+MINE = Invocation(".venv/bin/companion", ["fly", "--config", "my own.yaml"], "my own.yaml")
+
+HOVER = {
+    "name": "hover",
+    "level_rms_m": 0.03,
+    "level_max_m": 0.06,
+    "height_rms_m": 0.02,
+    "reference_speed_max_m_s": 0.0,
+    "open_loop": False,
+}
+STEPS = {**HOVER, "name": "steps", "level_rms_m": None, "level_max_m": None, "open_loop": True}
+CIRCLE = {**HOVER, "name": "circle", "reference_speed_max_m_s": 5.0, "level_rms_m": 0.2}
+GOOD = {
+    "result": "ok",
+    "phase": "disarm",
+    "planner": "model-following",
+    "maneuvers": [HOVER, STEPS, CIRCLE],
+    "response": {
+        "step_size": 0.25,
+        "cross_axis_max": 0.002,
+        "second_order": {"deviation_max": 0.03},
+    },
+    "samples": 10_000,
+    "unanswered": {"late": 3, "not_newer": 1},
+    "link": {"frames": 30_000, "lost": 12},
+    "latency_us": {"p50": 110.0, "p99": 260.0, "max": 900.0},
+    "deadline_ms": 4.0,
+    "lockstep": False,
+    "battery": {"takeoff": 0.9, "end": 0.8, "min": 0.2},
+    "advice": [],
+    "settings": {},
+    "early_end": None,
+    "at_the_end": {"armed": False, "mode": "AUTO.LOITER"},
+    "extent": {
+        "height_max_m": 5.04,
+        "speed_max_m_s": 5.1,
+        "tilt_max_deg": 24.6,
+        "under_control_s": 38.2,
+    },
+    "log": "flights/one",
+}
+END = {
+    "time_s": 33.9,
+    "since_takeoff_s": 21.3,
+    "phase": "maneuvers",
+    "maneuver": "circle",
+    "into_maneuver_s": 7.2,
+    "monitor": "fence",
+}
+ENDED = {"result": "the vehicle is 9.1 m away", "phase": "maneuvers", "early_end": END}
+
+
+def changed(path, value, base=GOOD):
+    """A copy of the figures with the value at `path` (keys and numbers) replaced."""
+    figures = copy.deepcopy(base)
+    *way, last = path
+    inner = figures
+    for key in way:
+        inner = inner[key]
+    inner[last] = value
+    return figures
+
+
+def words(figures, called=DEMO):
+    told = closing_words(figures, called)
+    return told, "\n".join((told.headline, *told.lines))
+
+
+def test_a_good_flight_is_called_good_with_its_figures_and_limits():
+    told, text = words(GOOD)
+    assert (told.good, told.flown) == (True, True)
+    assert told.headline == (
+        "The flight was good: hover, steps and circle, all 11 figures within their limits."
+    )
+    assert "  circle: 0.20 m RMS from its path (limit 0.25 m), at most 0.06 m; 0.02 m" in text
+    assert "  latency: 0.26 ms in 99 % of the answers (deadline 4 ms)" in text
+    assert "  38 s under our control, up to 5.0 m high, 5.1 m/s fast, 25° tilted" in text
+    assert told.next_command == "companion plot flights/one"
+
+
+BEYOND = {
+    "circle": (["maneuvers", 2, "level_rms_m"], 0.26, "fly it slower"),
+    "hover": (["maneuvers", 0, "level_rms_m"], 0.16, "fly it slower"),
+    "steps": (["maneuvers", 1, "height_rms_m"], 0.16, "thrust.hover_thrust"),
+    "straightness of the steps": (["response", "cross_axis_max"], 0.01, "model-following"),
+    "linearity of the steps": (
+        ["response", "second_order", "deviation_max"],
+        0.06,
+        "limits.max_tilt_rate_deg_s",
+    ),
+    "attitude samples": (["unanswered", "late"], 150, "Control loop"),
+    "link": (["link", "lost"], 900, "baud"),
+    "latency": (["latency_us", "p99"], 4100.0, "realtime.scheduler"),
+    "battery": (["battery", "end"], 0.29, "charge"),
+}
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_each_figure_beyond_its_limit_is_told_first_with_what_to_do(what):
+    path, value, remedy = BEYOND[what]
+    told, _ = words(changed(path, value))
+    assert (told.good, told.flown) == (False, True)
+    assert "not good" in told.headline
+    assert "1 of 11 figures beyond their limits" in told.headline
+    assert told.lines[0].startswith(f"! {what}: ")
+    assert remedy in told.lines[0]
+
+
+@pytest.mark.parametrize("what", BEYOND)
+def test_a_figure_that_was_not_measured_is_no_fault(what):
+    path, _, _ = BEYOND[what]
+    nothing = 0 if what in ("attitude samples", "link") else None
+    figures = changed(path, nothing)
+    assert is_good(figures)
+
+
+def test_in_lockstep_the_latency_is_not_judged():
+    slow = changed(["latency_us", "p99"], 99_000.0)
+    assert not is_good(slow)
+    _, text = words({**slow, "lockstep": True})
+    assert is_good({**slow, "lockstep": True})
+    assert "latency" not in text
+    assert "ms" not in text
+
+
+def test_a_setting_that_does_not_fit_is_told_and_tried_next():
+    sentence = "the vehicle hovers at 0.49, but thrust.hover_thrust is 0.30; set it to 0.49"
+    figures = {**GOOD, "advice": [sentence], "settings": {"thrust.hover_thrust": "0.49"}}
+    told, _ = words(figures)
+    assert "the configuration does not fit the vehicle" in told.headline
+    assert told.lines[0] == f"! {sentence}"
+    assert told.next_command == "companion demo --lockstep --set thrust.hover_thrust=0.49"
+    again = words(figures, MINE)[0].next_command
+    assert again == (
+        ".venv/bin/companion fly --config 'my own.yaml' --set thrust.hover_thrust=0.49"
+    )
+
+
+def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
+    told, text = words({**GOOD, **ENDED})
+    assert (told.good, told.flown) == (False, False)
+    assert told.headline == "The flight ended early: the vehicle is 9.1 m away."
+    assert (
+        "when: 21.3 s after take-off (33.9 s after the start), in phase `maneuvers`, "
+        "7.2 s into circle" in text
+    )
+    assert "vehicle now: disarmed, in mode AUTO.LOITER" in text
+    assert "what to do: make the maneuver smaller" in text
+    assert told.next_command == "companion plot flights/one"
+
+
+def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
+    armed = {**GOOD, **ENDED, "at_the_end": {"armed": True, "mode": "AUTO.LOITER"}}
+    _, text = words(armed)
+    assert "vehicle now: ARMED, in mode AUTO.LOITER" in text
+    assert "what to do: take the vehicle over or land it, for it is armed; then: make" in text
+
+
+@pytest.mark.parametrize("phase", ["connect", "checks", "stream", "arm"])
+def test_before_take_off_the_doctor_is_next(phase):
+    end = {**END, "since_takeoff_s": None, "phase": phase, "maneuver": None, "monitor": None}
+    figures = {**GOOD, "result": "no heartbeat", "early_end": end, "maneuvers": []}
+    told, text = words(figures, MINE)
+    assert "before take-off (33.9 s after the start)" in text
+    assert BY_PHASE[phase] in text
+    assert told.next_command == ".venv/bin/companion doctor --config 'my own.yaml'"
+    assert words(figures)[0].next_command is None  # the bundled vehicle has no doctor
+
+
+def test_a_flight_that_the_user_interrupted_has_nothing_to_mend():
+    figures = {**GOOD, **ENDED, "result": "interrupted by the user (Ctrl-C)"}
+    told, text = words(figures, MINE)
+    assert "nothing is to be mended" in text
+    assert told.next_command == ".venv/bin/companion fly --config 'my own.yaml'"
+
+
+def test_after_first_order_on_an_own_vehicle_identify_is_next():
+    figures = {**GOOD, "planner": "first-order"}
+    command = words(figures, MINE)[0].next_command
+    assert command == ".venv/bin/companion identify --config 'my own.yaml'"
+    assert words(figures)[0].next_command == "companion plot flights/one"
+    assert closing_words(figures, None).next_command is None
+
+
+def test_every_combination_has_words_without_gaps():
+    """A grid of results, ends, measurements and callers: a sentence each, nothing raised."""
+    nothing = {
+        "maneuvers": [],
+        "samples": 0,
+        "unanswered": {},
+        "link": {},
+        "response": {"step_size": None, "cross_axis_max": None, "second_order": {}},
+        "latency_us": {"p50": None, "p99": None, "max": None},
+        "battery": {"takeoff": None, "end": None, "min": 0.2},
+        "extent": {**dict.fromkeys(GOOD["extent"]), "under_control_s": 0.0},
+        "log": None,
+    }
+    ends = [
+        {},
+        *(
+            {"result": "broken", "early_end": {**END, "phase": phase, "monitor": monitor}}
+            for phase in (*BY_PHASE, "go to")
+            for monitor in (None, "fence", "unknown")
+        ),
+    ]
+    states = [
+        {"armed": armed, "mode": mode} for armed in (True, False, None) for mode in ("M", None)
+    ]
+    for measured, end, state, called in itertools.product(
+        ({}, nothing), ends, states, (DEMO, MINE, None)
+    ):
+        told, text = words({**GOOD, **measured, **end, "at_the_end": state}, called)
+        assert told.headline.endswith(".")
+        assert all(line.startswith(("  ", "! ")) for line in told.lines)
+        assert "None" not in text
+        assert " nan" not in text
+        assert (called is None) <= (told.next_command is None)
+
+
+def test_every_monitor_and_every_phase_has_its_advice():
+    assert {monitor.name for monitor in monitors(Config())} == set(BY_MONITOR)
+    config = FlightConfig()
+    phases = [*ground_phases(config)]
+    for autopilot in AUTOPILOTS:
+        phases += flight_phases(config, 1.0, autopilot)
+    for way in Exit:
+        phases += exit_phases(config, way)
+    assert {phase.name for phase in phases} <= set(BY_PHASE)
+
+
+def test_the_checks_are_those_of_the_json():
+    assert {check.what for check in checks(GOOD)} == set(BEYOND)

@@ -1,0 +1,82 @@
+"""Each maneuver has its own figures, by the rows that were recorded while it was flown."""
+
+from math import nan
+
+import numpy as np
+import pytest
+
+from companion.recording.maneuver_figures import BEGINNING, measure_maneuvers
+from companion.recording.trace import ManeuverMark
+
+RATE = 50
+
+
+def rows(begin, seconds, reference, position):
+    """Rows from vehicle time `begin` on; `reference` and `position` are functions of time (s)."""
+    times = [k / RATE for k in range(round(seconds * RATE))]
+    return [[begin + time, *reference(time), *position(time)] for time in times]
+
+
+def hover(off):
+    return lambda _: (0.0, 0.0, -5.0), lambda time: (off(time), 0.0, -5.1)
+
+
+HOVER = rows(100.0, 10.0, *hover(lambda time: 1.0 if time < BEGINNING else 0.03))
+STEPS = rows(
+    110.0,
+    8.0,
+    lambda time: (nan, nan, -5.0) if 1.0 < time < 5.0 else (0.0, 0.0, -5.0),
+    lambda time: (0.3 * time, 0.4 * time, -5.0),
+)
+LINE = rows(118.0, 10.0, lambda time: (2.0 * time, 0.0, -5.0), lambda time: (2.0 * time, 0.2, -4.8))
+ALL = np.array(HOVER + STEPS + LINE)
+MARKS = [
+    ManeuverMark(50.0, 100.0, "hover"),
+    ManeuverMark(60.0, 110.0, "steps"),
+    ManeuverMark(68.0, 118.0, "line"),
+    ManeuverMark(78.0, 128.0, None),
+]
+
+
+def test_each_maneuver_is_measured_by_itself():
+    hover, steps, line = measure_maneuvers(ALL, MARKS, began=40.0)
+    assert [one.name for one in (hover, steps, line)] == ["hover", "steps", "line"]
+    assert [one.begin for one in (hover, steps, line)] == [10.0, 20.0, 28.0]
+    assert hover.duration == pytest.approx(10.0, abs=0.03)
+    assert (line.level_rms, line.level_max) == pytest.approx((0.2, 0.2))
+    assert (line.height_rms, line.speed) == pytest.approx((0.2, 2.0))
+
+
+def test_the_beginning_is_left_out_and_told_apart():
+    hover, *_ = measure_maneuvers(ALL, MARKS, 0.0)
+    assert hover.beginning == BEGINNING
+    assert (hover.level_rms, hover.level_max) == pytest.approx((0.03, 0.03))
+    assert hover.beginning_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
+
+
+def test_of_a_short_maneuver_a_quarter_is_left_out():
+    (short,) = measure_maneuvers(ALL[: 4 * RATE + 1], MARKS[:1], 0.0)
+    assert short.beginning == pytest.approx(1.0)
+
+
+def test_open_loop_has_no_level_error_but_a_drift_and_a_height():
+    _, steps, _ = measure_maneuvers(ALL, MARKS, 0.0)
+    assert steps.open_loop
+    assert np.isnan([steps.level_rms, steps.level_max, steps.speed]).all()
+    assert steps.drift == pytest.approx(0.5 * 7.98)
+    assert steps.height_rms == 0.0
+    told = steps.as_dict()
+    assert (told["name"], told["level_rms_m"], told["open_loop"]) == ("steps", None, True)
+
+
+def test_what_was_not_recorded_is_not_measured():
+    assert measure_maneuvers(np.empty((0, 7)), [], 0.0) == ()
+    assert measure_maneuvers(np.empty((0, 7)), MARKS, 0.0) == ()
+    assert [one.name for one in measure_maneuvers(ALL[:RATE], MARKS, 0.0)] == ["hover"]
+
+
+def test_a_thrust_that_another_program_commands_has_no_height_error():
+    thrust = np.array(rows(0.0, 4.0, lambda _: (nan, nan, nan), lambda _: (0.0, 0.0, -5.0)))
+    (one,) = measure_maneuvers(thrust, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
+    assert np.isnan([one.height_rms, one.height_max]).all()
+    assert one.as_dict()["height_rms_m"] is None
