@@ -11,7 +11,7 @@ from companion.config import Config
 from companion.config.root import MOST_INCLUDED
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import Where
-from companion.files.yaml_faults import shortened
+from companion.files.yaml_faults import owners, shortened
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
 _INCLUDE = "include"
@@ -178,6 +178,8 @@ def assigned(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     for text in texts:
         key, equals, value = text.partition("=")
         section, dot, name = key.strip().partition(".")
+        if equals and not dot and (found := owners(section, Config)):
+            raise ConfigError(f"--set {text}: name the section, as in {found}")
         if not (equals and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
         if section not in Config.model_fields:

@@ -152,6 +152,11 @@ def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]
     return f"is not a known key; {hint}"
 
 
+def owners(name: str, model: type[BaseModel]) -> str:
+    """The dotted keys of this name as alternatives; empty if no section has it."""
+    return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
+
+
 def _either(places: list[str]) -> str:
     """Some dotted keys as alternatives."""
     return " or ".join(f"`{place}`" for place in places[:_PLACES_TOLD])
