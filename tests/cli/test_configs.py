@@ -134,7 +134,8 @@ def test_a_starting_file_can_be_checked_and_is_never_replaced(name, tmp_path, ca
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("max_tilt_deg=20", "write SECTION.KEY=VALUE"),
+        ("max_tilt_deg=20", "name the section, as in `limits.max_tilt_deg`"),
+        ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
         ("limit.max_tilt_deg=20", "there is no section `limit`"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
