@@ -14,7 +14,7 @@ from companion.flight.wiring import connected
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.serve.component import Component
-from companion.serve.mode_requests import asks_for_control, starves_control
+from companion.serve.mode_requests import asks_for_control, leaves_control, starves_control
 from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.ownership import Control, Ownership
@@ -85,6 +85,7 @@ class ServedControl:
         self._assembled: Assembled | None = None
         self._source: ServedSource | None = None
         self._not_before = 0.0
+        self._let_go = False
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
         self._own = Address(settings.source_system, settings.source_component)
@@ -107,8 +108,11 @@ class ServedControl:
             self._take_wish(client, frame)
             return True
         if self.in_control and starves_control(frame, self.needed_rates()):
-            self._component.acknowledge(client, frame, _ACCEPTED)
+            self._answer(client, frame, _ACCEPTED)
             return True
+        owner = self.ownership.owner
+        if isinstance(owner, _Owner) and owner.client is client and leaves_control(frame):
+            self._let_go = True  # the autopilot's answer decides whether it does
         return False
 
     async def close(self, reason: str) -> None:
@@ -191,7 +195,7 @@ class ServedControl:
         if not state.flying:
             self._component.answer(owner.client, "setpoints are flown in the air: take off first")
             return False
-        return self.ownership.ask(owner, now) is None
+        return self.ownership.streams(owner, now) and self.ownership.ask(owner, now) is None
 
     # --- control
 
@@ -210,15 +214,14 @@ class ServedControl:
             if self._flight is None:
                 self.ownership.release()
             self._component.answer(client, f"control refused: {refusal}")
-            self._component.acknowledge(client, frame, _REJECTED)
+            self._answer(client, frame, _REJECTED)
         elif self._flight is None:
             self._begin(owner, _Asked(client, frame))
         else:
-            self._component.acknowledge(
-                client, frame, _ACCEPTED if self.in_control else _IN_PROGRESS
-            )
+            self._answer(client, frame, _ACCEPTED if self.in_control else _IN_PROGRESS)
 
     def _begin(self, owner: _Owner, asked: _Asked | None) -> None:
+        self._let_go = False
         config = self._config
         motion = CommandedMotion(
             MotionLimits(
@@ -264,22 +267,22 @@ class ServedControl:
         self, source: ServedSource, asked: _Asked | None, result: str, *, begun: bool
     ) -> None:
         if begun:
-            ended = "handed back" if result == "ok" else result
+            ended = "it let go" if self._let_go else "handed back" if result == "ok" else result
             self._component.tell(f"control by {source.name} has ended: {ended}")
             return
         self._not_before = self._clock() + _TRY_AGAIN
         self._component.tell(f"control was not given to {source.name}: {result}")
         if asked is not None:
-            self._component.acknowledge(*asked, _REJECTED)
+            self._answer(*asked, _REJECTED)
 
     async def _follow_up(self, source: ServedSource, asked: _Asked | None) -> None:
         """Tell the client that the takeover goes on, then its end, then each silence."""
         while source.pose is None:
             if asked is not None:
-                self._component.acknowledge(*asked, _IN_PROGRESS)
+                self._answer(*asked, _IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
         if asked is not None:
-            self._component.acknowledge(*asked, _ACCEPTED)
+            self._answer(*asked, _ACCEPTED)
         self._component.tell(f"{source.name} is in control")
         told = Control.LIVE
         while True:
@@ -288,6 +291,10 @@ class ServedControl:
                 self._component.tell(f"{source.name}: {now.value}")
                 told = now
             await asyncio.sleep(0.05)
+
+    def _answer(self, client: Client, frame: Frame, result: int) -> None:
+        """Answer a client's command in the autopilot's name: it was addressed to the autopilot."""
+        self._component.acknowledge(client, frame, result, self._autopilot)
 
     def _heading(self) -> float:
         """The vehicle's heading without the jumps of estimator resets, rad."""

@@ -222,6 +222,7 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4():
         await stream(1.0, lambda _: script.local(ALL, begin))
         assert vehicle.state()["mode"] == "LOITER"
         assert not session.control.in_control
+        assert any("it let go" in text for text in script.texts())
 
     fly("px4", scene)
 
