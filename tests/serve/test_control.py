@@ -84,7 +84,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
         def send(time):
             commanded = circle(time, centre)
             script.local(ALL, *commanded)
-            error = session.control._assembled.context.guidance_loop.off_course
+            error = session.control.tracking_error
             errors.extend([error] if time > 4.0 else [])
 
         await stream(12.0, send)
