@@ -4,13 +4,15 @@ import argparse
 import asyncio
 import json
 import signal
+import time
 from typing import Any
 
-from rich.console import Console
-
 from companion.cli.exit_codes import EXIT_OK
+from companion.cli.signals import LEAVE_AFTER
+from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
+from companion.extras import require
 from companion.files.yaml_file import ConfigError
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError
@@ -19,23 +21,38 @@ from companion.serve.session import ServeSession
 
 
 def serve(options: argparse.Namespace) -> int:
-    """Pass everything between the vehicle and other programs."""
+    """Pass everything between the vehicle and other programs, and fly their setpoints."""
     config = _as_told(load(options.config), options)
-    console = Console(stderr=options.json, highlight=False)
+    observer = TerminalObserver(FlightConsole(stderr=options.json, highlight=False))
+    began = time.monotonic()
 
     def note(text: str) -> None:
-        console.print(text, markup=False, soft_wrap=True)
+        observer.event(time.monotonic() - began, text)
 
-    counters = link_loop.run(_until_stopped(ServeSession(config, note)))
+    try:
+        counters = link_loop.run(_until_stopped(ServeSession(config, note, observer)))
+    finally:
+        observer.close()
     if options.json:
         print(json.dumps(counters))
     return EXIT_OK
 
 
 async def _until_stopped(session: ServeSession) -> dict[str, Any]:
-    """Run a session until SIGINT (Ctrl-C), SIGTERM or SIGHUP."""
+    """Run a session until SIGINT (Ctrl-C), SIGTERM or SIGHUP; a second Ctrl-C leaves at once."""
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    stopped_at: float | None = None
+
+    def interrupt() -> None:
+        nonlocal stopped_at
+        if stopped_at is None:
+            stopped_at = loop.time()
+            session.stop()
+        elif loop.time() - stopped_at >= LEAVE_AFTER:
+            session.leave()
+
+    loop.add_signal_handler(signal.SIGINT, interrupt)
+    for number in (signal.SIGTERM, signal.SIGHUP):
         loop.add_signal_handler(number, session.stop)
     return await session.run()
 
@@ -45,6 +62,7 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
 
     Raises:
         ConfigError: the two do not go together.
+        MissingExtraError: it needs an extra that is not installed.
     """
     told = changed(config, assigned(options.set), "--set")
     link = {"endpoint": options.endpoint} if options.endpoint else {}
@@ -52,6 +70,8 @@ def _as_told(config: Config, options: argparse.Namespace) -> Config:
     told = changed(told, {"link": link, "serve": clients}, "the command line")
     if told.link.lockstep:
         raise ConfigError("link.lockstep: clients have no part in it; serve runs in real time")
+    if told.serve.control:
+        require("ruckig", "serve", "serve.control: true")
     for endpoint in told.serve.clients:
         try:
             parse_endpoint(endpoint)

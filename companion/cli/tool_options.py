@@ -19,7 +19,8 @@ def add_serve(commands: Commands) -> None:
         "serve",
         help="let other programs use the link: ground stations, MAVSDK, scripts",
         description="Own the link to the autopilot and pass everything between it and the clients "
-        "at serve.clients, until Ctrl-C.",
+        "at serve.clients, until Ctrl-C. The setpoints of one client at a time are flown by our "
+        "law: in OFFBOARD, which the client asks for (PX4), or in GUIDED (ArduPilot).",
     )
     serve.add_argument(
         "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"

@@ -2,8 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
+from companion.config.units import Si
 from companion.files.yaml_file import Section
 
 _Endpoint = Annotated[str, Field(max_length=300)]
@@ -11,7 +12,7 @@ _Name = Annotated[str, Field(min_length=1, max_length=300)]
 
 
 class ServeConfig(Section):
-    """`companion serve`: other programs on our link."""
+    """`companion serve`: other programs on our link, and control by their setpoints."""
 
     clients: Annotated[tuple[_Endpoint, ...], Field(max_length=32)] = (
         "udpout://127.0.0.1:14550",
@@ -22,3 +23,17 @@ class ServeConfig(Section):
     trusted: Annotated[tuple[_Name, ...], Field(max_length=100)] = ()
     """IP addresses and serial devices that may command without signing. Clients on this computer
     always may; all others only read."""
+    control: StrictBool = True
+    """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""
+    setpoint_timeout_ms: Annotated[float, Field(ge=100.0, le=2000.0)] = 500.0
+    """A client whose newest setpoint is older has stopped: the vehicle is held."""
+    hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 5.0
+    """How long the vehicle is held for a client that has stopped, before it is handed back."""
+    max_speed_m_s: Annotated[float, Field(ge=0.1, le=30.0)] = 5.0
+    """Largest horizontal speed towards a commanded position. Commanded velocities may be larger."""
+    max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
+    """Largest horizontal acceleration after a jump of the commanded position or velocity."""
+    max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
+    """Largest jerk of the same motion: how fast the vehicle tilts is this divided by gravity."""
+
+    setpoint_timeout = Si("setpoint_timeout_ms")

@@ -58,6 +58,7 @@ class FlightTrace:
             rad/s, thrust 0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while
             offboard control is active by its heartbeats.
         latencies_ns: sample in → setpoint out inside this process, ns.
+        newest_latency_ns: the newest of them; 0 before the first.
         motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
             °, distance from the reference m), ten times a second in all phases; NaN: unknown.
         maneuvers: when each maneuver began and the last one ended.
@@ -68,6 +69,7 @@ class FlightTrace:
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
         self.rates = Series(_RATES, self._spool, kept=_KEPT_RATES)
+        self.newest_latency_ns = 0
         self.latencies_ns = Series(("latency_ns",), self._spool)
         self.motion = Series(_MOTION, self._spool)
         self.maneuvers: list[ManeuverMark] = []
@@ -99,6 +101,7 @@ class FlightTrace:
 
     def add_latency(self, nanoseconds: int) -> None:
         """Record the latency of one answer."""
+        self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
     def add_motion(self, row: Iterable[float]) -> None:

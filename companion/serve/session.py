@@ -1,39 +1,67 @@
 """A session of `companion serve`: the link, the clients, and our component between them."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.config import Config
 from companion.flight.assembly import open_link
 from companion.flight.context import cancel
-from companion.flight.observer import StateLogger
+from companion.flight.environment import THIS_COMPUTER, Environment
+from companion.flight.observer import Observer, Silent, StateLogger
 from companion.mavlink.framing import Frame
 from companion.serve.component import Component
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
 from companion.serve.network.routing import Channel
+from companion.serve.situation import SituationKeeper
 from companion.vehicle.link import Link
+
+if TYPE_CHECKING:
+    from companion.serve.control import ServedControl
 
 Note = Callable[[str], None]
 
 
 class ServeSession:
-    """Passes everything between the vehicle and the clients until `stop` is called.
+    """Passes everything between the vehicle and the clients, and flies their setpoints.
+
+    Signal handlers of the event loop may call `stop` and `leave`.
 
     Args:
-        config: its sections `link` and `serve`.
+        config: of the vehicle, its section `serve` above all.
         note: takes events as sentences.
+        observer: is told of the phases and events of each flight under a client's control.
+        environment: what the link and the flights get from the computer.
+
+    Attributes:
+        network: of the clients, once it is open.
+        control: by clients' setpoints, if `serve.control` says so, once it is open.
     """
 
-    def __init__(self, config: Config, note: Note) -> None:
+    def __init__(
+        self,
+        config: Config,
+        note: Note,
+        observer: Observer | None = None,
+        environment: Environment = THIS_COMPUTER,
+    ) -> None:
         self._config, self._note = config, note
+        self._observer, self._environment = observer or Silent(), environment
         self._stop = asyncio.Event()
+        self.network: Network | None = None
+        self.control: ServedControl | None = None
 
     def stop(self) -> None:
-        """End the session; signal handlers may call this."""
+        """End the session; a vehicle under control is handed back first."""
+        self._stop.set()
+
+    def leave(self) -> None:
+        """Stop sending setpoints at once, and end the session."""
+        if self.control is not None:
+            self.control.leave()
         self._stop.set()
 
     async def run(self) -> dict[str, Any]:
@@ -43,38 +71,59 @@ class ServeSession:
             EndpointError: the link or an endpoint of `serve.clients` could not be opened.
             SigningError: the key cannot be used.
         """
-        async with open_link(self._config, None, self._note) as link:
+        config = self._config
+        async with open_link(config, None, self._note, self._environment.open_transport) as link:
             state_logger = StateLogger(link.state, self._note)
             link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
-            async with Network(link, self._config.serve.clients) as network:
-                component = Component(link.settings, network, link.send)
-                guard = _Guard(self._config, link, component)
-                network.routing.on_own = component.on_own
-                network.routing.intercept = guard.intercept
-                for endpoint in self._config.serve.clients:
-                    self._note(f"clients at {endpoint}")
-                heartbeats = asyncio.create_task(component.run())
-                try:
-                    await self._stop.wait()
-                finally:
-                    await cancel(heartbeats)
-                return _counters(link, network)
+            async with Network(link, config.serve.clients) as network:
+                return await self._serve(link, network)
+
+    async def _serve(self, link: Link, network: Network) -> dict[str, Any]:
+        component = Component(link.settings, network, link.send)
+        permission = Permission(self._config.serve.trusted, link.settings.signing)
+        beside: list[Coroutine[Any, Any, None]] = [component.run()]
+        if self._config.serve.control:
+            from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
+
+            keeper = SituationKeeper(link, network)
+            self.control = ServedControl(
+                self._config, link, component, keeper, self._observer, self._environment
+            )
+            beside.append(self.control.send_values())
+            beside.append(keeper.keep_telemetry(self.control.needed_rates))
+        gate = _Gate(permission, component, self.control)
+        network.routing.on_own = component.on_own
+        network.routing.intercept = gate.intercept
+        for endpoint in self._config.serve.clients:
+            self._note(f"clients at {endpoint}")
+        self.network = network
+        tasks = [asyncio.create_task(each) for each in beside]
+        try:
+            await self._stop.wait()
+        finally:
+            if self.control is not None:
+                await self.control.close("companion serve is stopped")
+            for task in tasks:
+                await cancel(task)
+        return _counters(link, network)
 
 
-class _Guard:
-    """Refuses what a client may not send."""
+class _Gate:
+    """Refuses what a client may not send, and passes its setpoints to control."""
 
-    def __init__(self, config: Config, link: Link, component: Component) -> None:
-        self._permission = Permission(config.serve.trusted, link.settings.signing)
-        self._component = component
+    def __init__(
+        self, permission: Permission, component: Component, control: "ServedControl | None"
+    ) -> None:
+        self._permission, self._component, self._control = permission, component, control
 
     def intercept(self, client: Channel, frame: Frame) -> bool:
-        """Whether a frame is refused; its sender is told why."""
+        """Whether a frame ends here."""
         assert isinstance(client, Client)
         refusal = self._permission.refusal(client, frame)
         if refusal is not None:
             self._component.answer(client, refusal)
-        return refusal is not None
+            return True
+        return self._control is not None and self._control.intercept(client, frame)
 
 
 def _counters(link: Link, network: Network) -> dict[str, Any]:

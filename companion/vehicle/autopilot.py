@@ -99,6 +99,8 @@ class Autopilot(Protocol):
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
         rates_along_target: True: body rates are taken along the axes of ATTITUDE_TARGET, which
             turns before the body follows. False: along the axes of the body.
+        body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
+            from the present yaw, not from north.
         offboard_loss_failsafe: What the autopilot does when setpoints stop.
         cannot_arm_in: Roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: Rules for the parameters that matter to a flight by body rates.
@@ -114,6 +116,7 @@ class Autopilot(Protocol):
     wanted_rates: Mapping[str, float]
     interval_step_us: int
     rates_along_target: bool
+    body_yaw_is_relative: bool
     offboard_loss_failsafe: OffboardLossFailsafe
     cannot_arm_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]

@@ -47,6 +47,7 @@ class Network:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
         uplink: the clients' frames on their way to the vehicle.
         ports: the open endpoints, in their order.
+        attitude: payload of the newest ATTITUDE_QUATERNION; empty before the first.
         overflowed: frames of the vehicle that were dropped after a stall.
     """
 
@@ -62,6 +63,7 @@ class Network:
             clock,
         )
         self.ports: list[Port] = []
+        self.attitude = b""
         self.overflowed = 0
         self._link = link
         self._endpoints = [parse_endpoint(each) for each in endpoints]
@@ -95,6 +97,10 @@ class Network:
     def clients(self) -> tuple[Client, ...]:
         """The clients there are now."""
         return tuple(self._clients)
+
+    def now(self) -> float:
+        """The time on our clock, s."""
+        return self._loop.time()
 
     def send(self, frame: bytes) -> None:
         """Send a frame of our own component to every client."""
@@ -145,8 +151,10 @@ class Network:
             self.overflowed += 1
             return
         self._noted.append(frame)
-        if frame.message_id == ATTITUDE_QUATERNION and self._soon is None:
-            self._soon = self._loop.call_soon(self.flush)
+        if frame.message_id == ATTITUDE_QUATERNION:
+            self.attitude = frame.payload
+            if self._soon is None:
+                self._soon = self._loop.call_soon(self.flush)
         elif self._timer is None:
             self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
 

@@ -74,6 +74,7 @@ class ArduPilot:
     )
     interval_step_us = 1000
     rates_along_target = True
+    body_yaw_is_relative = True
     offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT", "it levels and keeps its height, and does not hold", brakes=False
     )

@@ -93,6 +93,7 @@ class Px4:
     )
     interval_step_us = 1
     rates_along_target = False
+    body_yaw_is_relative = False
     offboard_loss_failsafe = OffboardLossFailsafe(
         "COM_OF_LOSS_T", "it does what COM_OBL_RC_ACT says", brakes=True
     )

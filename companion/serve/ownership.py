@@ -1,0 +1,106 @@
+"""Whose vehicle it is among the clients: one at a time, until it lets go or falls silent. Pure."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from enum import Enum
+from math import inf
+
+_MOST_CLIENTS = 64
+"""Clients whose newest setpoint is remembered."""
+
+
+class Control(Enum):
+    """What the vehicle does for its owner."""
+
+    FREE = "no client is in control"
+    LIVE = "the owner's setpoints are flown"
+    HOLDING = "the owner is silent, and the vehicle is held"
+    EXPIRED = "the owner was silent for too long, and the vehicle is handed back"
+
+
+@dataclass
+class _Stream:
+    """The setpoints of one client.
+
+    Attributes:
+        newest: when the newest came, s.
+        before: when the one before it came, s.
+    """
+
+    newest: float = -inf
+    before: float = -inf
+
+
+class Ownership:
+    """Keeps one owner, and tells everybody else why they are refused.
+
+    Args:
+        timeout: a client without a setpoint for this long is silent, s.
+        hold: time for which the vehicle is held for a silent owner, s.
+
+    Attributes:
+        owner: the client in control, or None.
+    """
+
+    def __init__(self, timeout: float, hold: float) -> None:
+        self._timeout, self._hold = timeout, hold
+        self.owner: Hashable | None = None
+        self._streams: dict[Hashable, _Stream] = {}
+
+    def setpoint(self, client: Hashable, now: float) -> str | None:
+        """Note a setpoint; returns why it is not flown, or None.
+
+        A setpoint of another client takes over from a silent owner.
+        """
+        owner = self.owner
+        if owner is not None and client != owner:
+            if self._is_live(owner, now):
+                return f"{_name(owner)} is in control"
+            self.owner = client
+        stream = self._streams.setdefault(client, _Stream())
+        stream.before, stream.newest = stream.newest, now
+        if len(self._streams) > _MOST_CLIENTS:
+            self._forget_silent(now)
+        return None
+
+    def ask(self, client: Hashable, now: float) -> str | None:
+        """Give control to a client that asks for it; returns why not, or None."""
+        owner = self.owner
+        if owner is not None and owner != client and self._is_live(owner, now):
+            return f"{_name(owner)} is in control"
+        if not self.streams(client, now):
+            return "send setpoints first, at 2 Hz or more"
+        self.owner = client
+        return None
+
+    def streams(self, client: Hashable, now: float) -> bool:
+        """Whether a client sends a stream: one setpoint alone is none."""
+        stream = self._streams.get(client, _Stream())
+        return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
+
+    def release(self) -> None:
+        """Nobody is in control any more: the owner let go, or the vehicle left our mode."""
+        self.owner = None
+
+    def control(self, now: float) -> Control:
+        """What the vehicle does for its owner now."""
+        if self.owner is None:
+            return Control.FREE
+        silent = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
+        if silent <= 0.0:
+            return Control.LIVE
+        return Control.HOLDING if silent <= self._hold else Control.EXPIRED
+
+    def _is_live(self, client: Hashable, now: float) -> bool:
+        return now - self._streams.get(client, _Stream()).newest <= self._timeout
+
+    def _forget_silent(self, now: float) -> None:
+        self._streams = {
+            client: stream
+            for client, stream in self._streams.items()
+            if client == self.owner or self._is_live(client, now)
+        }
+
+
+def _name(client: Hashable) -> str:
+    return str(client)

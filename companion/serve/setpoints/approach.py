@@ -1,0 +1,80 @@
+"""Jerk-limited motions from one state of some axes to another, by Ruckig (extra `serve`)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ruckig import ControlInterface, InputParameter, Ruckig, Trajectory
+
+Values = tuple[float, ...]
+
+
+class State(NamedTuple):
+    """Position, velocity and acceleration along some axes; SI units or radians."""
+
+    position: Values
+    velocity: Values
+    acceleration: Values
+
+
+class AxisLimits(NamedTuple):
+    """Limits of a motion along one axis.
+
+    Attributes:
+        velocity: largest along the axis.
+        backward: largest against the axis.
+        acceleration: largest, either way.
+        jerk: largest, either way.
+    """
+
+    velocity: float
+    backward: float
+    acceleration: float
+    jerk: float
+
+
+class UnplannableError(ValueError):
+    """There is no motion: the numbers are too large or too far apart."""
+
+
+class Approach:
+    """A time-optimal motion of an error to zero.
+
+    Args:
+        error: where it begins.
+        limits: of each axis.
+        begins: time of the beginning, s.
+        by_velocity: whether only the velocity must become zero, wherever that is.
+
+    Raises:
+        UnplannableError: there is none.
+    """
+
+    def __init__(
+        self, error: State, limits: Sequence[AxisLimits], begins: float, *, by_velocity: bool
+    ) -> None:
+        axes = len(limits)
+        given = InputParameter(axes)
+        given.current_position = list(error.position)
+        given.current_velocity = list(error.velocity)
+        given.current_acceleration = list(error.acceleration)
+        given.target_position = [0.0] * axes
+        given.max_velocity = [each.velocity for each in limits]
+        given.min_velocity = [-each.backward for each in limits]
+        given.max_acceleration = [each.acceleration for each in limits]
+        given.max_jerk = [each.jerk for each in limits]
+        if by_velocity:
+            given.control_interface = ControlInterface.Velocity
+        self._begins = begins
+        self._trajectory = Trajectory(axes)
+        try:
+            result = Ruckig(axes).calculate(given, self._trajectory)
+        except (RuntimeError, ValueError) as refusal:  # of a Result that its enumeration lacks
+            raise UnplannableError(f"no motion from {error}: {refusal}") from refusal
+        if int(result) < 0:
+            raise UnplannableError(f"no motion from {error}: {result}")
+
+    def at(self, time: float) -> State:
+        """The error at a time, s; past the end it stays as it ended."""
+        elapsed = max(0.0, time - self._begins)
+        position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
+        return State(tuple(position), tuple(velocity), tuple(acceleration))

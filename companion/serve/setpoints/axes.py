@@ -1,0 +1,232 @@
+"""Some axes that follow what is commanded: a stream as it is, a jump by a motion within limits.
+
+The commanded state moves on between setpoints (`_Carrier`). Where it jumps, the difference between
+the state so far and the commanded one becomes an error, which a jerk-limited motion brings to zero
+(`Approach`). The state is the sum of both.
+"""
+
+from collections.abc import Sequence
+from math import hypot
+from typing import NamedTuple
+
+from companion.attitude.rotation import clamp
+from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
+from companion.serve.setpoints.request import AxisDemand
+
+_STREAM = 0.25
+"""Setpoints that come at this period or faster are a stream, whose derivatives are estimated, s."""
+_SMOOTHING = 0.5
+"""Share of a new derivative in its estimate; the rest is the one before."""
+_LARGEST_JERK = 50.0
+"""Largest estimated jerk, m/s³; faster changes of the acceleration are steps."""
+_LARGEST_ACCELERATION = 15.0
+"""The same for the acceleration, m/s²; faster changes of the velocity are jumps."""
+_MOST_BRAKED = 2.0
+"""A motion begins with at most this multiple of its largest acceleration."""
+_STRAYED = 1.5
+"""Where only velocities or accelerations are commanded, the position may run ahead by this, m."""
+
+_LEAST_SHARE = 0.25
+"""Share of the limits that is left for an axis across the direction of a motion."""
+
+
+class Continuity(NamedTuple):
+    """How far a stream may jump and still be flown as it is.
+
+    Attributes:
+        position: m or rad.
+        velocity: m/s or rad/s.
+    """
+
+    position: float
+    velocity: float
+
+
+class _Carrier(NamedTuple):
+    """The commanded state, continued at a constant jerk from `begins`, s."""
+
+    position: Values
+    velocity: Values
+    acceleration: Values
+    jerk: Values
+    begins: float
+
+    def at(self, time: float) -> State:
+        t = max(0.0, time - self.begins)
+        rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
+        position, velocity, acceleration = zip(
+            *(
+                (
+                    p + t * (v + t * (0.5 * a + t * j / 6.0)),
+                    v + t * (a + 0.5 * t * j),
+                    a + t * j,
+                )
+                for p, v, a, j in rows
+            ),
+            strict=True,
+        )
+        return State(position, velocity, acceleration)
+
+
+class Axes:
+    """Follows demands along one or more axes.
+
+    Args:
+        limits: of motions after a jump, along any direction in these axes: for each axis.
+        continuity: see there.
+        timeout: a stream that repeats the same moving state is continued for this long, s.
+    """
+
+    def __init__(
+        self, limits: Sequence[AxisLimits], continuity: Continuity, timeout: float
+    ) -> None:
+        self._limits, self._continuity, self._timeout = limits, continuity, timeout
+        self._zero: Values = (0.0,) * len(limits)
+        self._demand: AxisDemand | None = None
+        self._given_at = 0.0
+        self._approach: Approach | None = None
+        self._carrier = _Carrier(self._zero, self._zero, self._zero, self._zero, 0.0)
+
+    def begin(self, state: State, now: float) -> None:
+        """Start from a state, and stop from there until something is commanded."""
+        self._demand, self._approach = None, None
+        self._carrier = _Carrier(*state, self._zero, now)
+        self.stop(now)
+
+    def at(self, time: float) -> State:
+        """The state at a time, s."""
+        carried = self._carrier.at(time)
+        if self._approach is None:
+            return carried
+        error = self._approach.at(time)
+        return State(*(_sum(a, b) for a, b in zip(carried, error, strict=True)))
+
+    def stop(self, now: float) -> None:
+        """Come to rest within limits, and stay there."""
+        self.command(AxisDemand(None, self._zero, None), now)
+
+    def command(self, demand: AxisDemand, now: float, actual: Values | None = None) -> None:
+        """Follow a new demand.
+
+        Args:
+            demand: what is commanded now.
+            now: s.
+            actual: position of the vehicle; without a commanded position, the state does not run
+                further ahead of it.
+
+        Raises:
+            UnplannableError: there is no motion to it; the demand before still counts.
+        """
+        if demand == self._demand:
+            self._end_repetition(demand, now)
+            return
+        current = self.at(now)
+        if demand.position is not None:
+            self._carry_position(demand, current, now)
+        else:
+            self._carry_motion(demand, _near(current, actual), now)
+        self._demand, self._given_at = demand, now
+
+    def _end_repetition(self, demand: AxisDemand, now: float) -> None:
+        """Stop at a commanded position that is repeated although it should move."""
+        moving = demand.position is not None and any(demand.velocity or ())
+        if moving and now - self._given_at > self._timeout:
+            resting = AxisDemand(demand.position, None, None)
+            self._carry_position(resting, self.at(now), now)
+            self._given_at = float("inf")
+
+    def _carry_position(self, demand: AxisDemand, current: State, now: float) -> None:
+        assert demand.position is not None
+        velocity = demand.velocity or self._zero
+        acceleration, jerk = self._derivatives(demand, now)
+        carrier = _Carrier(demand.position, velocity, acceleration, jerk, now)
+        error = _difference(current, carrier)
+        if demand.velocity is not None and self._is_continued(error):
+            approach = None
+        else:
+            approach = self._plan(error, error.position, now, by_velocity=False)
+        self._carrier, self._approach = carrier, approach
+
+    def _carry_motion(self, demand: AxisDemand, current: State, now: float) -> None:
+        velocity = current.velocity if demand.velocity is None else demand.velocity
+        acceleration = demand.acceleration or self._zero
+        carrier = _Carrier(current.position, velocity, acceleration, self._zero, now)
+        approach = None
+        if demand.velocity is not None:
+            error = _difference(current, carrier)
+            approach = self._plan(error, error.velocity, now, by_velocity=True)
+        self._carrier, self._approach = carrier, approach
+
+    def _plan(self, error: State, direction: Values, now: float, *, by_velocity: bool) -> Approach:
+        """A motion of the error to zero; the limits hold along its direction, not for each axis."""
+        length = hypot(*direction)
+        limits = [
+            each if length == 0.0 else _scaled(each, max(_LEAST_SHARE, abs(part) / length))
+            for each, part in zip(self._limits, direction, strict=True)
+        ]
+        acceleration = tuple(
+            clamp(value, _MOST_BRAKED * each.acceleration)
+            for value, each in zip(error.acceleration, self._limits, strict=True)
+        )
+        begins = error._replace(acceleration=acceleration)
+        return Approach(begins, limits, now, by_velocity=by_velocity)
+
+    def _derivatives(self, demand: AxisDemand, now: float) -> tuple[Values, Values]:
+        """Acceleration and jerk of a stream; estimated where they are not commanded."""
+        before, since = self._demand, now - self._given_at
+        given = demand.acceleration
+        fresh = before is not None and before.position is not None and 0.0 < since <= _STREAM
+        if not fresh or before is None or demand.velocity is None or before.velocity is None:
+            return given or self._zero, self._zero
+        if given is None:
+            rate = _rate(before.velocity, demand.velocity, since)
+            if max(map(abs, rate)) > _LARGEST_ACCELERATION:
+                return self._zero, self._zero
+            return _blend(self._carrier.acceleration, rate), self._zero
+        if before.acceleration is None:
+            return given, self._zero
+        jerk = _rate(before.acceleration, given, since)
+        if max(map(abs, jerk)) > _LARGEST_JERK:
+            return given, self._zero
+        return given, _blend(self._carrier.jerk, jerk)
+
+    def _is_continued(self, error: State) -> bool:
+        return (
+            hypot(*error.position) <= self._continuity.position
+            and hypot(*error.velocity) <= self._continuity.velocity
+        )
+
+
+def _scaled(limits: AxisLimits, share: float) -> AxisLimits:
+    return AxisLimits(*(share * each for each in limits))
+
+
+def _near(current: State, actual: Values | None) -> State:
+    """The state, at the vehicle where it has run too far ahead of it."""
+    if actual is None or hypot(*_less(current.position, actual)) <= _STRAYED:
+        return current
+    return current._replace(position=actual)
+
+
+def _difference(current: State, carrier: _Carrier) -> State:
+    return State(
+        _less(current.position, carrier.position),
+        _less(current.velocity, carrier.velocity),
+        _less(current.acceleration, carrier.acceleration),
+    )
+
+
+def _sum(left: Values, right: Values) -> Values:
+    return tuple(a + b for a, b in zip(left, right, strict=True))
+
+
+def _less(left: Values, right: Values) -> Values:
+    return tuple(a - b for a, b in zip(left, right, strict=True))
+
+
+def _rate(old: Values, new: Values, since: float) -> Values:
+    return tuple((b - a) / since for a, b in zip(old, new, strict=True))
+
+
+def _blend(old: Values, new: Values) -> Values:
+    return tuple(a + _SMOOTHING * (b - a) for a, b in zip(old, new, strict=True))

@@ -1,0 +1,116 @@
+"""The reference that follows from a client's requests."""
+
+from typing import NamedTuple
+
+from companion.attitude.representation import wrap_angle
+from companion.guidance.reference import Reference, Vector
+from companion.serve.setpoints.approach import AxisLimits, State
+from companion.serve.setpoints.axes import Axes, Continuity
+from companion.serve.setpoints.request import AxisDemand, MotionRequest
+
+_HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
+_VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
+_HEADING_CONTINUITY = Continuity(0.2, 1.0)
+_VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
+"""Largest, m/s² and m/s³: what the thrust spends on climbing, it lacks for steering."""
+_YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
+"""Of a turn after a jump of the yaw, rad/s² and rad/s³: yaw responds slowly."""
+_STREAM = 0.25
+"""Yaws that come at this period or faster are a stream, whose rate is estimated, s."""
+
+
+class MotionLimits(NamedTuple):
+    """Limits of motions after a jump of the setpoints.
+
+    Attributes:
+        speed: largest horizontal, m/s.
+        acceleration: largest, m/s².
+        jerk: largest, m/s³.
+        climb, descent: largest, m/s.
+        yaw_rate: largest, rad/s.
+        timeout: see `Axes`, s.
+    """
+
+    speed: float
+    acceleration: float
+    jerk: float
+    climb: float
+    descent: float
+    yaw_rate: float
+    timeout: float
+
+
+class CommandedMotion:
+    """Turns requests into a reference that never jumps; all in one frame.
+
+    Args:
+        limits: see there.
+    """
+
+    def __init__(self, limits: MotionLimits) -> None:
+        each = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
+        down = AxisLimits(
+            limits.descent,
+            limits.climb,
+            min(limits.acceleration, _VERTICAL_ACCELERATION),
+            min(limits.jerk, _VERTICAL_JERK),
+        )
+        turn = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
+        self._horizontal = Axes((each, each), _HORIZONTAL_CONTINUITY, limits.timeout)
+        self._vertical = Axes((down,), _VERTICAL_CONTINUITY, limits.timeout)
+        self._heading = Axes((turn,), _HEADING_CONTINUITY, limits.timeout)
+        self._largest_yaw_rate = limits.yaw_rate
+        self._yaw: tuple[float, float, float] | None = None
+
+    def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
+        """Start from a motion, and come to rest until something is commanded."""
+        (x, y, z), (u, v, w) = position_ned, velocity_ned
+        self._horizontal.begin(State((x, y), (u, v), (0.0, 0.0)), now)
+        self._vertical.begin(State((z,), (w,), (0.0,)), now)
+        self._heading.begin(State((heading,), (0.0,), (0.0,)), now)
+        self._yaw = None
+
+    def command(self, request: MotionRequest, now: float, actual_ned: Vector) -> None:
+        """Follow a request; `actual_ned` is where the vehicle is.
+
+        Raises:
+            UnplannableError: there is no motion to it; the request before still counts.
+        """
+        north, east, down = actual_ned
+        self._horizontal.command(request.horizontal, now, (north, east))
+        self._vertical.command(request.vertical, now, (down,))
+        self._heading.command(self._turn(request, now), now)
+
+    def stop(self, now: float) -> None:
+        """Come to rest within limits, and stay there."""
+        for axes in (self._horizontal, self._vertical, self._heading):
+            axes.stop(now)
+
+    def reference(self, time: float) -> Reference:
+        """The reference at a time, s."""
+        (x, y), (u, v), (a, b) = self._horizontal.at(time)
+        (z,), (w,), (c,) = self._vertical.at(time)
+        (heading,), (rate,), _ = self._heading.at(time)
+        return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
+
+    def _turn(self, request: MotionRequest, now: float) -> AxisDemand:
+        """The demand on the heading: the short way to a yaw, or a rate, or as it is."""
+        if request.yaw is None:
+            self._yaw = None
+            return AxisDemand(None, (request.yaw_rate or 0.0,), None)
+        before, self._yaw = self._yaw, None
+        rate = request.yaw_rate
+        if before is not None:
+            yaw, heading, at = before
+            if request.yaw == yaw and rate is None:
+                self._yaw = before
+                return AxisDemand((heading,), None, None)
+            heading += wrap_angle(request.yaw - yaw)
+            turned = wrap_angle(request.yaw - yaw) / max(now - at, 1e-3)
+            if rate is None and now - at <= _STREAM and abs(turned) <= self._largest_yaw_rate:
+                rate = turned
+        else:
+            (heading,), _, _ = self._heading.at(now)
+            heading += wrap_angle(request.yaw - heading)
+        self._yaw = request.yaw, heading, now
+        return AxisDemand((heading,), None if rate is None else (rate,), None)

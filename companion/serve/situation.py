@@ -1,0 +1,83 @@
+"""What setpoints relative to the vehicle need to know: its position, its yaw, the local origin."""
+
+import asyncio
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from math import atan2
+
+from companion.mavlink.codec import decode_attitude
+from companion.mavlink.errors import LinkError
+from companion.mavlink.messages import Message
+from companion.serve.network.network import Network
+from companion.serve.setpoints.origin import OriginEstimate
+from companion.serve.setpoints.request import Situation
+from companion.vehicle.link import Link
+
+_CHECK_PERIOD = 1.0
+_COUNTED = 0.1
+"""What arrives is counted for this long after a request, s; nothing waits for it."""
+_STALE = 0.5
+"""An older position is no position, s."""
+_MOST_APART = 0.3
+"""Local and global positions further apart than this are not paired, s."""
+
+
+class SituationKeeper:
+    """Keeps the newest, from the link and the network.
+
+    Args:
+        link: to the vehicle.
+        network: keeps the newest attitude.
+    """
+
+    def __init__(self, link: Link, network: Network) -> None:
+        self._link, self._network = link, network
+        self._origin = OriginEstimate()
+        link.subscribe("GLOBAL_POSITION_INT", self._on_global_position)
+
+    def situation(self) -> Situation | None:
+        """The situation now, or None while position or attitude are not known."""
+        position, clock = self._link.state.position, self._link.clock
+        decoded = decode_attitude(self._network.attitude) if self._network.attitude else None
+        if position is None or decoded is None:
+            return None
+        age = clock.age(position.vehicle_time, self._network.now())
+        if age is not None and age > _STALE:
+            return None
+        _, (w, x, y, z), _ = decoded
+        yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return Situation(position.position_ned, yaw, self._origin.origin)
+
+    async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
+        """Ask for telemetry while no attitude comes, until cancelled: ArduPilot is silent before.
+
+        Args:
+            wanted: rates by message name, Hz; called once the autopilot is known.
+        """
+        newest = self._network.attitude
+        while True:
+            await asyncio.sleep(_CHECK_PERIOD)
+            before, newest = newest, self._network.attitude
+            if newest != before or self._link.state.autopilot is None:
+                continue
+            with suppress(LinkError):  # it may be booting; asked again
+                await self._link.set_rates(wanted(), window_s=_COUNTED)
+
+    def _on_global_position(self, message: Message) -> None:
+        position = self._link.state.position
+        if position is None or message.lat == message.lon == 0:
+            return
+        later = self._link.clock.vehicle_time(message.time_boot_ms) - position.vehicle_time
+        if abs(later) > _MOST_APART:
+            return
+        north, east, down = (
+            there + later * speed
+            for there, speed in zip(position.position_ned, position.velocity_ned, strict=True)
+        )
+        self._origin.note(
+            (north, east, down),
+            message.lat * 1e-7,
+            message.lon * 1e-7,
+            message.alt * 1e-3,
+            message.relative_alt * 1e-3,
+        )

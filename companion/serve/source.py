@@ -1,0 +1,129 @@
+"""A client's setpoints as a source of guidance."""
+
+from collections.abc import Callable
+
+from companion.attitude import coefficients, heading
+from companion.control.estimator_resets import EstimatorResets
+from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
+from companion.serve.ownership import Control, Ownership
+from companion.serve.setpoints.motion import CommandedMotion
+from companion.serve.setpoints.request import (
+    AttitudeRequest,
+    AxisDemand,
+    MotionRequest,
+    RatesRequest,
+    Request,
+)
+
+_FLOWN = frozenset({Control.LIVE, Control.HOLDING})
+
+
+class ServedSource:
+    """Flies the requests of the client in control; stops and holds while it is silent.
+
+    Requests are in the autopilot's frame, references in the one without estimator resets.
+
+    Attributes:
+        name: shown to the user.
+        pose: where control began, or None before.
+        failure: None: a silent client is handed back without a failure.
+
+    Args:
+        name: see there.
+        motion: follows commanded motions.
+        ownership: says whether the client is live.
+        heading_now: the vehicle's heading without resets, rad.
+    """
+
+    failure: str | None = None
+
+    def __init__(
+        self,
+        name: str,
+        motion: CommandedMotion,
+        ownership: Ownership,
+        heading_now: Callable[[], float],
+    ) -> None:
+        self.name = name
+        self.pose: Pose | None = None
+        self.resets = EstimatorResets()
+        self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
+        self._vehicle = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._direct: Reference | None = None
+        self._waiting: Request | None = None
+        self._stopped = False
+
+    def begin(self, now: float, pose: Pose) -> None:
+        """Start from the pose that was held so far, with the newest request."""
+        self.pose = pose
+        self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
+        self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
+        if self._waiting is not None:
+            self.give(self._waiting, now)
+
+    def give(self, request: Request, now: float) -> None:
+        """Fly a request from now on; before `begin`, keep it.
+
+        Raises:
+            UnplannableError: there is no motion to it; the request before still counts.
+        """
+        if self.pose is None:
+            self._waiting = request
+            return
+        self._stopped = False
+        if isinstance(request, MotionRequest):
+            self._leave_direct(now)
+            self._motion.command(self._without_jumps(request), now, self._vehicle.position_ned)
+        else:
+            self._direct = self._direct_reference(request)
+
+    def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
+        """The reference over time."""
+        self._vehicle = motion
+        if self._ownership.control(now) is not Control.LIVE and not self._stopped:
+            self._leave_direct(now)
+            self._motion.stop(now)
+            self._stopped = True
+        direct = self._direct
+        return self._motion.reference if direct is None else lambda _: direct
+
+    def finished(self, now: float) -> bool:
+        """Whether nobody is in control any more."""
+        return self._ownership.control(now) not in _FLOWN
+
+    def _leave_direct(self, now: float) -> None:
+        """Let motions continue where the vehicle is after attitudes or rates."""
+        if self._direct is not None:
+            self._direct = None
+            position, velocity = self._vehicle
+            self._motion.begin(position, velocity, self._heading_now(), now)
+
+    def _direct_reference(self, request: AttitudeRequest | RatesRequest) -> Reference:
+        position, heading_now = self._vehicle.position_ned, self._heading_now()
+        if isinstance(request, RatesRequest):
+            return Reference(
+                position, heading=heading_now, body_rates=request.rates, thrust=request.thrust
+            )
+        return Reference(
+            position,
+            heading=heading(request.q) - self.resets.turn,
+            heading_rate=request.yaw_rate,
+            coefficients=coefficients(request.q),
+            thrust=request.thrust,
+        )
+
+    def _without_jumps(self, request: MotionRequest) -> MotionRequest:
+        """The request in the frame without estimator resets."""
+        north, east, down = self.resets.shift
+        return request._replace(
+            horizontal=_shifted(request.horizontal, (north, east)),
+            vertical=_shifted(request.vertical, (down,)),
+            yaw=None if request.yaw is None else request.yaw - self.resets.turn,
+        )
+
+
+def _shifted(demand: AxisDemand, shift: tuple[float, ...]) -> AxisDemand:
+    if demand.position is None:
+        return demand
+    position = tuple(a - b for a, b in zip(demand.position, shift, strict=True))
+    return demand._replace(position=position)

@@ -1,0 +1,270 @@
+"""Control by clients on both mock vehicles, in vehicle time."""
+
+import asyncio
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion import testing
+from tests.serve.virtual import (
+    ALL,
+    POSITION,
+    VELOCITY,
+    MemoryClient,
+    airborne,
+    begin_control,
+    mock,
+    serving,
+    stream,
+)
+
+BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
+UNDER_CONTROL = {"px4": "OFFBOARD", "ardupilot": "GUIDED"}
+REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+OFFBOARD = 176, 1, 6
+
+
+def fly(autopilot, scene, **settings):
+    """Run a scene with an airborne vehicle and a connected script."""
+    serve = settings.pop("serve", {})
+    vehicle = mock(autopilot, **settings)
+
+    async def whole():
+        async with serving(vehicle, autopilot, **serve) as session:
+            ground = await airborne(session, vehicle, autopilot)
+            script = MemoryClient().connect(session)
+            await scene(vehicle, session, script, ground)
+
+    testing.run(vehicle, whole())
+    return vehicle
+
+
+def place(session):
+    return session.control._link.state.position.position_ned
+
+
+def velocity(session):
+    return session.control._link.state.position.velocity_ned
+
+
+def heading(vehicle):
+    w, x, y, z = vehicle.state()["q"]
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def circle(time, centre, radius=5.0, speed=5.0, ramp=3.0):
+    """Position, velocity and acceleration on a circle that begins at rest north of `centre`."""
+    rate = speed / radius
+    if time < ramp:
+        angle, rate_now, change = 0.5 * rate * time**2 / ramp, rate * time / ramp, rate / ramp
+    else:
+        angle, rate_now, change = rate * (time - 0.5 * ramp), rate, 0.0
+    c, s = math.cos(angle), math.sin(angle)
+    north, east, down = centre
+    return (
+        (north + radius * c, east + radius * s, down),
+        (-radius * rate_now * s, radius * rate_now * c, 0.0),
+        (-radius * (rate_now**2 * c + change * s), radius * (change * c - rate_now**2 * s), 0.0),
+    )
+
+
+@BOTH
+def test_a_streamed_circle_is_flown_as_it_is(autopilot):
+    """5 m at 5 m/s, 50 Hz: within 0.1 m RMS of the setpoints, by the vehicle's own estimate."""
+
+    async def scene(_, session, script, __):
+        start = place(session)
+        centre = (start[0] - 5.0, start[1], start[2])
+        await begin_control(session, script, autopilot, lambda _: script.local(ALL, start))
+        await stream(1.0, lambda _: script.local(ALL, start))
+        errors = []
+
+        def send(time):
+            commanded = circle(time, centre)
+            script.local(ALL, *commanded)
+            error = session.control._assembled.context.guidance_loop.off_course
+            errors.extend([error] if time > 4.0 else [])
+
+        await stream(12.0, send)
+        assert math.sqrt(sum(error**2 for error in errors) / len(errors)) < 0.10
+        assert {each.name for each in script.of("NAMED_VALUE_FLOAT")} == {"trk_err_m", "answer_ms"}
+
+    fly(autopilot, scene)
+
+
+@BOTH
+def test_positions_velocities_and_attitudes_are_flown(autopilot):
+    async def scene(vehicle, session, script, _):
+        start = place(session)
+        hover = {"px4": 0.49, "ardupilot": 0.364}[autopilot]
+        await begin_control(session, script, autopilot, lambda _: script.local(POSITION, start))
+        there = (start[0] + 4.0, start[1] - 3.0, start[2] - 2.0)
+        await stream(6.0, lambda _: script.local(POSITION & ~1024, there, yaw=1.0), 0.1)
+        assert math.dist(place(session), there) < 0.2
+        assert heading(vehicle) == pytest.approx(1.0, abs=0.1)
+        forward = (1.5, 0.0, 0.0)
+        await stream(3.0, lambda _: script.local(VELOCITY, velocity=forward, frame=8), 0.05)
+        north, east, down = velocity(session)
+        assert (north, east) == pytest.approx((1.5 * math.cos(1.0), 1.5 * math.sin(1.0)), abs=0.25)
+        assert abs(down) < 0.15
+        await stream(3.0, lambda _: script.local(VELOCITY, velocity=(0, 0, 0)), 0.05)
+        assert math.hypot(*velocity(session)) < 0.15
+        tilt = math.radians(6.0)
+        q = (math.cos(0.5 * tilt), math.sin(0.5 * tilt), 0.0, 0.0)  # a roll to the right, heading 0
+        height = place(session)[2]
+        await stream(1.5, lambda _: script.attitude(7, q, hover), 0.02)
+        assert 2.0 * math.asin(math.hypot(*vehicle.state()["q"][1:3])) == pytest.approx(
+            tilt, abs=0.03
+        )
+        assert abs(place(session)[2] - height) < 1.5
+        await stream(3.0, lambda _: script.local(POSITION, there), 0.1)
+        assert session.control.in_control, script.texts()
+
+    fly(autopilot, scene)
+
+
+@BOTH
+def test_a_silent_client_is_held_then_handed_back_and_nothing_is_sent_for_it(autopilot):
+    async def scene(vehicle, session, script, _):
+        begin = place(session)
+        await begin_control(session, script, autopilot, lambda _: script.local(ALL, begin))
+        moving = (2.0, 0.0, 0.0)
+        await stream(3.0, lambda _: script.local(VELOCITY, velocity=moving))
+        assert velocity(session)[0] > 1.5
+        await asyncio.sleep(1.5)
+        assert math.hypot(*velocity(session)) < 0.4, "held"
+        assert vehicle.state()["mode"].startswith(UNDER_CONTROL[autopilot])
+        held = place(session)
+        await asyncio.sleep(0.8)
+        assert math.dist(place(session), held) < 0.5
+        await stream(1.0, lambda _: script.local(VELOCITY, velocity=moving))
+        assert velocity(session)[0] > 0.5, "it resumed"
+        await asyncio.sleep(0.5 + 2.0 + 3.0)
+        assert vehicle.state()["mode"] == HELD[autopilot]
+        assert not session.control.in_control
+        count = len(vehicle.setpoints)
+        await asyncio.sleep(1.0)
+        assert len(vehicle.setpoints) == count
+        said = " ".join(script.texts())
+        for words in ("is in control", "is silent, and the vehicle is held", "has ended"):
+            assert words in said
+
+    fly(autopilot, scene, serve={"hold_s": 2.0})
+
+
+@BOTH
+def test_a_station_wins_over_a_client_and_its_stream_is_not_obeyed_any_more(autopilot):
+    async def scene(vehicle, session, script, ground):
+        begin = place(session)
+        await begin_control(session, script, autopilot, lambda _: script.local(ALL, begin))
+        land = {"px4": (176, 1, 4, 6), "ardupilot": (176, 1, 9)}[autopilot]
+        ground.command(*land)
+        await stream(1.5, lambda _: script.local(ALL, begin))
+        assert vehicle.state()["mode"] == {"px4": "LAND", "ardupilot": "LAND"}[autopilot]
+        assert not session.control.in_control
+        count = len(vehicle.setpoints)
+        await stream(1.0, lambda _: script.local(ALL, begin))
+        assert len(vehicle.setpoints) == count
+        assert any("took over" in text for text in script.texts())
+
+    fly(autopilot, scene)
+
+
+@BOTH
+def test_two_clients_at_once_and_what_is_refused(autopilot):
+    """Only the owner is flown; NaN, contradictions and other vehicles' setpoints never are."""
+
+    async def scene(_, session, script, __):
+        begin = place(session)
+        await begin_control(session, script, autopilot, lambda _: script.local(ALL, begin))
+        rival = MemoryClient("rival", (246, 190)).connect(session)
+        stranger = MemoryClient("stranger", (250, 1), host="192.0.2.7").connect(session)
+        away = (begin[0] + 30.0, begin[1], begin[2])
+        before = session.control._link.stats.forwarded
+
+        def send(_):
+            script.local(ALL, begin)
+            rival.local(ALL, away)
+            stranger.local(ALL, away)
+            script.local(ALL, (math.nan, 0.0, 0.0))
+            script.local(0x0DF8 & ~64 & ~128 & ~256, away)
+            script.local(ALL, away, target=(2, 1))
+            script.attitude(7, (0.0, 0.0, 0.0, 0.0), 0.5)
+
+        await stream(3.0, send)
+        assert math.dist(place(session), begin) < 0.5
+        assert session.control._link.stats.forwarded == before, "no setpoint is forwarded"
+        assert any("script (245/190) is in control" in text for text in rival.texts())
+        assert any("read-only" in text for text in stranger.texts())
+        said = " ".join(script.texts())
+        for words in ("not finite", "without velocity", "target_system is 2", "unit quaternion"):
+            assert words in said, said
+        await stream(1.0, lambda _: rival.local(ALL, begin))
+        assert session.control.ownership.owner.client is rival, "the first has fallen silent"
+
+    fly(autopilot, scene)
+
+
+def test_px4_is_asked_for_offboard_by_the_rules_of_px4():
+    async def scene(vehicle, session, script, ground):
+        assert await script.offboard() == REJECTED, "no stream"
+        assert "setpoints first" in " ".join(script.texts())
+        begin = place(session)
+        await begin_control(session, script, "px4", lambda _: script.local(ALL, begin))
+        assert await script.offboard() == dialect.MAV_RESULT_ACCEPTED, "again"
+        assert await ground.offboard() == REJECTED, "of another station"
+        script.command(511, dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, 1e6)
+        await stream(2.0, lambda _: script.local(ALL, begin))
+        assert session.control.in_control, "its telemetry is not taken away"
+        script.command(176, 1, 4, 3)  # hold, as MAVSDK's offboard.stop()
+        await stream(1.0, lambda _: script.local(ALL, begin))
+        assert vehicle.state()["mode"] == "LOITER"
+        assert not session.control.in_control
+
+    fly("px4", scene)
+
+
+def test_a_single_setpoint_in_guided_gives_no_control():
+    async def scene(vehicle, session, script, _):
+        script.local(POSITION, (20.0, 0.0, -5.0))
+        await asyncio.sleep(2.0)
+        assert not session.control.in_control
+        assert vehicle.state()["mode"] == "GUIDED"
+
+    fly("ardupilot", scene)
+
+
+@BOTH
+def test_on_the_ground_control_is_refused_in_words(autopilot):
+    vehicle = mock(autopilot)
+
+    async def whole():
+        async with serving(vehicle, autopilot) as session:
+            script = MemoryClient().connect(session)
+            await asyncio.sleep(60.0 if autopilot == "ardupilot" else 12.0)
+            if autopilot == "ardupilot":
+                script.command(176, 1, 4)
+            await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
+            if autopilot == "px4":
+                assert await script.offboard() == REJECTED
+            assert "take off first" in " ".join(script.texts())
+            assert not vehicle.setpoints
+
+    testing.run(vehicle, whole())
+
+
+def test_without_control_setpoints_are_passed_on_as_everything_else():
+    vehicle = mock("px4")
+
+    async def whole():
+        async with serving(vehicle, "px4", control=False) as session:
+            script = MemoryClient().connect(session)
+            await asyncio.sleep(8.0)
+            await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
+            assert await script.offboard() == dialect.MAV_RESULT_ACCEPTED
+            await script.hears("HEARTBEAT")
+            assert vehicle.state()["setpoints"] > 50
+
+    testing.run(vehicle, whole())

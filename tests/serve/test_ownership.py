@@ -1,0 +1,107 @@
+"""Whose vehicle it is among the clients."""
+
+import random
+
+import pytest
+
+from companion.serve.ownership import Control, Ownership
+
+TIMEOUT, HOLD = 0.5, 2.0
+
+
+@pytest.fixture
+def ownership():
+    return Ownership(TIMEOUT, HOLD)
+
+
+def stream(ownership, client, begin, end, period=0.1):
+    refusals, now = [], begin
+    while now <= end:
+        refusals.append(ownership.setpoint(client, now))
+        now += period
+    return refusals
+
+
+def test_control_needs_a_stream_as_px4_does(ownership):
+    assert "setpoints first" in ownership.ask("a", 0.0)
+    ownership.setpoint("a", 0.0)
+    assert "setpoints first" in ownership.ask("a", 0.1), "one alone"
+    ownership.setpoint("a", 0.4)
+    assert ownership.ask("a", 0.5) is None
+    assert ownership.owner == "a"
+
+
+def test_setpoints_without_asking_give_no_control(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    assert ownership.control(1.0) is Control.FREE
+
+
+def test_another_clients_setpoints_are_refused_by_name_while_the_owner_is_live(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    ownership.ask("a", 1.0)
+    assert set(stream(ownership, "b", 1.0, 1.45)) == {"a is in control"}
+    assert ownership.ask("b", 1.2) == "a is in control"
+    assert ownership.owner == "a"
+
+
+def test_a_silent_owner_is_held_for_and_then_handed_back(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    ownership.ask("a", 1.0)
+    now = 1.0
+    assert ownership.control(now + TIMEOUT - 0.01) is Control.LIVE
+    assert ownership.control(now + TIMEOUT + 0.01) is Control.HOLDING
+    assert ownership.control(now + TIMEOUT + HOLD - 0.01) is Control.HOLDING
+    assert ownership.control(now + TIMEOUT + HOLD + 0.01) is Control.EXPIRED
+
+
+def test_an_owner_that_resumes_is_live_again(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    ownership.ask("a", 1.0)
+    ownership.setpoint("a", 2.0)
+    assert ownership.control(2.1) is Control.LIVE
+
+
+def test_another_client_takes_over_from_a_silent_owner(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    ownership.ask("a", 1.0)
+    assert ownership.setpoint("b", 1.6) is None
+    assert ownership.owner == "b"
+    assert ownership.setpoint("a", 1.7) == "b is in control"
+
+
+def test_after_release_nobody_is_in_control(ownership):
+    stream(ownership, "a", 0.0, 1.0)
+    ownership.ask("a", 1.0)
+    ownership.release()
+    assert ownership.control(1.1) is Control.FREE
+    assert ownership.setpoint("b", 1.1) is None
+
+
+def test_many_clients_are_not_remembered_for_ever(ownership):
+    for number in range(1000):
+        ownership.setpoint(number, float(number))
+    assert len(ownership._streams) < 100
+
+
+def test_at_any_time_only_a_live_owner_is_flown(ownership):
+    """Random clients: a refused setpoint never comes from the owner, and the owner only changes
+    when it was silent, or nobody had control."""
+    rng, now, newest = random.Random(3), 0.0, {}
+    for _ in range(5000):
+        now += rng.choice((0.01, 0.1, 0.3, 0.7))
+        client, before = rng.choice("abc"), ownership.owner
+        match rng.randrange(10):
+            case 0:
+                ownership.ask(client, now)
+            case 1:
+                ownership.release()
+                continue
+            case _:
+                refusal = ownership.setpoint(client, now)
+                assert (refusal is None) or client != before
+                if refusal is None:
+                    newest[client] = now
+        if before is not None and ownership.owner != before:
+            assert now - newest.get(before, -9.0) > TIMEOUT
+        if ownership.control(now) is Control.LIVE:
+            assert now - newest[ownership.owner] <= TIMEOUT

@@ -1,0 +1,196 @@
+"""`companion serve` and its clients in memory, on the mock vehicle's clock."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion import testing
+from companion.config.files import changed, load
+from companion.mavlink.framing import FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
+from companion.serve.network.client import Client
+from companion.serve.session import ServeSession
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
+
+
+def mock(autopilot, **settings):
+    return testing.MockVehicle(
+        autopilot, lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings
+    )
+
+
+class MemoryClient(Client):
+    """A client without a socket."""
+
+    def __init__(self, name="script", ids=(245, 190), host="127.0.0.1"):
+        super().__init__(name, host=host, streaming=False)
+        self.ids, self.heard = ids, []
+        self.mav = dialect.MAVLink(None, *ids)
+        self._parser = dialect.MAVLink(None)
+        self._parser.robust_parsing = True
+
+    def _flush(self):
+        while self._waiting:
+            data, _ = self._take(100_000)
+            self.heard += self._parser.parse_buffer(data) or ()
+
+    def connect(self, session):
+        self.session = session
+        session.network.attach(self)
+        return self
+
+    def send(self, message):
+        raw = message.pack(self.mav)
+        self.mav.seq = (self.mav.seq + 1) & 0xFF
+        self.session.network.received(self, FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw))
+
+    def of(self, name):
+        return [each for each in self.heard if each.get_type() == name]
+
+    async def hears(self, name):
+        while not self.of(name):  # noqa: ASYNC110  telemetry sets no events
+            await asyncio.sleep(0.05)
+
+    def texts(self):
+        """What our component said; the pieces of long texts joined."""
+        said = {}
+        for number, each in enumerate(self.of("STATUSTEXT")):
+            if each.get_srcComponent() == 191:
+                key = -number if each.id == 0 else each.id
+                said[key] = said.get(key, "") + each.text
+        return list(said.values())
+
+    def local(
+        self,
+        mask,
+        position=(0, 0, 0),
+        velocity=(0, 0, 0),
+        acceleration=(0, 0, 0),
+        *,
+        frame=1,
+        yaw=0.0,
+        yaw_rate=0.0,
+        target=(1, 1),
+    ):
+        self.send(
+            dialect.MAVLink_set_position_target_local_ned_message(
+                0, *target, frame, mask, *position, *velocity, *acceleration, yaw, yaw_rate
+            )
+        )
+
+    def attitude(self, mask, q, thrust, rates=(0.0, 0.0, 0.0)):
+        self.send(
+            dialect.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(q), *rates, thrust)
+        )
+
+    def command(self, number, *parameters):
+        padded = (*parameters, *(0.0,) * 7)[:7]
+        self.send(dialect.MAVLink_command_long_message(1, 1, number, 0, *padded))
+
+    async def acknowledged(self, number, seconds=20.0):
+        """The final answer to the newest command of that number."""
+        begin = len(self.of("COMMAND_ACK"))
+        async with asyncio.timeout(seconds):
+            while True:
+                for ack in self.of("COMMAND_ACK")[begin:]:
+                    if ack.command == number and ack.result != 5:
+                        return ack.result
+                await asyncio.sleep(0.02)
+
+    async def offboard(self):
+        """Ask PX4 for OFFBOARD, as MAVSDK does; the result."""
+        answer = asyncio.ensure_future(self.acknowledged(176))
+        await asyncio.sleep(0)
+        self.command(176, 1, 6, 0)
+        return await answer
+
+
+async def stream(seconds, send, period=0.02):
+    """Call `send(t)` every period for a time; t counts from the beginning, s."""
+    loop = asyncio.get_running_loop()
+    begin = loop.time()
+    number = 0
+    while number * period < seconds:
+        send(number * period)
+        number += 1
+        await asyncio.sleep(max(0.0, begin + number * period - loop.time()))
+
+
+async def begin_control(session, script, autopilot, hold):
+    """Stream `hold()` until the vehicle is under control."""
+    await stream(0.3, hold)
+    asked = asyncio.ensure_future(script.offboard()) if autopilot == "px4" else None
+    async with asyncio.timeout(15.0):
+        while not session.control.in_control:
+            await stream(0.2, hold)
+    while asked is not None and not asked.done():
+        await stream(0.1, hold)
+    assert asked is None or asked.result() == 0, script.texts()
+    await stream(1.2, hold)
+
+
+@asynccontextmanager
+async def serving(vehicle, autopilot, notes=None, **serve) -> AsyncIterator[ServeSession]:
+    """A session over the vehicle in memory; nobody listens at sockets."""
+    config = changed(
+        load(CONFIGS / f"mock-{autopilot}.yaml"),
+        {
+            "link": {"lockstep": False},
+            "limits": {"max_tilt_deg": 45.0},
+            "serve": {"clients": (), **serve},
+        },
+        "the test",
+    )
+    notes = [] if notes is None else notes
+    session = ServeSession(config, notes.append, None, testing.environment)
+    running = asyncio.ensure_future(session.run())
+    while session.network is None:
+        await asyncio.sleep(0.01)
+        if running.done():
+            running.result()
+    try:
+        yield session
+    finally:
+        session.stop()
+        await running
+
+
+async def airborne(session, vehicle, autopilot, height=5.0):
+    """Arm and take off by the autopilot's own commands, as a client would."""
+    ground = MemoryClient("ground", (255, 190)).connect(session)
+    async with asyncio.timeout(120.0):
+        await ground.hears("HEARTBEAT")
+        if autopilot == "ardupilot":
+            for name, rate in (("LOCAL_POSITION_NED", 50), ("EXTENDED_SYS_STATE", 5),
+                               ("SYS_STATUS", 2), ("GLOBAL_POSITION_INT", 10)):  # fmt: skip
+                number = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+                ground.command(511, number, 1e6 / rate)
+                await asyncio.sleep(0.2)
+        while True:
+            if autopilot == "ardupilot":
+                ground.command(176, 1, 4)
+                await asyncio.sleep(0.5)
+            ground.command(400, 1)
+            await asyncio.sleep(1.5)
+            if session.control._link.state.armed:
+                break
+        if autopilot == "px4":
+            altitude = session.control._link.state.home
+            ground.command(22, 0, 0, 0, math.nan, math.nan, math.nan,
+                           altitude.altitude_m + height)  # fmt: skip
+        else:
+            ground.command(22, 0, 0, 0, 0, 0, 0, height)
+        while True:
+            state = session.control._link.state
+            position = state.position
+            near = state.height is not None and state.height > height - 0.4
+            if near and abs(position.velocity_ned[2]) < 0.2 and not state.taking_off:
+                break
+            await asyncio.sleep(0.2)
+    return ground
