@@ -21,6 +21,7 @@ PLAN = """QGC WPL 110
 """
 
 
+@pytest.mark.timeout(180)
 def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
     vehicle, station, program = free_ports(3)
     with (
@@ -34,7 +35,7 @@ def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
         )  # fmt: skip
         said = read_until(proxy, "parameters\n")
         received = next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
-        out, errors = run.communicate(timeout=60)
+        out, errors = run.communicate(timeout=120)
         assert run.returncode == 0, out + errors
         report = json.loads(out.split("REPORT ")[1].splitlines()[0])
         (tmp_path / "plan.txt").write_text(PLAN)
@@ -50,7 +51,7 @@ def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
 
 
 class mavproxy:  # noqa: N801 - a context manager
-    """MAVProxy, listening on a UDP port; killed after a minute."""
+    """MAVProxy, listening on a UDP port; killed if the test hangs."""
 
     def __init__(self, port, folder):
         script = shutil.which("mavproxy.py", path=Path(sys.executable).parent)
@@ -61,7 +62,7 @@ class mavproxy:  # noqa: N801 - a context manager
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, bufsize=1, cwd=folder,
         )  # fmt: skip
-        self._watchdog = threading.Timer(80.0, self._process.kill)
+        self._watchdog = threading.Timer(150.0, self._process.kill)
 
     def __enter__(self):
         self._watchdog.start()
@@ -84,6 +85,7 @@ def read_until(process, words):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(180)
 @pytest.mark.parametrize(("autopilot", "hover"), [("px4", 0.49), ("ardupilot", 0.364)])
 def test_a_mavsdk_offboard_program_flies_through_us(autopilot, hover):
     """Position, velocity, acceleration, attitude, and a circle of 5 m at 5 m/s; real time."""
