@@ -4,9 +4,11 @@ import asyncio
 import time
 from collections.abc import Callable
 
+from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
 from companion.mavlink.framing import Frame, build_frame
 from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
+from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.routing import Channel
@@ -37,6 +39,7 @@ class Component:
     ) -> None:
         self._settings, self._network, self._to_vehicle = settings, network, to_vehicle
         self._loop = asyncio.get_running_loop()
+        self._own = Address(settings.source_system, settings.source_component)
         self._sequence = self._text_id = 0
         self._began = time.monotonic()
         self._told: dict[tuple[Client | None, str], float] = {}
@@ -66,21 +69,28 @@ class Component:
         message = dialect.MAVLink_named_value_float_message(boot_ms, name.encode(), value)
         self._network.send(self._frame(message))
 
-    def acknowledge(self, client: Client, frame: Frame, result: int) -> None:
-        """Answer a client's command (COMMAND_LONG or COMMAND_INT) with a MAV_RESULT."""
+    def acknowledge(self, client: Client, frame: Frame, result: int, by: Address) -> None:
+        """Answer a client's command with a MAV_RESULT.
+
+        Args:
+            client: who sent it.
+            frame: COMMAND_LONG, COMMAND_INT or SET_MODE.
+            result: of it.
+            by: who answers; clients take the answer only of the component that they commanded.
+        """
         command = decode(frame.message_id, frame.payload)
         message = dialect.MAVLink_command_ack_message(
-            command.command,
+            getattr(command, "command", MAV_CMD_DO_SET_MODE),
             result,
             target_system=frame.system,
             target_component=frame.component,
         )
-        self._network.send_to(client, self._frame(message))
+        self._network.send_to(client, self._frame(message, by))
 
     def on_own(self, client: Channel, frame: Frame) -> None:
         """Answer what is addressed to us alone: we carry out no commands."""
         if frame.message_id in _COMMANDS and isinstance(client, Client):
-            self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED)
+            self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own)
 
     def _is_new(self, client: Client | None, text: str) -> bool:
         now = self._loop.time()
@@ -104,16 +114,16 @@ class Component:
             for number, at in enumerate(cuts)
         ]
 
-    def _frame(self, message: Message) -> bytes:
-        number, settings = message.get_msgId(), self._settings
-        signing = settings.signing
+    def _frame(self, message: Message, by: Address | None = None) -> bytes:
+        number, signing = message.get_msgId(), self._settings.signing
+        system, component = by or self._own
         frame = build_frame(
             number,
             encode(message),
             CRC_EXTRA[number],
             sequence=self._sequence,
-            system=settings.source_system,
-            component=settings.source_component,
+            system=system,
+            component=component,
             signed=signing is not None,
         )
         self._sequence = (self._sequence + 1) & 0xFF

@@ -1,40 +1,29 @@
-"""Control by clients: whose setpoints are flown, and the flight that flies them."""
+"""Control by clients: whose setpoints are flown, and who asks for control."""
 
 import asyncio
 from typing import NamedTuple
 
-from companion.attitude.representation import heading
 from companion.config import Config
-from companion.flight.assembly import Assembled, assemble
-from companion.flight.context import cancel
 from companion.flight.environment import Environment
-from companion.flight.observer import EventRecorder, Observer
-from companion.flight.plan import TakeoverPlan
-from companion.flight.wiring import connected
+from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
-from companion.mavlink.messages import dialect
 from companion.serve.component import Component
-from companion.serve.mode_requests import asks_for_control, starves_control
+from companion.serve.mode_requests import asks_for_control, leaves_control, starves_control
 from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
-from companion.serve.ownership import Control, Ownership
+from companion.serve.ownership import Ownership
+from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, Asked, ServedFlight
 from companion.serve.setpoints.approach import UnplannableError
-from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 from companion.serve.setpoints.request import RefusedSetpoint, Request
 from companion.serve.setpoints.understand import SETPOINTS, Setpoints
 from companion.serve.situation import SituationKeeper
-from companion.serve.source import ServedSource
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
-_ACCEPTED = dialect.MAV_RESULT_ACCEPTED
-_IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
-_REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-_PROGRESS_PERIOD = 0.4
-"""A client that asked for control is told so often that the takeover goes on, s."""
 _TRY_AGAIN = 2.0
 """After a takeover has failed, setpoints alone do not begin another one for this long, s."""
-_VALUES_PERIOD = 0.5
+_MOST_OWNERS = 32
+"""Programs whose newest request is kept."""
 
 
 class _Owner(NamedTuple):
@@ -45,13 +34,6 @@ class _Owner(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.client.name} ({self.address.system}/{self.address.component})"
-
-
-class _Asked(NamedTuple):
-    """A command that asks for control, and waits for its answer."""
-
-    client: Client
-    frame: Frame
 
 
 class ServedControl:
@@ -81,9 +63,8 @@ class ServedControl:
         serve = config.serve
         self.ownership = Ownership(serve.setpoint_timeout, serve.hold_s)
         self._newest: dict[_Owner, Request] = {}
-        self._flight: asyncio.Task[None] | None = None
-        self._assembled: Assembled | None = None
-        self._source: ServedSource | None = None
+        self._flight: ServedFlight | None = None
+        self._task: asyncio.Task[None] | None = None
         self._not_before = 0.0
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
@@ -92,8 +73,12 @@ class ServedControl:
     @property
     def in_control(self) -> bool:
         """Whether the autopilot obeys us for a client."""
-        assembled = self._assembled
-        return assembled is not None and assembled.context.loop.offboard_active
+        return self._flight is not None and self._flight.in_control
+
+    @property
+    def tracking_error(self) -> float | None:
+        """Distance of the vehicle from its reference, m; None where it is not known."""
+        return None if self._flight is None else self._flight.tracking_error
 
     def intercept(self, client: Client, frame: Frame) -> bool:
         """Whether a client's frame ends here: its setpoints, and its wish for control."""
@@ -107,34 +92,23 @@ class ServedControl:
             self._take_wish(client, frame)
             return True
         if self.in_control and starves_control(frame, self.needed_rates()):
-            self._component.acknowledge(client, frame, _ACCEPTED)
+            self._answer(client, frame, ACCEPTED)
             return True
+        owner = self.ownership.owner
+        if self._flight is not None and isinstance(owner, _Owner) and owner.client is client:
+            self._flight.let_go = self._flight.let_go or leaves_control(frame)
         return False
 
     async def close(self, reason: str) -> None:
         """Hand the vehicle back, if a client has it, and wait until that is done."""
-        if self._flight is None:
-            return
-        if self._assembled is not None:
-            self._assembled.flight.interrupt(reason)
-        await asyncio.wait({self._flight})
+        if self._flight is not None and self._task is not None:
+            self._flight.interrupt(reason)
+            await asyncio.wait({self._task})
 
     def leave(self) -> None:
         """Stop sending setpoints at once."""
-        if self._flight is not None:
-            self._flight.cancel()
-
-    async def send_values(self) -> None:
-        """Send the tracking error and the latency of answers to clients until cancelled."""
-        while True:
-            await asyncio.sleep(_VALUES_PERIOD)
-            assembled = self._assembled
-            if assembled is None or not self.in_control:
-                continue
-            error = assembled.context.guidance_loop.off_course
-            if error is not None:
-                self._component.value("trk_err_m", error)
-            self._component.value("answer_ms", 1e-6 * assembled.trace.newest_latency_ns)
+        if self._task is not None:
+            self._task.cancel()
 
     def needed_rates(self) -> dict[str, float]:
         """Telemetry that control needs, Hz by message name; the autopilot must be known."""
@@ -164,21 +138,26 @@ class ServedControl:
             request = setpoints.understand(frame, situation)
             refusal = self.ownership.setpoint(owner, now)
             if refusal is None:
-                self._newest = {who: each for who, each in self._newest.items() if who != owner}
-                self._newest[owner] = request
+                self._keep(owner, request)
                 self._fly_request(owner, request, now)
         except (RefusedSetpoint, UnplannableError) as error:
             refusal = str(error)
         if refusal is not None:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
+    def _keep(self, owner: _Owner, request: Request) -> None:
+        """Keep a program's newest request; those of the longest silent ones are forgotten."""
+        self._newest.pop(owner, None)
+        self._newest[owner] = request
+        while len(self._newest) > _MOST_OWNERS:
+            del self._newest[next(iter(self._newest))]
+
     def _fly_request(self, owner: _Owner, request: Request, now: float) -> None:
         """Give a request to the flight, or begin one where setpoints alone ask for control."""
-        if self._source is not None and self.ownership.owner == owner:
-            self._source.give(request, now)
-            if self._assembled is not None:
-                self._assembled.context.guidance_loop.step_soon()
-        elif self._flight is None and self._may_begin(owner, now):
+        if self._flight is not None:
+            if self.ownership.owner == owner:
+                self._flight.give(request)
+        elif self._may_begin(owner, now):
             self._begin(owner, None)
 
     def _may_begin(self, owner: _Owner, now: float) -> bool:
@@ -191,7 +170,7 @@ class ServedControl:
         if not state.flying:
             self._component.answer(owner.client, "setpoints are flown in the air: take off first")
             return False
-        return self.ownership.ask(owner, now) is None
+        return self.ownership.streams(owner, now) and self.ownership.ask(owner, now) is None
 
     # --- control
 
@@ -210,90 +189,36 @@ class ServedControl:
             if self._flight is None:
                 self.ownership.release()
             self._component.answer(client, f"control refused: {refusal}")
-            self._component.acknowledge(client, frame, _REJECTED)
+            self._answer(client, frame, REJECTED)
         elif self._flight is None:
-            self._begin(owner, _Asked(client, frame))
+            self._begin(owner, Asked(client, frame))
         else:
-            self._component.acknowledge(
-                client, frame, _ACCEPTED if self.in_control else _IN_PROGRESS
-            )
+            self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
-    def _begin(self, owner: _Owner, asked: _Asked | None) -> None:
-        config = self._config
-        motion = CommandedMotion(
-            MotionLimits(
-                config.serve.max_speed_m_s,
-                config.serve.max_acceleration_m_s2,
-                config.serve.max_jerk_m_s3,
-                config.limits.max_climb_m_s,
-                config.limits.max_descent_m_s,
-                config.limits.max_yaw_rate,
-                config.serve.setpoint_timeout,
-            )
-        )
-        self._source = source = ServedSource(str(owner), motion, self.ownership, self._heading)
-        source.give(self._newest[owner], self._clock())
-        self._flight = asyncio.create_task(self._fly(source, asked))
-
-    async def _fly(self, source: ServedSource, asked: _Asked | None) -> None:
-        """Take over, fly the source until it is finished, and hand back."""
-        self._assembled = assembled = assemble(
+    def _begin(self, owner: _Owner, asked: Asked | None) -> None:
+        """Begin a flight under a client's control."""
+        self._flight = flight = ServedFlight(
+            str(owner),
             self._config,
             self._link,
-            EventRecorder(self._observer, self._clock, lambda _: None),
-            _decline,
-            None,
-            TakeoverPlan(source),
+            self._component,
+            self.ownership,
+            self._observer,
             self._environment,
         )
-        source.resets = assembled.context.loop.resets
-        watcher = asyncio.create_task(self._follow_up(source, asked))
-        result = "left at once"
+        flight.give(self._newest[owner])
+        self._task = asyncio.create_task(self._fly(flight, asked))
+
+    async def _fly(self, flight: ServedFlight, asked: Asked | None) -> None:
+        begun = False
         try:
-            with connected(self._link, assembled):
-                result = await assembled.flight.run()
+            begun = await flight.run(asked)
         finally:
-            await cancel(watcher)
-            begun = source.pose is not None
             self.ownership.release()
-            self._flight = self._assembled = self._source = None
-            assembled.close()
-            self._tell_end(source, asked, result, begun=begun)
+            self._flight = self._task = None
+            if not begun:
+                self._not_before = self._clock() + _TRY_AGAIN
 
-    def _tell_end(
-        self, source: ServedSource, asked: _Asked | None, result: str, *, begun: bool
-    ) -> None:
-        if begun:
-            ended = "handed back" if result == "ok" else result
-            self._component.tell(f"control by {source.name} has ended: {ended}")
-            return
-        self._not_before = self._clock() + _TRY_AGAIN
-        self._component.tell(f"control was not given to {source.name}: {result}")
-        if asked is not None:
-            self._component.acknowledge(*asked, _REJECTED)
-
-    async def _follow_up(self, source: ServedSource, asked: _Asked | None) -> None:
-        """Tell the client that the takeover goes on, then its end, then each silence."""
-        while source.pose is None:
-            if asked is not None:
-                self._component.acknowledge(*asked, _IN_PROGRESS)
-            await asyncio.sleep(_PROGRESS_PERIOD)
-        if asked is not None:
-            self._component.acknowledge(*asked, _ACCEPTED)
-        self._component.tell(f"{source.name} is in control")
-        told = Control.LIVE
-        while True:
-            now = self.ownership.control(self._clock())
-            if now is not told and now in (Control.LIVE, Control.HOLDING):
-                self._component.tell(f"{source.name}: {now.value}")
-                told = now
-            await asyncio.sleep(0.05)
-
-    def _heading(self) -> float:
-        """The vehicle's heading without the jumps of estimator resets, rad."""
-        assert self._assembled is not None
-        return heading(self._assembled.context.guidance_loop.attitude())
-
-
-async def _decline() -> bool:
-    return False
+    def _answer(self, client: Client, frame: Frame, result: int) -> None:
+        """Answer a client's command in the autopilot's name: it was addressed to the autopilot."""
+        self._component.acknowledge(client, frame, result, self._autopilot)

@@ -1,6 +1,10 @@
 """Which messages of clients ask for our mode, and which would starve our control. Pure."""
 
-from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
+from companion.mavlink.commands import (
+    MAV_CMD_DO_SET_MODE,
+    MAV_CMD_NAV_LAND,
+    MAV_CMD_NAV_RETURN_TO_LAUNCH,
+)
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import MESSAGE_IDS, decode, dialect
 from companion.vehicle.autopilot import Autopilot, ControlEntry
@@ -10,6 +14,7 @@ _COMMAND_INT = dialect.MAVLINK_MSG_ID_COMMAND_INT
 _SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
 _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+_LEAVING = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE = 1
 _MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE, _REQUEST_DATA_STREAM})
 """All messages that are looked at here."""
@@ -34,6 +39,15 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
         and int(message.param1) & _CUSTOM_MODE
         and (message.param2, message.param3) == (wanted.p2, wanted.p3)
     )
+
+
+def leaves_control(frame: Frame) -> bool:
+    """Whether a frame commands a mode, a landing or a return: its sender gives control up."""
+    if frame.message_id == _SET_MODE:
+        return True
+    if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
+        return False
+    return decode(frame.message_id, frame.payload).command in _LEAVING
 
 
 def starves_control(frame: Frame, needed: dict[str, float]) -> bool:

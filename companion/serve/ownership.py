@@ -68,7 +68,7 @@ class Ownership:
         owner = self.owner
         if owner is not None and owner != client and self._is_live(owner, now):
             return f"{_name(owner)} is in control"
-        if not self.streams(client, now):
+        if not self._is_live(client, now):
             return "send setpoints first, at 2 Hz or more"
         self.owner = client
         return None

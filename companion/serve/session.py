@@ -89,7 +89,6 @@ class ServeSession:
             self.control = ServedControl(
                 self._config, link, component, keeper, self._observer, self._environment
             )
-            beside.append(self.control.send_values())
             beside.append(keeper.keep_telemetry(self.control.needed_rates))
         gate = _Gate(permission, component, self.control)
         network.routing.on_own = component.on_own

@@ -84,7 +84,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
         def send(time):
             commanded = circle(time, centre)
             script.local(ALL, *commanded)
-            error = session.control._assembled.context.guidance_loop.off_course
+            error = session.control.tracking_error
             errors.extend([error] if time > 4.0 else [])
 
         await stream(12.0, send)
@@ -222,6 +222,7 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4():
         await stream(1.0, lambda _: script.local(ALL, begin))
         assert vehicle.state()["mode"] == "LOITER"
         assert not session.control.in_control
+        assert any("it let go" in text for text in script.texts())
 
     fly("px4", scene)
 

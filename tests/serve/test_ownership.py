@@ -22,13 +22,23 @@ def stream(ownership, client, begin, end, period=0.1):
     return refusals
 
 
-def test_control_needs_a_stream_as_px4_does(ownership):
+def test_control_needs_a_fresh_setpoint_as_px4_does(ownership):
     assert "setpoints first" in ownership.ask("a", 0.0)
     ownership.setpoint("a", 0.0)
-    assert "setpoints first" in ownership.ask("a", 0.1), "one alone"
-    ownership.setpoint("a", 0.4)
-    assert ownership.ask("a", 0.5) is None
+    assert "setpoints first" in ownership.ask("a", TIMEOUT + 0.1), "too old"
+    ownership.setpoint("a", 1.0)
+    assert ownership.ask("a", 1.1) is None
     assert ownership.owner == "a"
+
+
+def test_one_setpoint_alone_is_no_stream(ownership):
+    ownership.setpoint("a", 0.0)
+    assert not ownership.streams("a", 0.1)
+    ownership.setpoint("a", 0.4)
+    assert ownership.streams("a", 0.5)
+    assert not ownership.streams("a", 1.0)
+    ownership.setpoint("a", 2.0)
+    assert not ownership.streams("a", 2.1)
 
 
 def test_setpoints_without_asking_give_no_control(ownership):

@@ -7,8 +7,11 @@ import sys
 import threading
 from pathlib import Path
 
+import pytest
+
 from tests.serve.serving import free_ports, mock, serving
 
+OFFBOARD = Path(__file__).with_name("mavsdk_offboard.py")
 MAVSDK = Path(__file__).with_name("mavsdk_program.py")
 PARAMETERS = 90
 PLAN = """QGC WPL 110
@@ -18,6 +21,7 @@ PLAN = """QGC WPL 110
 """
 
 
+@pytest.mark.timeout(180)
 def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
     vehicle, station, program = free_ports(3)
     with (
@@ -31,7 +35,7 @@ def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
         )  # fmt: skip
         said = read_until(proxy, "parameters\n")
         received = next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
-        out, errors = run.communicate(timeout=60)
+        out, errors = run.communicate(timeout=120)
         assert run.returncode == 0, out + errors
         report = json.loads(out.split("REPORT ")[1].splitlines()[0])
         (tmp_path / "plan.txt").write_text(PLAN)
@@ -47,7 +51,7 @@ def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
 
 
 class mavproxy:  # noqa: N801 - a context manager
-    """MAVProxy, listening on a UDP port; killed after a minute."""
+    """MAVProxy, listening on a UDP port; killed if the test hangs."""
 
     def __init__(self, port, folder):
         script = shutil.which("mavproxy.py", path=Path(sys.executable).parent)
@@ -58,7 +62,7 @@ class mavproxy:  # noqa: N801 - a context manager
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, bufsize=1, cwd=folder,
         )  # fmt: skip
-        self._watchdog = threading.Timer(80.0, self._process.kill)
+        self._watchdog = threading.Timer(150.0, self._process.kill)
 
     def __enter__(self):
         self._watchdog.start()
@@ -78,3 +82,32 @@ def read_until(process, words):
         assert line, f"MAVProxy ended before it said {words!r}:\n{said}"
         said += line
     return said
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize(("autopilot", "hover"), [("px4", 0.49), ("ardupilot", 0.364)])
+def test_a_mavsdk_offboard_program_flies_through_us(autopilot, hover):
+    """Position, velocity, acceleration, attitude, and a circle of 5 m at 5 m/s; real time."""
+    config = f"configs/mock-{autopilot}.yaml"
+    vehicle, program = free_ports(2)
+    endpoints = f"udpin://127.0.0.1:{program}", f"udpout://127.0.0.1:{program}"
+    with (
+        mock(vehicle, "--config", config),
+        serving(
+            vehicle, endpoints[0], config=config, settings=["limits.max_tilt_deg=45"]
+        ) as served,
+    ):
+        run = subprocess.run(
+            [sys.executable, OFFBOARD, endpoints[1], str(hover)],
+            capture_output=True, text=True, timeout=150, check=False,
+        )  # fmt: skip
+    assert run.returncode == 0, run.stdout + run.stderr + served.said
+    report = json.loads(run.stdout.split("REPORT ")[1].splitlines()[0])
+    assert report["active"]
+    assert report["still_active"]
+    assert report["disarmed"]
+    assert report["position"] < 0.2
+    assert report["velocity"] == pytest.approx(-1.5, abs=0.2)
+    assert report["acceleration"] == pytest.approx(1.0, abs=0.3)
+    assert report["circle_rms_m"] < 0.15, "as MAVSDK's telemetry tells it, late by itself"

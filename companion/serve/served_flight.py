@@ -1,0 +1,183 @@
+"""One flight under a client's control: the takeover, the answers meanwhile, and its end."""
+
+import asyncio
+from typing import NamedTuple
+
+from companion.attitude.representation import heading
+from companion.config import Config
+from companion.flight.assembly import assemble
+from companion.flight.context import cancel
+from companion.flight.environment import Environment
+from companion.flight.observer import EventRecorder, Observer
+from companion.flight.plan import TakeoverPlan
+from companion.flight.wiring import connected
+from companion.mavlink.framing import Frame
+from companion.mavlink.messages import dialect
+from companion.serve.component import Component
+from companion.serve.network.addresses import Address
+from companion.serve.network.client import Client
+from companion.serve.ownership import Control, Ownership
+from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
+from companion.serve.setpoints.request import Request
+from companion.serve.source import ServedSource
+from companion.vehicle.link import Link
+
+ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+IN_PROGRESS = dialect.MAV_RESULT_IN_PROGRESS
+REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+
+_PROGRESS_PERIOD = 0.4
+"""A client that asked for control is told so often that the takeover goes on, s."""
+_LOOK_PERIOD = 0.05
+_VALUES_PERIOD = 0.5
+
+
+class Asked(NamedTuple):
+    """A command that asks for control, and waits for its answer."""
+
+    client: Client
+    frame: Frame
+
+
+class ServedFlight:
+    """Takes over, flies the requests of the owner, and hands back.
+
+    Attributes:
+        let_go: whether the owner has commanded another mode.
+
+    Args:
+        name: of the owner.
+        config: of the vehicle and of `serve`.
+        link: to the vehicle, open.
+        component: answers clients and tells pilots.
+        ownership: says whose requests are flown, and for how long.
+        observer: is told of phases and events.
+        environment: of the flight.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        config: Config,
+        link: Link,
+        component: Component,
+        ownership: Ownership,
+        observer: Observer,
+        environment: Environment,
+    ) -> None:
+        self.let_go = False
+        self._link, self._component, self._ownership = link, component, ownership
+        self._clock = asyncio.get_running_loop().time
+        settings = link.settings
+        self._autopilot = Address(settings.target_system, settings.target_component)
+        self._source = ServedSource(name, _motion(config), ownership, self._heading)
+        self._assembled = assemble(
+            config,
+            link,
+            EventRecorder(observer, self._clock, lambda _: None),
+            _decline,
+            None,
+            TakeoverPlan(self._source),
+            environment,
+        )
+        self._source.resets = self._assembled.context.loop.resets
+
+    @property
+    def in_control(self) -> bool:
+        """Whether the autopilot obeys us."""
+        return self._assembled.context.loop.offboard_active
+
+    @property
+    def tracking_error(self) -> float | None:
+        """Distance from the reference, m; None where it is not known."""
+        return self._assembled.context.guidance_loop.off_course
+
+    def give(self, request: Request) -> None:
+        """Fly a request, at once if control has begun.
+
+        Raises:
+            UnplannableError: there is no motion to it; the request before still counts.
+        """
+        self._source.give(request, self._clock())
+        self._assembled.context.guidance_loop.step_soon()
+
+    def interrupt(self, reason: str) -> None:
+        """Hand the vehicle back."""
+        self._assembled.flight.interrupt(reason)
+
+    async def run(self, asked: Asked | None) -> bool:
+        """Fly; returns whether control had begun."""
+        beside = [
+            asyncio.create_task(work) for work in (self._follow_up(asked), self._send_values())
+        ]
+        result = "left at once"
+        try:
+            with connected(self._link, self._assembled):
+                result = await self._assembled.flight.run()
+        finally:
+            for task in beside:
+                await cancel(task)
+            self._assembled.close()
+            self._tell_end(asked, result)
+        return self._source.pose is not None
+
+    def _tell_end(self, asked: Asked | None, result: str) -> None:
+        name = self._source.name
+        if self._source.pose is not None:
+            ended = "it let go" if self.let_go else "handed back" if result == "ok" else result
+            self._component.tell(f"control by {name} has ended: {ended}")
+            return
+        self._component.tell(f"control was not given to {name}: {result}")
+        self._answer(asked, REJECTED)
+
+    async def _follow_up(self, asked: Asked | None) -> None:
+        """Tell the client that the takeover goes on, then its end, then each silence."""
+        while self._source.pose is None:
+            self._answer(asked, IN_PROGRESS)
+            await asyncio.sleep(_PROGRESS_PERIOD)
+        self._answer(asked, ACCEPTED)
+        self._component.tell(f"{self._source.name} is in control")
+        told = Control.LIVE
+        while True:
+            now = self._ownership.control(self._clock())
+            if now is not told and now in (Control.LIVE, Control.HOLDING):
+                self._component.tell(f"{self._source.name}: {now.value}")
+                told = now
+            await asyncio.sleep(_LOOK_PERIOD)
+
+    async def _send_values(self) -> None:
+        """Send the tracking error and the latency of answers to clients."""
+        while True:
+            await asyncio.sleep(_VALUES_PERIOD)
+            if not self.in_control:
+                continue
+            if self.tracking_error is not None:
+                self._component.value("trk_err_m", self.tracking_error)
+            self._component.value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
+
+    def _answer(self, asked: Asked | None, result: int) -> None:
+        if asked is not None:
+            self._component.acknowledge(*asked, result, self._autopilot)
+
+    def _heading(self) -> float:
+        """The vehicle's heading without the jumps of estimator resets, rad."""
+        return heading(self._assembled.context.guidance_loop.attitude())
+
+
+def _motion(config: Config) -> CommandedMotion:
+    serve, limits = config.serve, config.limits
+    return CommandedMotion(
+        MotionLimits(
+            serve.max_speed_m_s,
+            serve.max_acceleration_m_s2,
+            serve.max_jerk_m_s3,
+            limits.max_climb_m_s,
+            limits.max_descent_m_s,
+            limits.max_yaw_rate,
+            serve.setpoint_timeout,
+        )
+    )
+
+
+async def _decline() -> bool:
+    return False
