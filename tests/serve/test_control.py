@@ -256,6 +256,21 @@ def test_on_the_ground_control_is_refused_in_words(autopilot):
     testing.run(vehicle, whole())
 
 
+def test_setpoints_for_another_vehicle_behind_a_client_are_passed_to_it():
+    vehicle = mock("px4")
+
+    async def whole():
+        async with serving(vehicle, "px4") as session:
+            script = MemoryClient().connect(session)
+            other = MemoryClient("other vehicle", (2, 1)).connect(session)
+            other.send(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+            script.local(ALL, (1.0, 2.0, -3.0), target=(2, 1))
+            await other.hears("SET_POSITION_TARGET_LOCAL_NED")
+            assert not script.texts()
+
+    testing.run(vehicle, whole())
+
+
 def test_without_control_setpoints_are_passed_on_as_everything_else():
     vehicle = mock("px4")
 
