@@ -12,10 +12,11 @@ from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, StateLogger
 from companion.mavlink.framing import Frame
 from companion.serve.component import Component
+from companion.serve.network.addresses import target_of
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
-from companion.serve.network.routing import Channel
+from companion.serve.network.routing import Channel, Routing
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.link import Link
 
@@ -90,7 +91,9 @@ class ServeSession:
                 self._config, link, component, keeper, self._observer, self._environment
             )
             beside.append(keeper.keep_telemetry(self.control.needed_rates))
-        gate = _Gate(permission, component, self.control)
+        gate = _Gate(
+            permission, component, self.control, network.routing, link.settings.target_system
+        )
         network.routing.on_own = component.on_own
         network.routing.intercept = gate.intercept
         for endpoint in self._config.serve.clients:
@@ -111,9 +114,15 @@ class _Gate:
     """Refuses what a client may not send, and passes its setpoints to control."""
 
     def __init__(
-        self, permission: Permission, component: Component, control: "ServedControl | None"
+        self,
+        permission: Permission,
+        component: Component,
+        control: "ServedControl | None",
+        routing: Routing,
+        system: int,
     ) -> None:
         self._permission, self._component, self._control = permission, component, control
+        self._routing, self._system = routing, system
 
     def intercept(self, client: Channel, frame: Frame) -> bool:
         """Whether a frame ends here."""
@@ -122,7 +131,13 @@ class _Gate:
         if refusal is not None:
             self._component.answer(client, refusal)
             return True
-        return self._control is not None and self._control.intercept(client, frame)
+        if self._control is None:
+            return False
+        target = target_of(frame)
+        for_another_system = target.system not in (0, self._system)
+        if for_another_system and self._routing.is_at_client(target, client):
+            return False
+        return self._control.intercept(client, frame)
 
 
 def _counters(link: Link, network: Network) -> dict[str, Any]:

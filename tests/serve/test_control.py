@@ -256,6 +256,21 @@ def test_on_the_ground_control_is_refused_in_words(autopilot):
     testing.run(vehicle, whole())
 
 
+def test_setpoints_for_another_vehicle_behind_a_client_are_passed_to_it():
+    vehicle = mock("px4")
+
+    async def whole():
+        async with serving(vehicle, "px4") as session:
+            script = MemoryClient().connect(session)
+            other = MemoryClient("other vehicle", (2, 1)).connect(session)
+            other.send(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+            script.local(ALL, (1.0, 2.0, -3.0), target=(2, 1))
+            await other.hears("SET_POSITION_TARGET_LOCAL_NED")
+            assert not script.texts()
+
+    testing.run(vehicle, whole())
+
+
 def test_without_control_setpoints_are_passed_on_as_everything_else():
     vehicle = mock("px4")
 
@@ -269,3 +284,41 @@ def test_without_control_setpoints_are_passed_on_as_everything_else():
             assert vehicle.state()["setpoints"] > 50
 
     testing.run(vehicle, whole())
+
+
+@BOTH
+def test_a_killed_client_is_held_for_and_its_next_connection_may_go_on(autopilot):
+    async def scene(vehicle, session, script, _):
+        begin = place(session)
+        await begin_control(session, script, autopilot, lambda _: script.local(ALL, begin))
+        await stream(1.5, lambda _: script.local(VELOCITY, velocity=(2.0, 0.0, 0.0)))
+        session.network.detach(script)
+        await asyncio.sleep(1.5)
+        assert math.hypot(*velocity(session)) < 0.5
+        again = MemoryClient("script again").connect(session)
+        there = place(session)
+        await stream(2.0, lambda _: again.local(POSITION, there))
+        assert session.control.in_control
+        assert session.control.ownership.owner.client is again
+        session.network.detach(again)
+        await asyncio.sleep(0.5 + 2.0 + 3.0)
+        assert vehicle.state()["mode"] == HELD[autopilot]
+
+    fly(autopilot, scene, serve={"hold_s": 2.0})
+
+
+def test_a_flood_of_setpoints_is_flown_like_a_stream():
+    async def scene(vehicle, session, script, _):
+        begin = place(session)
+        await begin_control(session, script, "px4", lambda _: script.local(ALL, begin))
+        before = len(vehicle.setpoints)
+
+        def flood(_):
+            for number in range(20):
+                script.local(ALL, (begin[0] + 1e-4 * number, *begin[1:]))
+
+        await stream(2.0, flood, 0.01)
+        assert math.dist(place(session), begin) < 0.3
+        assert len(vehicle.setpoints) - before < 2.0 * 260, "one for each sample, no more"
+
+    fly("px4", scene)

@@ -107,6 +107,10 @@ class Routing:
         """The addresses heard on a channel."""
         return frozenset(self._heard.get(channel, ()))
 
+    def is_at_client(self, target: Address, origin: Channel) -> bool:
+        """Whether a target was heard on the channel of a client other than `origin`."""
+        return any(self._reaches(each, target) for each in self._clients if each is not origin)
+
     def from_vehicle(self, frame: Frame) -> None:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
