@@ -158,14 +158,14 @@ async def returns_infinity(control):
     control.rotate((0.0, float("inf"), 0.0))
 
 
-@BOTH
 @pytest.mark.parametrize(
-    ("fault", "error", "reason"),
+    ("autopilot", "fault", "error", "reason"),
     [
-        (stops, companion.FlightEnded, "the program gave no new command for"),
-        (raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
-        (returns_nan, ValueError, "a command must be finite"),
-        (returns_infinity, ValueError, "a command must be finite"),
+        ("px4", stops, companion.FlightEnded, "the program gave no new command for"),
+        ("ardupilot", stops, companion.FlightEnded, "the program gave no new command for"),
+        ("px4", raises, ZeroDivisionError, "the program raised ZeroDivisionError('mine')"),
+        ("ardupilot", returns_nan, ValueError, "a command must be finite"),
+        ("px4", returns_infinity, ValueError, "a command must be finite"),
     ],
 )
 def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(

@@ -45,6 +45,7 @@ def _command(*arguments: Any) -> None:
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("error")
+        warnings.simplefilter("default", ResourceWarning)  # of what other tests left behind
         code = main([str(argument) for argument in arguments])
     said = errors.getvalue()
     assert code in (0, 1, 2), code

@@ -23,6 +23,7 @@ _SHARES = (0.0, 1e-9, 0.01, 0.1, 0.25, 0.4999, 0.5, 0.73, 0.99, 1.0 - 1e-9, 1.0,
 def _check(case: Case) -> None:
     with folder_of(case["files"]) as folder, warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning of NumPy is as loose as a traceback
+        warnings.simplefilter("default", ResourceWarning)  # of what other tests left behind
         path = folder / next(iter(case["files"]))
         try:
             trajectory = trajectory_file.load(path)
