@@ -23,12 +23,7 @@ from companion.attitude.representation import (
     wrap_angle,
 )
 from companion.attitude.rotation import clamp, limit_rates
-from companion.attitude.types import (
-    BodyRates,
-    Coefficients,
-    Quaternion,
-    Target,
-)
+from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
 from companion.attitude.yaw import HeadingModel, TargetFrame, YawModel
 
 SHORTEST_SAMPLE, LONGEST_SAMPLE = 1e-4, 0.2  # s
@@ -50,8 +45,7 @@ class ModelFollowingPlanner:
     the time when they take effect. ArduPilot takes the rates along the axes of its attitude target
     instead; `TargetFrame` gives the rotation into these.
 
-    Beyond the recovery angle the planner sends the rates of `first-order`. When the tilt is below
-    it again, a new plan begins.
+    Beyond the recovery angle the rates are those of `first-order`; a new plan begins below it.
 
     Args:
         constants: gains and limits.
@@ -235,11 +229,7 @@ class ModelFollowingPlanner:
         still = 0.5 * (still_before + still_after)
         self._frame.advance(yaw, still, dt)
         self._append_plan(x, y, still * dt, dt)
-        return (
-            self._roll.command(dt, heading),
-            self._pitch.command(dt, heading),
-            yaw,
-        )
+        return self._roll.command(dt, heading), self._pitch.command(dt, heading), yaw
 
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
         """Append the plan of `dt` seconds later.

@@ -17,8 +17,7 @@ from companion.safety.actions import Exit, FlightEnded, internal
 
 AskLanding = Callable[[], Coroutine[Any, Any, bool]]
 
-_WATCH_PERIOD = 0.02
-_TELL_PERIOD = 1.0
+_WATCH_PERIOD, _TELL_PERIOD = 0.02, 1.0
 _ATTEMPTS = 5
 """Number of times the checks run, when another vehicle may have come meanwhile."""
 
@@ -65,7 +64,7 @@ class Flight:
         """Fly; returns "ok" or the reason why the flight ended early."""
         helpers = [
             asyncio.create_task(self._guarded(work))
-            for work in (self._context.guidance_loop.run, self._judge, self._report_progress)
+            for work in (self._context.guidance_loop.run, self._watch_over, self._report_progress)
         ]
         try:
             await self._fly_all()
@@ -115,23 +114,17 @@ class Flight:
 
     def on_heartbeat(self) -> None:
         """Judge a new HEARTBEAT at once."""
-        self._judge_message(self._watch.judge)
+        self._judge(self._watch.judge)
 
     def on_current_mode(self) -> None:
         """Judge a new CURRENT_MODE at once."""
-        self._judge_message(self._watch.on_current_mode)
+        self._judge(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
         """Record an event and show it."""
         time = self._clock() - self.began
         self.events.append((time, text))
         self._observer.event(time, text)
-
-    def _judge_message(self, judge: Callable[[Phase], None]) -> None:
-        try:
-            judge(self.phase)
-        except FlightEnded as ended:
-            self.end(ended)
 
     async def _fly_all(self) -> None:
         """Run all phases; start again if another vehicle may have replaced the checked one.
@@ -150,6 +143,10 @@ class Flight:
                 self._context.link.state.forget()
                 self._context.same_vehicle.begin()
                 self._end = self._new_end()
+            except FlightEnded:
+                raise
+            except Exception as error:  # of the plan: the vehicle must not be left to nobody
+                raise FlightEnded(internal(error)) from error
             else:
                 return
         raise FlightEnded(f"the vehicle changed {_ATTEMPTS} times before it was armed")
@@ -159,7 +156,7 @@ class Flight:
         self.phase, self._entered = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
         if not self._end.done():
-            self._judge_once(phase)  # before the phase commands anything
+            self._judge(self._watch.judge)  # before the phase commands anything
         if not self._end.done():
             await self._race(phase.work(self._context), phase.timeout)
         if self._end.done():
@@ -229,14 +226,14 @@ class Flight:
         except Exception as error:
             self.fail(error)
 
-    async def _judge(self) -> None:
+    async def _watch_over(self) -> None:
         while True:
-            self._judge_once(self.phase)
+            self._judge(self._watch.judge)
             await asyncio.sleep(_WATCH_PERIOD)
 
-    def _judge_once(self, phase: Phase) -> None:
+    def _judge(self, judge: Callable[[Phase], None]) -> None:
         try:
-            self._watch.judge(phase)
+            judge(self.phase)
         except FlightEnded as ended:
             self.end(ended)
         except Exception as error:  # the watch goes on, because an exit needs it, too

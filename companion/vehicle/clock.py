@@ -24,8 +24,7 @@ from companion.vehicle.clock_jumps import (
 _SETTLES_FOR = 2.0
 """Time after the first sample in which queued samples may make the offset wrong, s."""
 _CERTAINLY_BACK = 0.5
-"""A TIMESYNC time behind the newest stamp by more than this, s, means that the clock went back. If
-it is behind by less, the clock stood still, as TIMESYNC lags the stamps a little."""
+"""A TIMESYNC time further behind the newest stamp than this, s, means that the clock went back."""
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _UNKNOWN_AFTER = 3.0
@@ -64,8 +63,7 @@ class VehicleClock:
         self._quickest = self._newest = -inf
         self._received = self._late = 0.0
         self._misfits = MisfitRun()
-        self._told_unknown = False
-        self._told_outlier = False
+        self._told_unknown = self._told_outlier = False
 
     @property
     def age_known(self) -> bool:
