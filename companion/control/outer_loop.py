@@ -45,7 +45,8 @@ _LOCKSTEP_DEADLINE = 1.0
 _USUAL_RATE_LOOP = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _QUICK, _SLOW = 0.065, 0.08
-"""Range of dead time plus half the lag over which the hold changes from stiff to normal, s."""
+"""Range over which the hold changes from stiff to normal: dead time, plus half the lag, plus half
+the time in which the rate loop slews to the largest roll-pitch rate, s."""
 _POSITION_TIME = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
@@ -77,11 +78,19 @@ def hold_weights(config: Config) -> Weights:
 
 
 def _rate_loop_quickness(config: Config) -> float:
-    """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop."""
+    """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop.
+
+    A rate loop that slews slowly is late in large motions only: a stiff hold would swing on after
+    them for good, as on the ArduPilot mock at 200 °/s.
+    """
     if not config.vehicle.known:
         return 0.0
     lag, dead_time = slower_tilt(config)
-    return min(max(0.0, (_SLOW - dead_time - 0.5 * lag) / (_SLOW - _QUICK)), 1.0)
+    limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
+    slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
+    slewing = config.limits.max_tilt_rate / min(slews) if slews else 0.0
+    late = dead_time + 0.5 * lag + 0.5 * slewing
+    return min(max(0.0, (_SLOW - late) / (_SLOW - _QUICK)), 1.0)
 
 
 def _position_pull(config: Config) -> float:

@@ -8,6 +8,7 @@ import pytest
 
 import companion
 from companion.config import trajectory_file
+from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.guidance import Pose
 from companion.guidance.follow import HeldFigure
@@ -184,6 +185,29 @@ def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(
     assert reason in events
     assert state["mode"] in ("LOITER", "BRAKE")
     assert (state["armed"], state["crashed"]) == (True, False)
+
+
+@BOTH
+def test_after_a_hard_line_the_hold_comes_to_rest(autopilot):
+    """ArduPilot's slewing rate loop made a stiffer hold swing by 0.8 m/s for good."""
+    path = CONFIGS / f"mock-{autopilot}.yaml"
+    quick = {"limits": {"max_tilt_deg": 45.0, "max_tilt_rate_deg_s": 200.0}}
+    quick["safety"] = {"max_body_rate_deg_s": 700.0}
+    mock, speeds = MockVehicle(config=path), []
+
+    async def main():
+        async with connect(changed(load(path), quick, "test"), mock) as vehicle:
+            await vehicle.take_off()
+            north, east, down = vehicle.state.position_ned
+            place = north + 4.0, east, down - 2.0
+            await vehicle.go_to(place, speed=8.0, acceleration=6.0, jerk=20.0)
+            await vehicle.hold(5.0)
+            for _ in range(20):
+                await vehicle.hold(0.1)
+                speeds.append(hypot(*mock.state()["velocity"][:2]))
+
+    run(mock, main())
+    assert max(speeds) < 0.15
 
 
 def test_a_pilot_who_takes_over_ends_the_program_at_once(tmp_path):
