@@ -58,7 +58,8 @@ class GuidanceConfig(Section):
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
     makes a stiffer hold. The gains follow from it (LQR). null: k/T⁴. k = 2 where dead time + lag/2
-    of the rate loop is at most 65 ms, 1 from 80 ms on or where unknown, between them in between.
+    + s/2 is at most 65 ms, 1 from 80 ms on or where unknown, between them in between. s is the time
+    in which the rate loop slews to limits.max_tilt_rate_deg_s; 0 without a known slew limit.
     T is the delay of the attitude behind its target plus half a guidance period. That delay
     follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s."""
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
