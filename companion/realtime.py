@@ -85,7 +85,7 @@ def asked_for(wishes: Wishes) -> Iterator[tuple[Grant, ...]]:
     """
     grants: list[Grant] = []
     with ExitStack() as undo:
-        for name, asked, take in _steps(wishes):
+        for name, asked, take in _requested_settings(wishes):
             try:
                 undo.callback(take())
                 grants.append(Grant(name, asked))
@@ -101,7 +101,7 @@ _Undo = Callable[[], object]
 _Take = Callable[[], _Undo]
 
 
-def _steps(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
+def _requested_settings(wishes: Wishes) -> Iterator[tuple[str, str, _Take]]:
     """For each requested setting: its key, the setting in words, and a function that applies it."""
     priority, processors = wishes.fifo_priority, wishes.processors
     if processors:

@@ -115,5 +115,5 @@ def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
 
 def test_the_priority_is_taken_last():
     """Else what takes long (the collection before the freeze) would be done at that priority."""
-    taken = [name for name, *_ in realtime._steps(Wishes(1, (0,), True, True))]
+    taken = [name for name, *_ in realtime._requested_settings(Wishes(1, (0,), True, True))]
     assert taken[-1] == "scheduler"

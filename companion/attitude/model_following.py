@@ -16,8 +16,8 @@ from companion.attitude.limits import Constants
 from companion.attitude.rate_response import RateResponse, feedback_gain
 from companion.attitude.reference_model import ReferenceModel, model_lag
 from companion.attitude.representation import (
-    admissible,
     is_unit,
+    limited_target,
     normalised,
     plausible_rates,
     wrap_angle,
@@ -153,7 +153,7 @@ class ModelFollowingPlanner:
         """
         constants = self._constants
         w, x, y, z = q = normalised(q)
-        target = admissible(target, constants.longest_target)
+        target = limited_target(target, constants.longest_target)
         square, ax, ay = tilt_products(w, x, y, z)
         cosine = 2.0 * square - 1.0
         plausible = plausible_rates(body_rates)

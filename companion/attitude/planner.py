@@ -11,7 +11,7 @@ from companion.attitude.first_order import first_order
 from companion.attitude.limits import Constants, Limits, make_constants
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.attitude.rate_response import AxisResponse, RateResponse
-from companion.attitude.representation import admissible, normalised
+from companion.attitude.representation import limited_target, normalised
 from companion.attitude.types import BodyRates, Quaternion, Target
 
 Law = Callable[[Quaternion, Target, float, Constants], tuple[float, float, float]]
@@ -51,13 +51,13 @@ class LawPlanner:
         constants: gains and limits of the law.
     """
 
-    __slots__ = ("_admissible", "_last_target", "constants", "law")
+    __slots__ = ("_last_target", "_limited_target", "constants", "law")
 
     def __init__(self, law: Law, constants: Constants) -> None:
         self.law = law
         self.constants = constants
         self._last_target: Target | None = None
-        self._admissible = Target(0.0, 0.0, 0.0)
+        self._limited_target = Target(0.0, 0.0, 0.0)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -69,9 +69,9 @@ class LawPlanner:
             InvalidTargetError: a value of `target` is not finite.
         """
         if target is not self._last_target:  # one target serves many samples; a tuple cannot change
-            self._admissible = admissible(target, self.constants.longest_target)
+            self._limited_target = limited_target(target, self.constants.longest_target)
             self._last_target = target if isinstance(target, tuple) else None
-        rates = self.law(normalised(q), self._admissible, dt, self.constants)
+        rates = self.law(normalised(q), self._limited_target, dt, self.constants)
         return _make_body_rates(BodyRates, rates)
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:

@@ -103,7 +103,7 @@ LARGEST_HEADING_RATE = 1e9
 """Largest heading rate of a target, rad/s; with more, the rates to send might not be finite."""
 
 
-def admissible(target: Target, longest: float) -> Target:
+def limited_target(target: Target, longest: float) -> Target:
     """`target` with its coefficients shortened to `longest` and its heading wrapped to (−π, π].
 
     Raises:

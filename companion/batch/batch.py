@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from companion.attitude.kinematics import tilt_products
 from companion.attitude.planner import LAW_NAMES, LawPlanner
-from companion.batch.checks import admissible_targets, as_rows, compiled_check, unit_quaternions
+from companion.batch.checks import as_rows, compiled_check, limited_targets, unit_quaternions
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
 from companion.extras import require
 
@@ -48,25 +48,25 @@ def rates(
     dt: float,
     compiled: bool | None = None,
 ) -> Array:
-    """Body rates of many vehicles, each as `planner.rates` gives them.
+    """Body rates of many vehicles: for each vehicle the result of `planner.rates`.
 
     Args:
-        planner: its law and constants are used.
+        planner: gives the law and its constants.
         q: (4, n) attitudes w, x, y, z, body → world.
-        targets: (4, n) north, east, heading in rad, heading rate in rad/s.
+        targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s.
-        compiled: True for numba, False for Python; None decides by `COMPILE_FROM`.
+        compiled: True: numba. False: Python. None: numba from `COMPILE_FROM` steps on.
 
     Returns:
-        (3, n) roll, pitch, yaw in rad/s, body FRD. Compiled rates differ from those in Python by
-        about 1e-15, with `exact` by an angle of 1e-15 rad per sample.
+        (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about
+        1e-15 rad/s; with the law `exact`, the angles of one sample (rate · dt) by 1e-15 rad.
 
     Raises:
         InvalidQuaternionError: an attitude is not a unit quaternion.
         InvalidTargetError: a value of a target is not finite.
         MissingExtraError: `compiled` is True and numba is not installed.
-        TypeError: the planner has a memory; a batch maps laws only.
-        ValueError: the shapes do not fit.
+        TypeError: the planner keeps state between samples; a batch needs one without memory.
+        ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
     q, targets, loops = _prepared(planner, q, targets, 1, compiled)
     out = np.empty((3, q.shape[1]))
@@ -82,9 +82,9 @@ def advance(
     steps: int,
     compiled: bool | None = None,
 ) -> Array:
-    """Attitudes (4, n) after `steps` samples, the body rates held over each (`rotation.turned`).
+    """Attitudes (4, n) after `steps` samples, each with constant body rates (`rotation.turned`).
 
-    Arguments and errors are those of `rates`; a negative `steps` is a ValueError.
+    Arguments and errors are those of `rates`; a negative `steps` raises ValueError.
     """
     q, targets, loops = _prepared(planner, q, targets, steps, compiled)
     after = _advanced(loops, planner, q, targets, dt, steps)
@@ -102,7 +102,7 @@ def simulate(
     steps: int,
     compiled: bool | None = None,
 ) -> History:
-    """As `advance`, but returns every attitude and body rate on the way."""
+    """As `advance`, but returns the attitudes and body rates of all samples."""
     q, targets, loops = _prepared(planner, q, targets, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
@@ -114,7 +114,9 @@ def simulate(
 
 
 def coefficients(q: ArrayLike) -> Array:
-    """Acceleration coefficients of many attitudes (equation 10), as of one in `companion.attitude`.
+    """Acceleration coefficients of many attitudes (equation 10).
+
+    `companion.attitude.coefficients` computes those of one attitude.
 
     Args:
         q: (..., 4, n) unit quaternions w, x, y, z, such as `History.q`; they are not checked.
@@ -151,7 +153,7 @@ def _prepared(
             return q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return unit_quaternions(q), admissible_targets(targets, longest), loops
+    return unit_quaternions(q), limited_targets(targets, longest), loops
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:

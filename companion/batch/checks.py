@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from companion.attitude.representation import (
     LARGEST_HEADING_RATE,
     NORM_TOLERANCE,
-    admissible,
+    limited_target,
     normalised,
 )
 from companion.attitude.types import InvalidQuaternionError, InvalidTargetError, Target
@@ -74,8 +74,8 @@ def unit_quaternions(q: Array) -> Array:
     return q / norm
 
 
-def admissible_targets(targets: Array, longest: float) -> Array:
-    """`targets` (4, n), each as `admissible` returns it.
+def limited_targets(targets: Array, longest: float) -> Array:
+    """`targets` (4, n), each as `limited_target` returns it.
 
     Targets within the limits are passed in bulk, the others are treated one by one.
 
@@ -89,7 +89,7 @@ def admissible_targets(targets: Array, longest: float) -> Array:
     admitted = targets.copy()
     for i in np.flatnonzero(~fit):
         try:
-            admitted[:, i] = admissible(Target(*targets[:, i].tolist()), longest)
+            admitted[:, i] = limited_target(Target(*targets[:, i].tolist()), longest)
         except InvalidTargetError as error:
             raise InvalidTargetError(f"vehicle {i}: {error}") from None
     return admitted

@@ -137,7 +137,10 @@ def _add_identify(commands: Commands) -> None:
         help="start the bundled vehicle and fly it; default: the mock-px4.yaml that ships",
     )
     which.add_argument(
-        "--log", type=Path, metavar="PATH", help="a flight's folder, or anybody's .tlog: no flight"
+        "--log",
+        type=Path,
+        metavar="PATH",
+        help="identify from a recorded flight's folder or any .tlog, without flying",
     )
     command.add_argument(
         "--out", type=Path, metavar="FILE", help="default: vehicle.yaml beside the flight's log"

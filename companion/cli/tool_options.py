@@ -61,7 +61,9 @@ def add_benches(commands: Commands) -> None:
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument("--seconds", type=number(0.001, 3600.0), default=5.0, help="of measuring (5)")
     step.set_defaults(run="tools.bench_planner")
-    flight = benches.add_parser("flight", help="whole flights in one process, times real time")
+    flight = benches.add_parser(
+        "flight", help="speed of whole flights in one process, as a multiple of real time"
+    )
     flight.add_argument(
         "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
     )

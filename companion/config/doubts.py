@@ -8,10 +8,10 @@ from companion.config.root import Config
 from companion.files.yaml_faults import other_unit
 
 _TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
-"""By the end of a key whose default is null: a value of the usual size."""
+"""Usual value of a key whose default is null, by the end of the key's name."""
 _FAR, _NEAR = 20.0, 5.0
-"""A value is doubted if it is so many times smaller than usual, and in the other unit it is within
-so many times of it."""
+"""A value is doubted if it is less than 1/_FAR of the usual value, but in the other unit more than
+1/_NEAR of it."""
 
 
 class Doubt(NamedTuple):
@@ -40,10 +40,9 @@ def doubts(config: Config) -> Iterator[Doubt]:
     if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
         yield Doubt(
             "vehicle.identified",
-            "the times of `vehicle` are not this vehicle's own, for no `companion identify` wrote "
-            "them",
-            "the response is less exact, and in the steps that docs/identify.md names still "
-            "straighter than with first-order",
+            "the times of `vehicle` were not measured on this vehicle",
+            "the response is less exact than after `companion identify`, but steps are still "
+            "straighter than with first-order in the cases of docs/identify.md",
             "run `companion identify` before raising planner.gain_per_s, and include its file",
         )
 

@@ -27,10 +27,10 @@ class PlannerConfig(Section):
     name: Annotated[
         str, Field(max_length=50, json_schema_extra={"enum": [AUTO, *PLANNER_NAMES]})
     ] = AUTO
-    """auto: model-following where `vehicle` tells how the rate loop answers, else first-order.
+    """auto: model-following if `vehicle` gives the response of the rate loop, else first-order.
     first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
-    error of discretisation. model-following: stays linear behind the vehicle's own rate loop,
-    needs `vehicle`. quaternion, so3, euler: what the paper compares with. Or a planner of another
+    discretisation error. model-following: stays linear behind the vehicle's own rate loop,
+    needs `vehicle`. quaternion, so3, euler: the paper's comparison laws. Or a planner of another
     package, by the name of its entry point in `companion.planners`."""
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
     """p: the acceleration approaches its target with time constant 1/p."""
@@ -57,10 +57,11 @@ class GuidanceConfig(Section):
     """Rate at which guidance computes a new target."""
     position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
-    makes a stiffer hold. The gains follow from it (LQR). null: 2/T⁴ where dead time and
-    half the lag are 65 ms at most, 1/T⁴ from 80 ms on or where they are not known; T is the
-    delay of the attitude by planner.gain_per_s, `vehicle` (0.12 s where it is not known) and
-    half a period of guidance."""
+    makes a stiffer hold. The gains follow from it (LQR). null: k/T⁴. k = 2 where dead time + lag/2
+    + s/2 is at most 65 ms, 1 from 80 ms on or where unknown, between them in between. s is the time
+    in which the rate loop slews to limits.max_tilt_rate_deg_s; 0 without a known slew limit.
+    T is the delay of the attitude behind its target plus half a guidance period. That delay
+    follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s."""
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
     """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
@@ -93,6 +94,6 @@ class GuidanceConfig(Section):
 
     @property
     def drag(self) -> Drag | None:
-        """The drag as far as it is told."""
+        """The configured drag, or None."""
         told = self.drag_per_s
         return None if told is None else Drag(told, self.quadratic_drag_per_m)

@@ -1,8 +1,8 @@
 """The safety ladder's section of the configuration: limits, and what each breach leads to.
 
-What a flight ends for whoever has the vehicle (pilot, failsafe, disarmed) and the deadman are not
-here: they cannot be changed. A breach that says that our control cannot be trusted cannot be made a
-mere warning either.
+Some actions cannot be changed and are not here: the deadman's, and the end of a flight when
+somebody else has the vehicle (pilot, failsafe) or it is disarmed. The action of a breach that means
+that our control cannot be trusted cannot be `warn`.
 """
 
 from typing import Annotated, Literal
@@ -33,11 +33,13 @@ class SafetyConfig(Section):
     fence_polygon_m: Annotated[
         tuple[tuple[Metres, Metres], ...], Field(max_length=MOST_CORNERS)
     ] = ()
-    """Fence polygon: corners [north, east] in metres from where control began."""
+    """Fence polygon: corners [north, east] in metres from where control began. Set fence_polygon_m
+    or fence_polygon_deg, not both; neither: no polygon."""
     fence_polygon_deg: Annotated[
         tuple[tuple[Latitude, Longitude], ...], Field(max_length=MOST_CORNERS)
     ] = ()
-    """Fence polygon: corners [latitude, longitude]. Give one of the two, or none."""
+    """Fence polygon: corners [latitude, longitude]. Set fence_polygon_m or fence_polygon_deg, not
+    both; neither: no polygon."""
     braking_m_s2: Annotated[float, Field(ge=0.1, le=20.0)] = 2.5
     """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence."""
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3

@@ -32,13 +32,13 @@ FixedOrAlong = Literal["fixed", "along"]
 
 
 class HoverShape(Section):
-    """Stay where it begins."""
+    """Hover at the start."""
 
     duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
     """Duration."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         return Hover(self.duration_s)
 
 
@@ -46,7 +46,7 @@ class LineShape(Section):
     """A straight line with limited jerk, rest to rest."""
 
     to_m: Place
-    """The end: north, east, down of the start."""
+    """End point: north, east, down from the start."""
     speed_m_s: Speed
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
@@ -54,25 +54,25 @@ class LineShape(Section):
     jerk_m_s3: Annotated[float, Field(ge=0.01, le=1000.0)] = 10.0
     """Largest jerk."""
     heading: FixedOrAlong = "fixed"
-    """fixed: as it was at the start. along: facing along the path."""
+    """fixed: the heading at the start. along: facing along the path."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         along = self.heading == "along"
         return line(self.to_m, self.speed_m_s, self.acceleration_m_s2, self.jerk_m_s3, along)
 
 
 class _Rounds(Section):
-    """Keys of all figures that are flown in laps."""
+    """Keys of all shapes that are flown in laps."""
 
     laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
-    """How often round, gathering and losing speed included."""
+    """Number of laps, acceleration and braking included."""
     acceleration_m_s2: Acceleration = 3.0
-    """Largest along the path while speed is gathered or lost; too few laps take more."""
+    """Largest acceleration and braking along the path; exceeded if the laps are too few for it."""
     direction_deg: Degrees = 0.0
-    """Where the figure lies from the start, clockwise from north."""
+    """Direction from the start in which the figure lies, clockwise from north."""
     heading: FixedOrAlong = "fixed"
-    """fixed: as it was at the start. along: facing along the path."""
+    """fixed: the heading at the start. along: facing along the path."""
 
     def _laps(self, speed: float) -> Laps:
         along = self.heading == "along"
@@ -84,12 +84,12 @@ class CircleShape(_Rounds):
     """A circle, anticlockwise from above; it begins and ends where the vehicle is."""
 
     radius_m: Metres
-    """Radius; the centre lies in direction_deg of the start."""
+    """Radius; the centre lies from the start in the direction direction_deg."""
     speed_m_s: Speed
-    """Speed along it, once gathered."""
+    """Speed along the path after acceleration."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         return circle(self.radius_m, self._laps(self.speed_m_s))
 
 
@@ -97,10 +97,10 @@ class HelixShape(CircleShape):
     """A circle that rises."""
 
     rise_m: Annotated[float, Field(ge=-1000.0, le=1000.0)]
-    """Upwards in each lap; negative sinks."""
+    """Climb in each lap; negative: descent."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         return helix(self.radius_m, self.rise_m, self._laps(self.speed_m_s))
 
 
@@ -108,32 +108,32 @@ class FigureEightShape(_Rounds):
     """A figure-eight about the start, its long side along direction_deg."""
 
     half_width_m: Metres
-    """From the middle to a tip."""
+    """Distance from the middle to a tip."""
     peak_speed_m_s: Speed
     """Speed at the fastest place: gerono, in the middle; bernoulli, at the tips."""
     shape: Literal["gerono", "bernoulli"] = "gerono"
     """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
-    φ runs steadily."""
+    φ increases at a constant rate."""
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         eight = gerono_eight if self.shape == "gerono" else bernoulli_eight
         return eight(self.half_width_m, self._laps(self.peak_speed_m_s))
 
 
 class WaypointsShape(Section):
-    """Through points without a stop, by minimum snap."""
+    """A minimum-snap trajectory through waypoints, without stops."""
 
     points_m: Annotated[tuple[Place, ...], Field(min_length=1, max_length=1000)]
-    """north, east, down of the start; the start itself is not among them."""
+    """Waypoints: north, east, down from the start; without the start itself."""
     speed_m_s: Speed
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
-    """Largest acceleration. The path is made as fast as this and the speed allow."""
+    """Largest acceleration. The path is flown as fast as this and speed_m_s allow."""
     heading: FixedOrAlong = "fixed"
-    """fixed: as it was at the start. along: facing along the path."""
+    """fixed: the heading at the start. along: facing along the path."""
     headings_deg: tuple[Degrees | None, ...] | None = None
-    """Instead of `heading`: at each point, clockwise from north; null where it does not matter."""
+    """Instead of `heading`: heading at each point, clockwise from north; null: any heading."""
 
     @model_validator(mode="after")
     def _one_heading(self) -> "WaypointsShape":
@@ -142,7 +142,7 @@ class WaypointsShape(Section):
         return self
 
     def trajectory(self, folder: Path) -> Trajectory:
-        """What it describes."""
+        """The trajectory of this shape."""
         headings = [None if h is None else radians(h) for h in self.headings_deg or ()]
         along = self.heading == "along"
         return waypoints(self.points_m, self.speed_m_s, self.acceleration_m_s2, along, headings)

@@ -166,7 +166,7 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The target, and the downward acceleration (m/s²) that the answer's thrust has at its tilt.
+    """The answer's target, and the downward acceleration (m/s²) of its thrust at its own tilt.
 
     `HoverThrust` converts this acceleration to the thrust at the present tilt.
     """

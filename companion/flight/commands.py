@@ -112,7 +112,9 @@ async def change_mode(context: FlightContext, command: Command, ours: Ours, done
             return True
         if state.mode_received > accepted + _ENTERED:
             raise FlightEnded(
-                f"the mode was accepted and left again, not by us: {state.mode}", Exit.RELEASE
+                "the autopilot accepted the mode but left it again without our command: "
+                f"{state.mode}",
+                Exit.RELEASE,
             )
         return False
 

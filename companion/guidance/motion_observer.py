@@ -86,8 +86,7 @@ class MotionObserver:
     def turn(self, angle: float) -> None:
         """Rotate the disturbance by `angle` (rad), a jump of the estimated heading.
 
-        The vehicle itself did not turn, and must keep the tilt with which it resists the
-        disturbance.
+        The vehicle itself did not turn, so it must keep the tilt that balances the disturbance.
         """
         self.disturbance = rotated(*self.disturbance, angle)
 
@@ -175,7 +174,11 @@ class SlopeHistory:
         return (n1 - n0) / (end - start), (e1 - e0) / (end - start)
 
     def _integral(self, time: float) -> Horizontal:
-        """The integral of the slope until `time`, linear between and beyond the attitudes."""
+        """The integral of the slope from the start of the history to `time`.
+
+        Between attitudes it is interpolated linearly; before the first and after the last it is
+        extrapolated linearly.
+        """
         times, sums = self._times, self._sums
         if time >= times[-1]:
             after = time - times[-1]

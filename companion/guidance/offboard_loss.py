@@ -18,7 +18,7 @@ _STEPS = 20
 _FEEDBACK_RATE = 0.15
 """Largest part of the rates that is feedback on a smooth path, rad/s (mock vehicles: 0.1)."""
 _FAILSAFE_DELAY = 0.1
-"""Time by which the failsafe begins later than its parameter says, s (PX4: 0.06 to 0.11)."""
+"""Delay of the failsafe beyond the time in its parameter, s (PX4: 0.06 to 0.11)."""
 _LEVELLING_RATE = 3.0
 """Rate at which the autopilot levels the vehicle, rad/s (PX4's limit: 3.8)."""
 _VERTICAL_BRAKING = 4.0
@@ -62,13 +62,13 @@ class LossFailsafe(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Where the vehicle can stop, relative to where the setpoints ended; m.
+    """Where the vehicle can stop, relative to its position when the setpoints ended; m.
 
     Attributes:
-        place: Where it stops if the last rates contain no feedback, (north, east).
-        spread: How far from `place` it can stop, in any direction.
-        up: How far it can climb.
-        down: How far it can fall.
+        place: Point (north, east) where it stops if the last rates contain no feedback.
+        spread: Radius around `place` within which it stops if they contain feedback.
+        up: Largest climb.
+        down: Largest fall.
     """
 
     place: tuple[float, float]
@@ -83,7 +83,7 @@ class Reach(NamedTuple):
 
 
 class _HeldResult(NamedTuple):
-    """The vehicle when the autopilot ceases to hold the rates.
+    """The vehicle when the autopilot stops holding the rates.
 
     Attributes:
         way: Displacement without feedback, m NED.

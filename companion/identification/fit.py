@@ -28,10 +28,11 @@ LAGS = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMPS = (0.03, 0.06, 0.12, 0.25)
-"""First tried slew limits, each as the time (s) of the largest change of command at the limit."""
+"""Slew limits from which the search starts. Each is given as the time (s) that the largest change
+of command takes at that limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
-"""Starts of the search with a slew limit, as shares of lag and dead time found without one."""
+"""Shares of the lag and dead time found without a slew limit; the search with one starts there."""
 _CLEARLY = 0.6
 """A model with more unknowns is accepted if its sum of squares is below this share of the other."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)

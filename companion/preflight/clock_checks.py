@@ -24,7 +24,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 Key.AGE,
                 INEFFECTIVE,
                 "TIMESYNC counts another clock than time_boot_ms",
-                "how old a sample is when it comes cannot be known",
+                "the age of a sample on arrival is unknown",
                 "let the autopilot itself answer TIMESYNC, not a router between",
                 "TIMESYNC",
             )

@@ -85,9 +85,9 @@ def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
             yield Finding(
                 Key.ACCEPT,
                 INEFFECTIVE,
-                f"flight.accept names {name!r}, which no check is called",
-                "it excepts nothing",
-                "name it as `companion doctor` does, or take it out",
+                f"flight.accept names {name!r}, but no check has that name",
+                "this entry has no effect",
+                "use a name that `companion doctor --json` prints, or remove it",
                 "flight.accept",
             )
 

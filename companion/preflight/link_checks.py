@@ -49,7 +49,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
             )
         elif trouble is not None:
             found, fix = trouble
-            because = "what hangs on it works late or not at all"
+            because = "whatever depends on it is delayed or does not work"
             yield Finding(
                 f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
             )
@@ -98,7 +98,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         Key.LOSS,
         result,
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
-        "so are as many of our setpoints, and the pilot's mode is told late" if bad else "",
+        "our setpoints are lost, too, and we see the pilot's mode changes late" if bad else "",
         "ask for lower rates, or use a faster or better link" if bad else "",
         "gaps in the running numbers",
     )
@@ -107,7 +107,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.DAMAGE,
             INEFFECTIVE,
             f"{link.damaged} damaged messages in {evidence.window:g} s",
-            "they are refused, and so lost",
+            "they are rejected, and so lost",
             "check the wiring, its ground and the baud rate",
             "checksums",
         )
@@ -116,7 +116,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.NOT_FINITE,
             INEFFECTIVE,
             f"{link.not_finite} messages with a number that is NaN or infinite",
-            "they are refused, and so lost",
+            "they are rejected, and so lost",
             "let the estimator settle; if it goes on, do not fly",
             "decoded messages",
         )
@@ -125,7 +125,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.RECONNECTS,
             UNSAFE,
             f"the connection dropped {link.reconnects} times in {evidence.window:g} s",
-            "so it will in flight",
+            "it will drop in flight, too",
             "check plugs, cables and power",
             "the operating system",
         )
@@ -140,8 +140,8 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.ROUND_TRIP,
             INEFFECTIVE,
             "the autopilot does not answer TIMESYNC",
-            "how old a sample is when it comes cannot be known",
-            "a router between may hold it back",
+            "the age of a sample on arrival is unknown",
+            "check whether a router on the way blocks it",
             "TIMESYNC",
         )
     elif round_trip > stale:
@@ -165,7 +165,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.JITTER,
             INEFFECTIVE if uneven else SAFE,
             f"the round trip varies by {1e3 * jitter:.1f} ms",
-            "the planner reckons with one dead time" if uneven else "",
+            "the planner assumes a constant dead time" if uneven else "",
             "find what holds the messages up: a router, Wi-Fi, a busy computer" if uneven else "",
             "TIMESYNC",
         )
@@ -217,8 +217,8 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.SECOND_COMPANION,
             INEFFECTIVE,
             f"another companion computer is there, {system}/{component}",
-            "should it send commands or setpoints, two steer one vehicle",
-            "see that it only listens",
+            "if it sends commands or setpoints, two programs steer one vehicle",
+            "make sure that it only listens",
             "HEARTBEAT of type onboard controller",
         )
     steering = sorted(others.steering)

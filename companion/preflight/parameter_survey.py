@@ -15,11 +15,11 @@ take 30 ms."""
 
 
 class RetryPolicy(NamedTuple):
-    """How long one parameter is requested.
+    """How often and at which interval one parameter is requested.
 
     Attributes:
         timeout_s: Time until a request is repeated, s.
-        tries: Number of requests under each of its names.
+        tries: Number of requests for each of the parameter's names.
     """
 
     timeout_s: float
@@ -29,8 +29,8 @@ class RetryPolicy(NamedTuple):
 _AT_FIRST = RetryPolicy(0.5, 3)
 """Older PX4 does not answer for a parameter that it lacks: each of those costs 1.5 s."""
 _ONCE_MORE = RetryPolicy(0.75, 6)
-"""Where one frame in five is lost either way, three questions of a hundred get no answer to the
-first three and these six would leave one of ten thousand."""
+"""If each direction loses one frame in five, 5 % of the parameters get no answer to the first three
+requests, and 0.01 % get none after these six more."""
 
 
 class Survey(NamedTuple):
@@ -39,8 +39,8 @@ class Survey(NamedTuple):
     Attributes:
         values: Values by newest name.
         names: This autopilot's own name of each, by newest name.
-        untold: Newest names of those without any answer, neither a value nor an error.
-        lossy: Whether the link lost frames meanwhile, the vehicle's or ours.
+        untold: Newest names of parameters that got no answer, neither a value nor an error.
+        lossy: Whether the link lost frames during the survey, in either direction.
     """
 
     values: Values
@@ -112,7 +112,11 @@ class _Questions:
 
     @property
     def lossy(self) -> bool:
-        """Whether the vehicle's frames were lost, or ours: only a repeated request was answered."""
+        """Whether frames were lost since the start, in either direction.
+
+        Gaps in sequence numbers show lost frames of the vehicle. An answer to a repeated request
+        shows that the earlier request or its answer was lost.
+        """
         stats = self._link.stats
         lost = share_lost(stats.frames - self._frames, stats.lost - self._lost)
         return self._repeated or lost > SOME_LOST

@@ -59,11 +59,14 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     if result is CheckResult.NOT_CONNECTED:
         return Text("not connected: nothing was judged", style="bold red")
     if forbidden:
-        mendable = sum(finding.change is not None for finding in forbidden)
-        fix = f"; `companion doctor --fix` mends {mendable} of them" if mendable else ""
+        fixable = sum(finding.change is not None for finding in forbidden)
+        fix = f"; `companion doctor --fix` fixes {fixable} of them" if fixable else ""
         return Text(f"{len(forbidden)} unsafe: `companion fly` refuses{fix}", style="bold red")
     if result is CheckResult.NOT_READY:
-        return Text("not ready: ask again once it is, for not all was judged", style="bold yellow")
+        return Text(
+            "not ready: run again when it is ready; some checks could not be made",
+            style="bold yellow",
+        )
     if amiss:
         return Text(f"{amiss} unsafe, each excepted by flight.accept", style="bold yellow")
     return Text("nothing unsafe was found", style="bold green")
@@ -74,7 +77,7 @@ def outcome_line(outcome: Outcome) -> str:
     change = outcome.change
     if outcome.refusal:
         return f"not set: {outcome.refusal}"
-    later = "; it counts once the autopilot was started anew" if change.reboot else ""
+    later = "; takes effect after the autopilot reboots" if change.reboot else ""
     return f"{change.parameter}: {change.old:g} → {change.new:g}, read back{later}"
 
 

@@ -226,9 +226,9 @@ def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.VERSION,
             INEFFECTIVE,
-            f"{name} does not tell its version",
+            f"{name} does not report its version",
             "which behaviour to expect is unknown",
-            "a newer version tells it",
+            "update the autopilot's firmware: newer versions report theirs",
             "AUTOPILOT_VERSION",
         )
     elif not identity.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET:

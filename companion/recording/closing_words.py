@@ -51,13 +51,13 @@ def closing_words(figures: Figures, called: Invocation | None) -> ClosingWords:
         called: None: what comes next is said elsewhere.
     """
     flown, good = figures["result"] == "ok", is_good(figures)
-    headline, lines = _judged(figures) if flown else _ended_early(figures)
+    headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
     return ClosingWords(
         headline, tuple(lines), None if called is None else _next(figures, called), good, flown
     )
 
 
-def _judged(figures: Figures) -> tuple[str, list[str]]:
+def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     judged, advice = checks(figures), list(figures["advice"])
     beyond = [check for check in judged if not check.good]
     names = _enumerated([maneuver["name"] for maneuver in figures["maneuvers"]])

@@ -57,7 +57,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(float(np.hypot(*run.target.T).max()) for run in runs),
-        cross_axis_max=max(_from_line(step) for run in runs for step in run.steps()),
+        cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(_distance(run, first_order(run, 1.0 / gain)) for run in runs),
         second_order=second_order,
         second_order_deviation_max=max(_distance(run, second_order.path(run)) for run in runs),
@@ -80,7 +80,7 @@ def _distance(run: StepRun, model: Floats) -> float:
     return float(np.hypot(*(run.measured - model).T).max())
 
 
-def _from_line(step: StepRun) -> float:
+def _largest_deviation(step: StepRun) -> float:
     """Largest distance of a step from the straight line to its target.
 
     The line begins at the attitude when the target changed, which in wind is not level.

@@ -87,7 +87,7 @@ class SecondOrderFit:
         It starts as the measurement does, and keeps that speed until the first target has effect.
         """
         model = SecondOrderReference(self.frequency, self.damping)
-        time, steps, state = run.time[::thinning], run.steps(), _start(run)
+        time, steps, state = run.time[::thinning], run.steps(), _initial_state(run)
         effects = [float(step.time[0]) + self.dead_time for step in steps]
         out: Floats = state[0] + np.outer(time - run.time[0], state[1])
         state = np.array([state[0] + self.dead_time * state[1], state[1]])
@@ -127,7 +127,7 @@ def _fit(unknown: Floats) -> SecondOrderFit:
     return SecondOrderFit(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))
 
 
-def _start(run: StepRun) -> Floats:
+def _initial_state(run: StepRun) -> Floats:
     """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     since = run.time - run.time[0]
     early = since <= _UNANSWERED

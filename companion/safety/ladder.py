@@ -13,7 +13,7 @@ class Verdict(NamedTuple):
 
     Attributes:
         action: HOLD, or one that ends the flight.
-        reason: the breach in words.
+        reason: description of the breach.
         mutes: see `Monitor`.
     """
 
@@ -34,7 +34,7 @@ class SafetyLadder:
 
     Attributes:
         note: called with a message when an alarm is raised or over.
-        breaches: name of the monitor of each breach so far, by the breach in words.
+        breaches: dict from the description of each breach so far to its monitor's name.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:

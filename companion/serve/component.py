@@ -52,14 +52,14 @@ class Component:
 
     def tell(self, text: str, severity: int = NOTICE) -> None:
         """Tell everybody what a pilot must know: all clients, and who listens to the autopilot."""
-        if self._is_new(None, text):
+        if self._not_sent_lately(None, text):
             for piece in self._pieces(text, severity):
                 self._network.send(self._frame(piece))
                 self._to_vehicle(piece)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
         """Tell one client, for example why it is refused."""
-        if self._is_new(client, text):
+        if self._not_sent_lately(client, text):
             for piece in self._pieces(text, severity):
                 self._network.send_to(client, self._frame(piece))
 
@@ -92,7 +92,7 @@ class Component:
         if frame.message_id in _COMMANDS and isinstance(client, Client):
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own)
 
-    def _is_new(self, client: Client | None, text: str) -> bool:
+    def _not_sent_lately(self, client: Client | None, text: str) -> bool:
         now = self._loop.time()
         self._told = {who: at for who, at in self._told.items() if now - at < _SAME_TEXT}
         if (client, text) in self._told:

@@ -1,8 +1,8 @@
 """The effective rate of the setpoints, from how long the vehicle holds each of them."""
 
 _UNEVEN = 2.0
-"""Uneven intervals are tolerated until setpoints are held, on average, as long as at half the rate
-with even intervals. Beyond that the effective rate is lower than the mean rate."""
+"""Largest ratio of the time-weighted mean interval Σg²/Σg to the mean interval at which the
+effective rate still is the mean rate; with a larger ratio it is lower."""
 
 
 class HeldRates:
@@ -32,8 +32,8 @@ class HeldRates:
     def rate_since(self, before: "HeldRates") -> float | None:
         """Effective rate since `before`, Hz; None if there was no interval since then.
 
-        It is the number of setpoints per second, but for intervals g at most 2·Σg/Σg², so that
-        setpoints in bursts do not hide the pauses between the bursts.
+        It is the number of intervals per second, but at most 2·Σg/Σg², summed over the intervals g.
+        Long intervals dominate Σg², so pauses between bursts of setpoints lower the rate.
         """
         intervals = self.intervals - before.intervals
         seconds, squares = self.seconds - before.seconds, self.squares - before.squares

@@ -7,11 +7,14 @@ from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6
-"""Recorded time to a position estimate good enough to arm in GUIDED; the others scale with it."""
+"""Recorded time after boot until the position estimate allows arming in GUIDED, s. The other times
+are scaled with it."""
 INITIALISED_S = 2.4
+"""Time after boot, s, from which commands are accepted."""
 ORIGIN_S = 20.0
+"""Time after boot, s, from which the estimator has an origin."""
 HOME_S = 23.5
-"""From now on the pre-arm checks pass in modes that need no position."""
+"""Time after boot, s, from which the pre-arm checks pass in modes that need no position."""
 RUNTIME_PERIOD_US = 30_000_000
 """Period at which STAT_RUNTIME is saved and sent."""
 

@@ -18,7 +18,7 @@ from companion.attitude import (
     make_planner,
 )
 from companion.attitude.limits import make_constants
-from companion.attitude.representation import admissible
+from companion.attitude.representation import limited_target
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 Q = attitude(Coefficients(0.3, -0.2), 1.0)
@@ -186,9 +186,9 @@ def test_a_heading_whole_turns_away_is_the_same_heading(name):
     st.floats(-1e6, 1e6),
     st.floats(0.01, 0.99),
 )
-def test_an_admissible_target_keeps_its_direction_and_meaning(north, east, heading, longest):
+def test_a_limited_target_keeps_its_direction_and_meaning(north, east, heading, longest):
     target = Target(north, east, heading, 0.3)
-    north_then, east_then, heading_then, rate = admissible(target, longest)
+    north_then, east_then, heading_then, rate = limited_target(target, longest)
     scale = longest / max(math.hypot(north, east), longest)
     assert (north_then, east_then) == pytest.approx((scale * north, scale * east), abs=1e-12)
     assert -math.pi < heading_then <= math.pi
@@ -196,9 +196,9 @@ def test_an_admissible_target_keeps_its_direction_and_meaning(north, east, headi
     assert rate == 0.3
 
 
-def test_a_target_that_is_admissible_is_not_made_anew():
+def test_a_target_within_its_limits_is_returned_as_it_is():
     target = Target(0.3, -0.2, math.pi, 0.1)
-    assert admissible(target, 0.5) is target
+    assert limited_target(target, 0.5) is target
 
 
 def test_level_and_on_target_nothing_is_asked():

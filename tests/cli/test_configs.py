@@ -30,7 +30,7 @@ def test_a_shipped_configuration_is_right_and_short(path, capsys):
     assert end == f"{path}: ok"
     doubts = [line for line in told if line.startswith("look again: ")]
     assert len(doubts) == (0 if "mock" in path.stem else 1)
-    assert all("are not this vehicle's own" in line for line in doubts)
+    assert all("were not measured on this vehicle" in line for line in doubts)
     assert len(path.read_text().splitlines()) <= 40
 
 

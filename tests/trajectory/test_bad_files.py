@@ -16,7 +16,7 @@ from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.yaml_file import ConfigError
 from companion.guidance.trajectory import Envelope, csv_file, curves, slow_down, violations
 from companion.guidance.trajectory.csv_file import table
-from companion.guidance.trajectory.curves import MOST_LOOKS
+from companion.guidance.trajectory.curves import MOST_CHECKS
 from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
 from companion.guidance.trajectory.sample import TrajectoryError
 
@@ -225,10 +225,10 @@ def test_the_edges_of_what_is_permitted_are_judged_without_a_warning(tmp_path, t
 
 
 def test_the_longest_table_that_may_be_fitted_can_be_judged(monkeypatch):
-    """What `cutoff_hz` allows takes no more looks than there may be, in motion at its ends, too."""
-    assert fitted._MOST_PIECES * fitted._LOOKS < 0.95 * MOST_LOOKS
+    """What `cutoff_hz` allows takes no more than MOST_CHECKS, in motion at its ends, too."""
+    assert fitted._MOST_PIECES * fitted._CHECKS_PER_PIECE < 0.95 * MOST_CHECKS
     monkeypatch.setattr(fitted, "_MOST_PIECES", 100)
-    monkeypatch.setattr(curves, "MOST_LOOKS", 100 * fitted._LOOKS + 3 * 256)
+    monkeypatch.setattr(curves, "MOST_CHECKS", 100 * fitted._CHECKS_PER_PIECE + 3 * 256)
     moving = [f"{0.01 * k},{0.02 * k},0,0" for k in range(1000)]
     trajectory = from_samples(table(["t,x,y,z", *moving], "given"), SampleOptions())
-    assert len(trajectory.check_times()) >= 100 * fitted._LOOKS
+    assert len(trajectory.check_times()) >= 100 * fitted._CHECKS_PER_PIECE

@@ -23,7 +23,7 @@ from companion.guidance.trajectory import (
     waypoints,
 )
 from companion.guidance.trajectory.csv_file import Table
-from companion.guidance.trajectory.curves import MOST_LOOKS, PATH_STEP
+from companion.guidance.trajectory.curves import MOST_CHECKS, PATH_STEP
 from companion.guidance.trajectory.demand import demand, sampled
 from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
 from tests.trajectory.finite_differences import evenly
@@ -134,7 +134,7 @@ def test_the_looks_are_bounded_whatever_is_flown():
         waypoints([(float(k % 7), float(k), -1.0) for k in range(1, 1001)], 5.0, 3.0),
     ]
     for trajectory in worst:
-        assert len(trajectory.check_times()) <= MOST_LOOKS + 20_000, trajectory.name
+        assert len(trajectory.check_times()) <= MOST_CHECKS + 20_000, trajectory.name
 
 
 def test_waypoints_that_would_last_for_days_are_refused_before_they_are_looked_at():

@@ -19,7 +19,7 @@ class CurvePoint(NamedTuple):
     third: Vector
 
 
-class Looks(NamedTuple):
+class PhaseSampling(NamedTuple):
     """Phases at which to check a curve, so that no extreme between two of them is missed.
 
     Attributes:
@@ -36,28 +36,28 @@ class Looks(NamedTuple):
 PATH_STEP = 0.25
 """Longest path between two checks, m."""
 
-MOST_LOOKS = 80_000
+MOST_CHECKS = 80_000
 """Most checks of one trajectory, about a second of work."""
 
-_LOOKS_A_LAP = 720
-"""An extreme of the k-th harmonic is then missed by 0.001 k² % at most."""
+_CHECKS_PER_LAP = 720
+"""With so many, an extreme of the k-th harmonic is missed by at most 0.001 k² %."""
 
 
-def require_looks(needed: float) -> None:
+def require_checkable(needed: float) -> None:
     """Check that a trajectory can be checked with a bounded number of samples.
 
     Raises:
-        TrajectoryError: it takes more than MOST_LOOKS.
+        TrajectoryError: it takes more than MOST_CHECKS.
     """
-    if not needed <= MOST_LOOKS:
+    if not needed <= MOST_CHECKS:
         raise TrajectoryError(
-            f"it is too long to be checked: it takes {needed:.3g} samples, and {MOST_LOOKS} are "
+            f"it is too long to be checked: it takes {needed:.3g} samples, and {MOST_CHECKS} are "
             "the most; make it shorter, or let it gather speed more quickly"
         )
 
 
-def _looks_of(figure: "Figure") -> Looks:
-    return Looks(min(tau / _LOOKS_A_LAP, PATH_STEP / figure.steepest), tau)
+def _sampling_of(figure: "Figure") -> PhaseSampling:
+    return PhaseSampling(min(tau / _CHECKS_PER_LAP, PATH_STEP / figure.steepest), tau)
 
 
 class Curve(Protocol):
@@ -67,7 +67,7 @@ class Curve(Protocol):
         """The point at `phase`."""
         ...
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """The phases at which to check it."""
         ...
 
@@ -91,9 +91,9 @@ class Straight:
 
     direction: Vector
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """Checks at equal distances."""
-        return Looks(PATH_STEP)
+        return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
         """The point `phase` metres along."""
@@ -119,9 +119,9 @@ class Helix:
         """Length of the first derivative, m per rad; constant."""
         return hypot(self.radius, self.rise / tau)
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """Checks of one lap; all laps are alike."""
-        return _looks_of(self)
+        return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
@@ -145,9 +145,9 @@ class GeronoEight:
         """Largest length of the first derivative, m per rad: in the middle."""
         return sqrt(2.0) * self.half_width
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """Checks of one lap; all laps are alike."""
-        return _looks_of(self)
+        return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
@@ -174,9 +174,9 @@ class BernoulliEight:
         """Largest length of the first derivative, m per rad: at the tips."""
         return self.half_width
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """Checks of one lap; all laps are alike."""
-        return _looks_of(self)
+        return _sampling_of(self)
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
@@ -205,9 +205,9 @@ class Turned:
         """`steepest` of the figure."""
         return self.figure.steepest
 
-    def looks(self) -> Looks:
+    def sampling(self) -> PhaseSampling:
         """Checks of the figure."""
-        return self.figure.looks()
+        return self.figure.sampling()
 
     def at(self, phase: float) -> CurvePoint:
         """The turned point."""

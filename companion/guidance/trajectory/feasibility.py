@@ -27,9 +27,9 @@ class Violation(NamedTuple):
         limit: the key of the configuration that sets it.
         begins: when it is first broken, s.
         time: when it is broken most, s.
-        text: all of this in words.
+        text: the message for the user.
         remedy: what to do about it, as the end of a sentence.
-        slowing_helps: whether the limit is kept if the trajectory is flown slowly enough.
+        slowing_helps: whether the trajectory keeps the limit if it is flown slowly enough.
     """
 
     limit: str
@@ -75,15 +75,15 @@ class Envelope:
 
 
 class _Need(NamedTuple):
-    """What a motion needs of one limited quantity.
+    """One limited quantity over a motion, and its limit.
 
     Attributes:
-        limit: its key.
-        allowed: None for no limit.
-        needed: (m,), in the unit of `allowed`.
-        shown_in: how many units shown make one of these.
-        what: the shown unit and the quantity.
-        least: whether the limit is a lower one.
+        limit: key of the limit in the configuration.
+        allowed: the limit in SI units; None: no limit.
+        needed: (m,), the quantity at each time, in the unit of `allowed`.
+        what: unit and quantity as messages show them after the number, such as "° of tilt".
+        shown_in: factor from the unit of `allowed` to the unit in messages.
+        least: whether the limit is a lower limit.
     """
 
     limit: str
@@ -101,9 +101,9 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
 
 
 def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
-    """By how much each limit is exceeded, (m,) as a share of it, negative where it is kept.
+    """Excess over each limit at each time, (m,), as a share of it; negative where it is kept.
 
-    The fence is not among them: it is checked for a motion as a whole.
+    The fence is missing here: it is checked for a motion as a whole.
     """
     return {
         need.limit: _excess(need) / max(abs(need.allowed), _ROUNDING) - _ROUNDING
@@ -127,7 +127,7 @@ def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
 
 
 def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
-    """What the motion needs of everything that the envelope limits."""
+    """All quantities that an envelope can limit, over this motion."""
     e, climb = envelope, -motion.velocity[:, 2]
     rotors = demand(motion, e.drag, e.gravity)
     turn = np.abs(motion.heading_rate)
@@ -145,7 +145,7 @@ def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
 
 
 def _excess(need: _Need) -> Floats:
-    """(m,) in the unit of the limit."""
+    """(m,), excess over the limit in its unit; negative where it is kept."""
     allowed = need.allowed or 0.0
     return allowed - need.needed if need.least else need.needed - allowed
 

@@ -10,7 +10,7 @@ from companion.guidance.trajectory.csv_file import Table
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats, SepticSpline
 from companion.guidance.trajectory.spline_curve import (
-    HEADING_LOOKS,
+    HEADING_CHECK_STEP,
     SplineCurve,
     heading_spline,
     smoothed,
@@ -27,7 +27,7 @@ from companion.guidance.trajectory.timed_curve import (
 _AT_REST = 0.1
 """Samples that begin or end slower than this count as at rest there, m/s."""
 
-_LOOKS = 16
+_CHECKS_PER_PIECE = 16
 """Checks of each piece of the spline; two pieces are one period of the cutoff."""
 
 _MOST_PIECES = 4500
@@ -140,8 +140,8 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     ]
     law = Cruise(spline.end, 1.0, gathering, losing)
     heading = _heading(spline, table, options, resting)
-    step = inf if isinstance(heading, HeldHeading) else HEADING_LOOKS
-    return TimedCurve(name, SplineCurve(spline, _LOOKS, step), law, heading)
+    step = inf if isinstance(heading, HeldHeading) else HEADING_CHECK_STEP
+    return TimedCurve(name, SplineCurve(spline, _CHECKS_PER_PIECE, step), law, heading)
 
 
 def _require_short(table: Table, cutoff: float) -> None:

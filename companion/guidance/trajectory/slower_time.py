@@ -1,4 +1,4 @@
-"""A slower time law: by how much each moment of a trajectory is stretched, smoothly."""
+"""A slower time law: stretches the time of a trajectory by a factor that changes smoothly."""
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
@@ -11,14 +11,14 @@ from companion.guidance.trajectory.time_laws import Progress
 
 _NEWTON_STEPS = 20
 _NEAR = 1e-14
-"""Share of a piece within which a time is found."""
+"""Precision with which a time is found, as a share of a piece."""
 
 Number = Any
 """A number, or an array of them."""
 
 
 class _Piece(NamedTuple):
-    """One piece of the spline as a polynomial in u, 0..1: a + b·u + c·u² + d·u³."""
+    """One piece of the slowness w as a polynomial in u, 0..1: a + b·u + c·u² + d·u³."""
 
     a: Number
     b: Number
@@ -26,19 +26,19 @@ class _Piece(NamedTuple):
     d: Number
 
     def factor(self, u: Number) -> Number:
-        """The slowness there."""
+        """The slowness w at u: by which factor time is stretched."""
         return self.a + u * (self.b + u * (self.c + u * self.d))
 
     def slope(self, u: Number) -> Number:
-        """Its derivative by u."""
+        """dw/du."""
         return self.b + u * (2.0 * self.c + u * 3.0 * self.d)
 
     def bend(self, u: Number) -> Number:
-        """Its second derivative by u."""
+        """d²w/du²."""
         return 2.0 * self.c + 6.0 * self.d * u
 
     def area(self, u: Number) -> Number:
-        """Its integral from 0 to u."""
+        """∫ w du from 0 to u: the stretched time, in widths of a piece."""
         return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
 
 
@@ -54,14 +54,15 @@ def _piece(p: Number, q: Number, r: Number, s: Number) -> _Piece:
 
 @dataclass(frozen=True)
 class SlowerTime:
-    """The time σ of a trajectory over ours, t: dt/dσ = w(σ), a uniform cubic B-spline.
+    """The original time σ of a trajectory over the stretched time t: dt/dσ = w(σ).
 
-    Its second derivative is continuous, and so is the jerk of the trajectory that it slows down. It
-    lies between its smallest and its largest coefficient, piece by piece.
+    The slowness w is a uniform cubic B-spline. Its second derivative is continuous, and so is the
+    jerk of the trajectory that it slows down. In each piece, w lies between the smallest and the
+    largest of the piece's four coefficients.
 
     Attributes:
-        length: duration of the trajectory as it was, s.
-        coefficients: of w, three more than pieces; all alike stretch time evenly.
+        length: duration of the original trajectory, s.
+        coefficients: of w, three more than pieces; equal ones stretch time evenly.
     """
 
     length: float
@@ -79,16 +80,16 @@ class SlowerTime:
 
     @property
     def _width(self) -> float:
-        """Of a piece, s of the trajectory."""
+        """Original time of one piece, s."""
         return self.length / (len(self.coefficients) - 3)
 
     @property
     def duration(self) -> float:
-        """How long the trajectory lasts now, s."""
+        """Duration of the slowed trajectory, s."""
         return self._ends[-1]
 
     def at(self, time: float) -> Progress:
-        """The trajectory's time at ours, and its derivatives; at its ends beyond them."""
+        """Original time at the stretched `time`, and its derivatives; limited to the duration."""
         if time <= 0.0:
             return self._progress(_piece(*self.coefficients[:4]), 0.0, 0.0)
         last = len(self.coefficients) - 4
@@ -106,7 +107,7 @@ class SlowerTime:
         return self._progress(piece, u, which)
 
     def of(self, moments: Floats) -> tuple[Floats, Progress]:
-        """Our times (m,) at moments (m,) of the trajectory, and the progress there, (m,) each."""
+        """Stretched times (m,) at original times (m,), and the progress there, (m,) each."""
         count = len(self.coefficients) - 3
         which = np.clip((moments / self._width).astype(int), 0, count - 1)
         c = np.array(self.coefficients)

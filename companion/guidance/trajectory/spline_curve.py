@@ -4,7 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.guidance.trajectory.curves import PATH_STEP, CurvePoint, Looks, require_looks
+from companion.guidance.trajectory.curves import (
+    PATH_STEP,
+    CurvePoint,
+    PhaseSampling,
+    require_checkable,
+)
 from companion.guidance.trajectory.minimum_snap import Fixed, Observations, minimum_snap
 from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
@@ -12,7 +17,7 @@ from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpl
 _HEADING_CUTOFF = 2.0
 """Cutoff frequency of the heading along a spline, Hz: no vehicle follows a faster one."""
 
-HEADING_LOOKS = 1.0 / (32.0 * _HEADING_CUTOFF)
+HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
 """Longest time between two checks of such a heading, s."""
 
 _HEADING_STEP = 0.01
@@ -31,29 +36,30 @@ class SplineCurve:
 
     Attributes:
         spline: three times continuously differentiable.
-        looks_a_piece: at least; between them its extremes are missed by less than 0.3 %.
-        looks_step: largest phase between two of them, where a heading changes more quickly.
+        checks_per_piece: fewest checks in each piece; an extreme between two is missed by less than
+            0.3 %.
+        longest_step: largest phase between two checks; a heading may need a short one.
     """
 
     spline: SepticSpline
-    looks_a_piece: int = 64
-    looks_step: float = np.inf
+    checks_per_piece: int = 64
+    longest_step: float = np.inf
 
-    def looks(self) -> Looks:
-        """The pieces evenly divided, the long ones and the fast ones more finely."""
+    def sampling(self) -> PhaseSampling:
+        """Evenly spaced checks in each piece, more in long and in fast pieces."""
         knots = self.spline.knots
         spans = np.diff(knots)
         evenly = np.linspace(0.0, 1.0, 17)
         velocity = self.spline.along((knots[:-1, None] + spans[:, None] * evenly).ravel())[:, :, 1]
         fastest = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
-        counts = np.ceil(np.maximum(spans * fastest * 1.05 / PATH_STEP, spans / self.looks_step))
-        counts = np.maximum(counts, self.looks_a_piece)
-        require_looks(float(counts.sum()))
+        counts = np.ceil(np.maximum(spans * fastest * 1.05 / PATH_STEP, spans / self.longest_step))
+        counts = np.maximum(counts, self.checks_per_piece)
+        require_checkable(float(counts.sum()))
         grids = [
             np.linspace(begin, end, int(count), endpoint=False)
             for begin, end, count in zip(knots[:-1], knots[1:], counts, strict=True)
         ]
-        return Looks(None, phases=tuple(np.concatenate((*grids, knots[-1:])).tolist()))
+        return PhaseSampling(None, phases=tuple(np.concatenate((*grids, knots[-1:])).tolist()))
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the spline's time `phase`."""
@@ -82,18 +88,18 @@ def smoothed(
     derivatives: tuple[Floats, ...] = (),
     resting: tuple[bool, bool] = (False, False),
 ) -> SepticSpline:
-    """The spline from the first sample to the last and near to the others, without rapid changes.
+    """A smoothing spline through the first and last sample: a low-pass filter without delay.
 
-    It minimises ∫ (missed)² + ∫ snap²/ω⁸ dt with ω = 2π·cutoff, whose answer to a steady
-    oscillation is 1/(1 + (f/cutoff)⁸), without delay: at half the cutoff 0.4 % are missing, at a
-    quarter 0.0015 %.
+    It minimises ∫ residual² dt + ∫ snap²/ω⁸ dt with ω = 2π·cutoff; the residual is sample minus
+    spline. Its frequency response, without `derivatives`, is 1/(1 + (f/cutoff)⁸): it attenuates an
+    oscillation at half the cutoff by 0.4 %, at a quarter of it by 0.0015 %.
 
     Args:
         times: (m,), increasing, s.
         values: (m, n).
         cutoff: Hz.
-        derivatives: the first, second … derivatives, each (m, n), as far as they are known.
-        resting: whether it is at rest at the first sample, and at the last.
+        derivatives: the first, second … derivatives of the samples, each (m, n), if known.
+        resting: whether the spline is at rest at the first sample, and at the last.
     """
     omega = 2.0 * np.pi * cutoff
     knots = np.linspace(
@@ -113,12 +119,12 @@ def smoothed(
 
 
 def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) -> SplineHeading:
-    """Near to headings in rad at times in s, (m,) each."""
+    """Smoothing spline of headings in rad at times in s, (m,) each."""
     return SplineHeading(smoothed(times, headings[:, None], _HEADING_CUTOFF, resting=resting))
 
 
 def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineHeading:
-    """Along a spline of north, east and down; where it is slow, from the one heading to the next.
+    """Heading along a spline of north, east and down, interpolated where the spline is slow.
 
     Args:
         spline: of the positions, m.

@@ -1,9 +1,9 @@
 """A curve with a time law along it, and the times at which to check it against limits.
 
-Where the time law is steady, a figure is gone round the same way in each lap: the first lap and the
-last one tell of all (a helix rises steadily, so it is highest and lowest in them). The ramps are
-looked at whole. Two looks are so near in phase and in way that an extreme between them is missed by
-less than 0.3 % of it; `tests/trajectory/test_check_times.py` holds them against a finer grid.
+Where the rate of the time law is constant, all laps of a figure are alike, so only the first and
+the last one are checked (a helix is lowest and highest in them). The ramps are checked completely.
+Two checks are so close in phase and path length that an extreme between them is missed by less than
+0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
 """
 
 from bisect import bisect_left, bisect_right
@@ -14,34 +14,34 @@ from typing import Protocol
 
 import numpy as np
 
-from companion.guidance.trajectory.curves import Curve, CurvePoint, Looks, require_looks
+from companion.guidance.trajectory.curves import Curve, CurvePoint, PhaseSampling, require_checkable
 from companion.guidance.trajectory.sample import LONGEST, Sample, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
-_LOOKS_A_PIECE = 256
-"""Fewest check times in each smooth part of a time law whose rate changes."""
+_CHECKS_PER_PIECE = 256
+"""Fewest checks in each smooth part of a time law whose rate changes."""
 
 _TABLE = 2048
 """Rows of the table that finds the time of a phase; it need not be exact."""
 
 
-def check_times(looks: Looks, law: TimeLaw, longest: float = LONGEST) -> list[float]:
+def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST) -> list[float]:
     """Times at which to check a curve with a time law, ascending, s.
 
     Raises:
-        TrajectoryError: it lasts longer than `longest` seconds, or takes more than MOST_LOOKS.
+        TrajectoryError: it lasts longer than `longest` seconds, or takes more than MOST_CHECKS.
     """
     require_duration(law.duration, longest)
     parts = [
         part
         for piece in law.pieces()
         if piece.end > piece.begin
-        for part in _told_apart(piece, looks, law)
+        for part in _checked_parts(piece, sampling, law)
     ]
     phases = [(law.at(part.begin).phase, law.at(part.end).phase) for part in parts]
-    require_looks(sum(_count(looks, *span) for span in phases))
-    grids = [_times(part, looks, law, span) for part, span in zip(parts, phases, strict=True)]
+    require_checkable(sum(_count(sampling, *span) for span in phases))
+    grids = [_times(part, sampling, law, span) for part, span in zip(parts, phases, strict=True)]
     times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *grids))).tolist()
     return times
 
@@ -56,10 +56,10 @@ def require_duration(seconds: float, longest: float = LONGEST) -> None:
         raise TrajectoryError(f"it lasts {seconds:.4g} s, and {longest:.0f} s is the longest")
 
 
-def _told_apart(piece: Piece, looks: Looks, law: TimeLaw) -> Iterator[Piece]:
-    """The piece, or its first lap and its last one if it is steady and has more."""
-    if piece.steady and looks.period is not None:
-        lap = looks.period / law.at(piece.begin).first
+def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
+    """The piece; if it is steady and longer than two laps, its first and its last lap."""
+    if piece.steady and sampling.period is not None:
+        lap = sampling.period / law.at(piece.begin).first
         if piece.end - piece.begin > 2.0 * lap:
             yield Piece(piece.begin, piece.begin + lap, True)
             yield Piece(piece.end - lap, piece.end, True)
@@ -67,27 +67,29 @@ def _told_apart(piece: Piece, looks: Looks, law: TimeLaw) -> Iterator[Piece]:
     yield piece
 
 
-def _count(looks: Looks, begin: float, end: float) -> float:
-    if looks.step is None:
-        return bisect_right(looks.phases, end) - bisect_left(looks.phases, begin)
-    return (end - begin) / looks.step + _LOOKS_A_PIECE
+def _count(sampling: PhaseSampling, begin: float, end: float) -> float:
+    if sampling.step is None:
+        return bisect_right(sampling.phases, end) - bisect_left(sampling.phases, begin)
+    return (end - begin) / sampling.step + _CHECKS_PER_PIECE
 
 
-def _times(piece: Piece, looks: Looks, law: TimeLaw, span: tuple[float, float]) -> Floats:
-    """The times of the looks in a piece, both ends among them."""
+def _times(
+    piece: Piece, sampling: PhaseSampling, law: TimeLaw, span: tuple[float, float]
+) -> Floats:
+    """The times of the checks in a piece, both ends included."""
     begin, end = span
-    if looks.step is None:
-        phases = np.array(looks.phases)
+    if sampling.step is None:
+        phases = np.array(sampling.phases)
         phases = phases[(phases >= begin) & (phases <= end)]
     else:
-        phases = np.linspace(begin, end, int(np.ceil((end - begin) / looks.step)) + 1)
+        phases = np.linspace(begin, end, int(np.ceil((end - begin) / sampling.step)) + 1)
     if piece.steady:
         rate = law.at(piece.begin).first
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
     table = np.linspace(piece.begin, piece.end, _TABLE)
     reached = np.array([law.at(time).phase for time in table.tolist()])
-    evenly = np.linspace(piece.begin, piece.end, _LOOKS_A_PIECE + 1)
+    evenly = np.linspace(piece.begin, piece.end, _CHECKS_PER_PIECE + 1)
     # The jerk may jump at the end, and belongs to the next part there.
     before = np.nextafter(piece.end, piece.begin)
     return np.concatenate((evenly, [before], np.interp(phases, reached, table)))
@@ -174,7 +176,7 @@ class TimedCurve:
         Raises:
             TrajectoryError: it is too long to be checked.
         """
-        return check_times(self.curve.looks(), self.law, self.longest)
+        return check_times(self.curve.sampling(), self.law, self.longest)
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""

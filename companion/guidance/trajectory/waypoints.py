@@ -9,7 +9,7 @@ from companion.guidance.trajectory.minimum_snap import Fixed, minimum_snap
 from companion.guidance.trajectory.sample import LEAST_WAY, TrajectoryError, Vector
 from companion.guidance.trajectory.septic_spline import ORDER, Floats, SepticSpline
 from companion.guidance.trajectory.spline_curve import (
-    HEADING_LOOKS,
+    HEADING_CHECK_STEP,
     SplineCurve,
     SplineHeading,
     tangent_heading,
@@ -22,7 +22,7 @@ from companion.guidance.trajectory.timed_curve import (
     require_duration,
 )
 
-_LOOKS = 200
+_SAMPLES_PER_SEGMENT = 200
 """Samples of each segment, to find its largest speed and acceleration."""
 
 
@@ -69,7 +69,7 @@ def waypoints(
     heading: Heading = HeldHeading()
     curve = SplineCurve(spline)
     if along:
-        curve = SplineCurve(spline, looks_step=HEADING_LOOKS)
+        curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):
         heading = _given_headings(knots, headings)
@@ -111,7 +111,7 @@ def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: fl
 
     Stretching the knots stretches the minimum-snap spline, without changing its form.
     """
-    fine = np.linspace(0.0, knots.size - 1.0, _LOOKS * (knots.size - 1) + 1)
+    fine = np.linspace(0.0, knots.size - 1.0, _SAMPLES_PER_SEGMENT * (knots.size - 1) + 1)
     times = np.interp(fine, np.arange(knots.size), knots)
     motion = spline.along(times)
     fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)

@@ -1,4 +1,4 @@
-"""One client's channel: the frames that wait for it, and the frames that come from it."""
+"""One client's channel: the queue of frames to it, and the scanner of frames from it."""
 
 import ipaddress
 from abc import ABC, abstractmethod
@@ -12,7 +12,7 @@ from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.stats import LinkStats
 
 _MOST_WAITING = 32_768
-"""Largest number of bytes that wait for one client."""
+"""Largest number of bytes queued for one client."""
 
 
 @dataclass
@@ -22,7 +22,7 @@ class ClientStats:
     Attributes:
         received: intact, from the client.
         sent: handed to the kernel.
-        dropped: not sent, because the client or its line is too slow.
+        dropped: not sent, because the client or its connection is too slow.
     """
 
     received: int = 0
@@ -31,7 +31,7 @@ class ClientStats:
 
 
 class Clients(Protocol):
-    """Takes what the endpoints of clients find."""
+    """Receives the events of all clients from their endpoints."""
 
     def attach(self, client: "Client") -> None:
         """A client has connected."""
@@ -44,13 +44,13 @@ class Clients(Protocol):
 
 
 class Client(ABC):
-    """A client's channel. Frames wait until `flush`; none is ever cut, late ones are dropped.
+    """A client's channel. It queues frames until `flush`; it drops late frames, but never cuts one.
 
     Args:
         name: what the user calls it.
         host: IP address of the client, or None.
         device: its serial device, or None.
-        streaming: whether a frame may go on in the next bytes.
+        streaming: whether a frame may continue in the next bytes.
 
     Attributes:
         name, host, device: as given.
@@ -74,7 +74,7 @@ class Client(ABC):
         return self.host is not None and ipaddress.ip_address(self.host).is_loopback
 
     def put(self, frame: bytes) -> None:
-        """Queue one frame; drop it if too many bytes wait."""
+        """Queue one frame; drop it if the queue is full."""
         if self._bytes + len(frame) > _MOST_WAITING:
             self.stats.dropped += 1
             return
@@ -88,19 +88,19 @@ class Client(ABC):
         return frames
 
     def flush(self) -> None:
-        """Send what waits, as far as it can leave now; never block."""
+        """Send as many queued frames as possible now, without blocking."""
         if self._waiting:
             self._flush()
 
     @abstractmethod
     def _flush(self) -> None:
-        """As `flush`; something waits."""
+        """Send queued frames without blocking; called only if some are queued."""
 
     def _take(self, most: int) -> tuple[bytes, int]:
-        """Remove waiting frames, whole ones, at least one.
+        """Remove whole frames from the queue, at least one.
 
         Args:
-            most: bytes of all together, if they are several.
+            most: largest total number of bytes, if there are several frames.
 
         Returns:
             The bytes, and the number of frames in them.
@@ -114,26 +114,26 @@ class Client(ABC):
         return b"".join(taken), len(taken)
 
     def _drop_waiting(self) -> None:
-        """Drop all that waits."""
+        """Drop all queued frames."""
         self.stats.dropped += len(self._waiting)
         self._waiting.clear()
         self._bytes = 0
 
 
 class Flood:
-    """Tells when a client sends faster than any program has reason to."""
+    """Detects a client that sends faster than any program has reason to."""
 
     WINDOW = 0.02
-    """Reading pauses until the end of such a window, s."""
+    """Length of the window in which frames are counted, s; reading pauses until its end."""
     _MOST = 64
-    """Frames or datagrams in one window."""
+    """Largest number of frames or datagrams in one window."""
 
     def __init__(self) -> None:
         self._began = 0.0
         self._count = 0
 
     def count(self, number: int, now: float) -> bool:
-        """Count what came at `now`, s; whether reading must pause."""
+        """Count `number` frames received at `now`, s; return whether reading must pause."""
         if now - self._began > self.WINDOW:
             self._began, self._count = now, 0
         self._count += number

@@ -46,7 +46,7 @@ class Approach:
         by_velocity: whether only the velocity must become zero, wherever that is.
 
     Raises:
-        UnplannableError: there is none.
+        UnplannableError: there is no such motion.
     """
 
     def __init__(
@@ -69,12 +69,18 @@ class Approach:
         try:
             result = Ruckig(axes).calculate(given, self._trajectory)
         except (RuntimeError, ValueError) as refusal:  # of a Result that its enumeration lacks
-            raise UnplannableError(f"no motion from {error}: {refusal}") from refusal
+            raise _unplannable(refusal) from refusal
         if int(result) < 0:
-            raise UnplannableError(f"no motion from {error}: {result}")
+            raise _unplannable(result)
 
     def at(self, time: float) -> State:
         """The error at a time, s; past the end it stays as it ended."""
         elapsed = max(0.0, time - self._begins)
         position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
         return State(tuple(position), tuple(velocity), tuple(acceleration))
+
+
+def _unplannable(solver: object) -> UnplannableError:
+    return UnplannableError(
+        f"no motion within the limits leads to this setpoint (solver: {solver})"
+    )
