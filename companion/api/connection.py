@@ -69,9 +69,15 @@ async def flying(
     """As `connect`, with a configuration as it is; without a folder nothing is recorded."""
     program = Program()
     session = Session(config, folder, observer or Silent(), _decline, program, environment)
+    program.interrupt = session.interrupt
     flight = asyncio.create_task(_fly(session, program))
     try:
-        vehicle = Vehicle(program, await program.connected)
+        try:
+            vehicle = Vehicle(program, await asyncio.shield(program.connected))
+        except asyncio.CancelledError:
+            if not session.interrupt("the program was cancelled"):
+                flight.cancel()
+            raise
         try:
             yield vehicle
         except BaseException as error:
@@ -97,7 +103,9 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
 
 async def _leave(vehicle: Vehicle, program: Program) -> None:
     """End the flight, even if the program is cancelled meanwhile."""
-    if not program.over:
+    if program.busy:
+        program.interrupt("the program ended before what it had asked for")
+    elif not program.over:
         await asyncio.shield(asyncio.create_task(vehicle.leave()))
 
 

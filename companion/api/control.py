@@ -81,7 +81,8 @@ class Control:
         self.follow(
             Reference(
                 self.state.position_ned,
-                acceleration_ned=acceleration_ned,
+                self.state.velocity_ned,  # its drag is compensated
+                acceleration_ned,
                 heading=self._heading(heading),
                 drifting=True,
                 holds_height=False,

@@ -43,6 +43,7 @@ class Program:
         connected: set with the context when the checks have passed.
         summary: of the flight, once it has ended.
         over: whether the last request is done, or the flight has ended without it.
+        interrupt: ends the flight by the exit of its phase, for a reason in words.
     """
 
     def __init__(self) -> None:
@@ -50,6 +51,7 @@ class Program:
         self.connected: asyncio.Future[FlightContext] = asyncio.get_running_loop().create_future()
         self.summary: Summary | None = None
         self.over = False
+        self.interrupt: Callable[[str], object] = lambda _: None
         self._waiting: deque[Request] = deque()
         self._running: Request | None = None
         self._wake = asyncio.Event()
@@ -84,15 +86,31 @@ class Program:
             phases: returns them for the flight's context.
             last: whether the flight ends with them.
 
+        Cancelling this ends the flight: a waiting request is dropped, a running one interrupted.
+
         Raises:
             FlightEnded: the flight ended before or meanwhile; the vehicle is handed back.
+            RuntimeError: an earlier request has not ended yet.
         """
         if self._ended is not None:
             raise self._ended
+        if self.busy:
+            raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = Request(phases, last)
         self._waiting.append(request)
         self._wake.set()
-        await request.done
+        try:
+            await request.done
+        except asyncio.CancelledError:
+            if request in self._waiting:
+                self._waiting.remove(request)
+            self.interrupt("the program cancelled what it had asked for")
+            raise
+
+    @property
+    def busy(self) -> bool:
+        """Whether a request waits or runs."""
+        return self._running is not None or bool(self._waiting)
 
     def end(self, reason: Exception) -> None:
         """Note that the flight has ended: raise `reason` where the program waits for it."""

@@ -1,11 +1,12 @@
 """A vehicle that a program flies: each call runs phases of the flight and waits for their end."""
 
 import asyncio
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar, TypeVarTuple
 
 from companion.api.control import Control
 from companion.api.program import Program
@@ -21,8 +22,12 @@ from companion.guidance.reference import Vector
 from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import Trajectory, line
 from companion.guidance.trajectory.timed_curve import FixedHeading
+from companion.mavlink.lockstep import LockstepEventLoop
 from companion.recording.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
+
+T = TypeVar("T")
+Arguments = TypeVarTuple("Arguments")
 
 _BEGINS_WITHIN = 1.0
 """Time allowed from control's beginning to the first command, s."""
@@ -58,7 +63,12 @@ class Vehicle:
         """Arm where `flight.arm` allows it (else wait for the pilot), climb, and take over.
 
         The height is `flight.takeoff_height_m`. The preflight checks run before each step.
+
+        Raises:
+            FlightEnded: it flies already (that ends nothing), or the flight has ended early.
         """
+        if self._context.loop.offboard_active or self._context.link.state.flying:
+            raise FlightEnded("the vehicle flies already", Exit.LEAVE)
         await self._program.request(
             lambda context: takeoff_phases(context.config.flight, context.link.autopilot)
         )
@@ -110,7 +120,7 @@ class Vehicle:
                 nothing was flown.
         """
         if isinstance(trajectory, Path | str):
-            trajectory = await asyncio.to_thread(trajectory_file.load, Path(trajectory))
+            trajectory = await beside_the_loop(trajectory_file.load, Path(trajectory))
         await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
@@ -156,10 +166,9 @@ class Vehicle:
 
     async def leave(self) -> None:
         """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
-        if self._context.loop.offboard_active:
-            await self.hand_back()
-        else:
-            await self._program.request(lambda _: (), last=True)
+        await self._program.request(
+            lambda context: (hand_back_phase(),) if context.loop.offboard_active else (), last=True
+        )
 
     async def _begun(self, source: CommandedSource, flown: asyncio.Task[None]) -> None:
         """Wait until guidance flies the source.
@@ -174,7 +183,7 @@ class Vehicle:
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._require_control()
-        self._require_followable(maneuver)
+        await beside_the_loop(self._require_followable, maneuver)
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
         await self._program.request(
@@ -197,3 +206,14 @@ class Vehicle:
         pose = self._context.guidance_loop.flown.pose
         assert pose is not None
         return pose
+
+
+async def beside_the_loop(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
+    """Call a slow function in a thread, so that samples are answered meanwhile.
+
+    In lockstep and in memory the vehicle waits for us, and a thread would only make the order of
+    things uncertain: there the function is called at once.
+    """
+    if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
+        return function(*arguments)
+    return await asyncio.to_thread(function, *arguments)

@@ -1,7 +1,7 @@
 """The guidance loop: a timer that makes a new command from the newest position."""
 
 from collections.abc import Callable
-from math import degrees
+from math import degrees, isfinite
 
 from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
@@ -14,14 +14,7 @@ from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
-from companion.guidance import (
-    GRAVITY,
-    GuidanceInput,
-    HoverThrust,
-    Pose,
-    Reference,
-    VehicleMotion,
-)
+from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
@@ -214,6 +207,8 @@ class GuidanceLoop:
         target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self.learning.limit_tilt(each, down) for each in (target, later))
+        if not all(map(isfinite, (*target, *later, down))):
+            return reference  # of another package's guidance: the command before grows stale
         self.estimate.vertical = GRAVITY - down if self._loop.offboard_active else GRAVITY
         self._loop.command = GuidanceCommand(
             target,

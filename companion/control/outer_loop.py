@@ -124,7 +124,10 @@ def make_guidance(config: Config) -> Guidance:
     settings, kind = linear_settings(config), config.guidance.kind
     if kind in GUIDANCE_NAMES:
         return LinearGuidance(settings)
-    made: Guidance = plugin(plugins.GUIDANCE, kind)(settings)
+    try:
+        made: Guidance = plugin(plugins.GUIDANCE, kind)(settings)
+    except TypeError as error:
+        raise ConfigError(f"guidance.kind {kind} cannot be made: {error}") from error
     return made
 
 

@@ -47,6 +47,8 @@ class Silent:
 class EventRecorder:
     """An observer that keeps the phases, writes phases and events down, and passes all on.
 
+    An observer that raises is told nothing more: it must not cost control of the vehicle.
+
     Attributes:
         phases: (when it began, s on our clock, name) of each phase.
         write: writes words down at the present time.
@@ -69,20 +71,27 @@ class EventRecorder:
         """Keep, write and pass on."""
         self.phases.append((self._clock(), name))
         self.write(f"phase: {name}")
-        self._observer.phase(name, waits_for)
+        self._tell(lambda observer: observer.phase(name, waits_for))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Pass on."""
-        self._observer.waiting(name, detail, elapsed, timeout)
+        self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
 
     def status(self, status: FlightStatus) -> None:
         """Pass on."""
-        self._observer.status(status)
+        self._tell(lambda observer: observer.status(status))
 
     def event(self, time: float, text: str) -> None:
         """Write and pass on."""
         self.write(text)
-        self._observer.event(time, text)
+        self._tell(lambda observer: observer.event(time, text))
+
+    def _tell(self, tell: Callable[[Observer], None]) -> None:
+        try:
+            tell(self._observer)
+        except Exception as error:
+            self._observer = Silent()
+            self.write(f"the observer of this flight failed and is told nothing more: {error!r}")
 
 
 class StateLogger:

@@ -1,9 +1,16 @@
 """Sources of references for guidance: maneuvers, or references given one by one."""
 
+from math import hypot
 from typing import Protocol
 
 from companion.guidance.maneuvers import ManeuverSequence
-from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
+from companion.guidance.reference import Pose, Reference, ReferenceAt, Vector, VehicleMotion
+
+_NO_JERK = (0.0, 0.0, 0.0)
+_SHORTEST = 0.01
+"""Shortest time over which references tell their jerk, s: half a period of guidance."""
+_LARGEST_JERK = 50.0
+"""A larger jerk between two references is a step, m/s³."""
 
 
 class Source(Protocol):
@@ -107,7 +114,9 @@ class CommandedSource:
         self._held: Reference | None = None
         self._newest: Reference | None = None
         self._given_at = 0.0
-        self._jerk = (0.0, 0.0, 0.0)
+        self._jerk = _NO_JERK
+        self._base: Reference | None = None
+        self._base_at = 0.0
         self._ended = False
         self._failure: str | None = None
 
@@ -126,20 +135,24 @@ class CommandedSource:
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
                 the difference to the reference before; 0 for the first.
         """
-        before, since = self._newest, now - self._given_at
         self._require_fresh(now)
-        if jerk_ned is not None:
-            self._jerk = jerk_ned
-        elif before is None or since <= 0.0:
-            self._jerk = (0.0, 0.0, 0.0)
-        else:
-            old, new = before.acceleration_ned, reference.acceleration_ned
-            self._jerk = (
-                (new[0] - old[0]) / since,
-                (new[1] - old[1]) / since,
-                (new[2] - old[2]) / since,
-            )
+        self._jerk = self._difference(reference, now) if jerk_ned is None else jerk_ned
         self._newest, self._given_at = reference, now
+
+    def _difference(self, reference: Reference, now: float) -> Vector:
+        """Jerk from an earlier reference to this one, m/s³; 0 where it cannot be told.
+
+        Two references within a moment do not tell it, so it is told over `_SHORTEST` at least.
+        """
+        before, since = self._base, now - self._base_at
+        if before is not None and since < _SHORTEST:
+            return self._jerk if _kind(before) == _kind(reference) else _NO_JERK
+        self._base, self._base_at = reference, now
+        if before is None or _kind(before) != _kind(reference):
+            return _NO_JERK
+        old, new = before.acceleration_ned, reference.acceleration_ned
+        jerk = (new[0] - old[0]) / since, (new[1] - old[1]) / since, (new[2] - old[2]) / since
+        return jerk if hypot(*jerk) <= _LARGEST_JERK else _NO_JERK
 
     def end(self) -> None:
         """Note that no more references will come."""
@@ -181,6 +194,11 @@ class CommandedSource:
     def finished(self, now: float) -> bool:
         """Whether `end` was called."""
         return self._ended
+
+
+def _kind(reference: Reference) -> tuple[bool, bool, bool]:
+    """What is commanded: the acceleration of another kind of reference means something else."""
+    return reference.closed_loop, reference.drifting, reference.holds_height
 
 
 def continued(

@@ -17,6 +17,7 @@ from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
 from companion.serve.network.routing import Channel, Routing
+from companion.serve.setpoints.understand import SETPOINTS
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.link import Link
 
@@ -135,7 +136,9 @@ class _Gate:
             return False
         target = target_of(frame)
         for_another_system = target.system not in (0, self._system)
-        if for_another_system and self._routing.is_at_client(target, client):
+        known = self._routing.is_at_client(target, client)
+        # A setpoint for another system would reach the vehicle, which may obey it.
+        if for_another_system and (known or frame.message_id not in SETPOINTS):
             return False
         return self._control.intercept(client, frame)
 

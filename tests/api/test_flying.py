@@ -1,6 +1,7 @@
 """Programs that fly by `companion.connect`, against the mock vehicle in memory."""
 
 import asyncio
+from contextlib import suppress
 from math import dist, hypot, pi
 
 import numpy as np
@@ -10,8 +11,9 @@ import companion
 from companion.config import trajectory_file
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
-from companion.guidance import Pose
+from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.follow import HeldFigure
+from companion.guidance.source import CommandedSource
 from companion.testing import MockVehicle, connect, run
 from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QUICK_PARAMETERS, merged
 from tests.flight.test_tracking import FAST
@@ -29,6 +31,9 @@ class Told:
         self.events.append(f"phase {name}")
 
     def waiting(self, *_):
+        pass
+
+    def status(self, _):
         pass
 
     def event(self, _, text):
@@ -266,3 +271,97 @@ def test_before_take_off_nothing_flies(tmp_path):
     summary, _ = flown(program, mock)
     assert mock.state()["armed"] is False
     assert summary.result == "ok"
+
+
+@BOTH
+@pytest.mark.parametrize("after", [0.3, 2.0, 4.5])
+def test_a_take_off_that_is_cancelled_leaves_nothing_flying_unheld(autopilot, after):
+    """Cancelled while it arms, climbs, or takes over: disarmed, or held by the autopilot."""
+
+    async def program(vehicle):
+        with suppress(TimeoutError):
+            async with asyncio.timeout(after):
+                await vehicle.take_off()
+
+    mock = mock_vehicle(autopilot)
+    with suppress(companion.FlightEnded):
+        flown(program, mock)
+    mock.run(5.0)
+    state = mock.state()
+    held = state["mode"] in ("LOITER", "BRAKE") and abs(state["velocity"][2]) < 0.2
+    assert held or not state["armed"], state
+    assert not state["crashed"]
+
+
+def test_a_cancelled_call_hands_back():
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with asyncio.timeout(1.0):
+            await vehicle.hold(60.0)
+
+    mock = mock_vehicle()
+    with pytest.raises(TimeoutError):
+        flown(program, mock)
+    assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", True)
+    assert mock.time < 25.0
+
+
+def test_two_calls_at_once_and_a_second_take_off_are_refused():
+    async def program(vehicle):
+        await vehicle.take_off()
+        with pytest.raises(companion.FlightEnded, match="flies already"):
+            await vehicle.take_off()
+        first = asyncio.ensure_future(vehicle.hold(2.0))
+        await asyncio.sleep(0.5)
+        with pytest.raises(RuntimeError, match="another call"):
+            await vehicle.hold(1.0)
+        await first
+        await vehicle.land()
+
+    summary, _ = flown(program, mock_vehicle())
+    assert summary.result == "ok"
+
+
+def test_an_observer_that_raises_costs_nothing():
+    class Broken(Told):
+        def event(self, time, text):
+            raise BrokenPipeError(text)
+
+    async def main():
+        config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
+        async with connect(config, mock, observer=Broken()) as vehicle:
+            await vehicle.take_off()
+            await vehicle.land()
+        return vehicle.summary
+
+    mock = mock_vehicle()
+    assert run(mock, main()).result == "ok"
+    assert not mock.state()["armed"]
+
+
+def test_no_acceleration_keeps_the_velocity_against_drag():
+    speeds = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        async with vehicle.control() as control:
+            async for state in control.states(seconds=4.0):
+                quick = state.velocity_ned[0] > 2.5 or speeds
+                control.accelerate((0.0 if quick else 2.0, 0.0, 0.0))
+                if quick:
+                    speeds.append(state.velocity_ned[0])
+        await vehicle.land()
+
+    flown(program, mock_vehicle())
+    assert max(speeds) - speeds[-1] < 0.5  # a drag of 1/s alone would leave a fifth of it
+
+
+def test_references_in_one_moment_tell_no_jerk():
+    source = CommandedSource("a program", 0.5, 1.0)
+    source.begin(0.0, Pose((0.0, 0.0, 0.0), 0.0))
+    still = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    source.give(Reference((0.0, 0.0, 0.0)), 0.1)
+    source.give(Reference((0.0, 0.0, 0.0), acceleration_ned=(1.0, 0.0, 0.0)), 0.10001)
+    assert source.reference(0.11, still)(0.3).acceleration_ned[0] == pytest.approx(1.0)
+    source.give(Reference((0.0, 0.0, 0.0), acceleration_ned=(2.0, 0.0, 0.0)), 0.2)
+    assert source.reference(0.2, still)(0.3).acceleration_ned[0] == pytest.approx(4.0)

@@ -67,6 +67,7 @@ async def network(*endpoints, **settings):
     """A network between a fake vehicle and these endpoints."""
     endpoints = endpoints or ("udpin://127.0.0.1:0",)
     async with linked(**settings) as (link, vehicle), Network(link, endpoints) as net:
+        net.routing.intercept = lambda *_: False
         yield net, link, vehicle
 
 

@@ -47,6 +47,7 @@ class Net:
             Ear(name) for name in ("vehicle", "ground", "script", "silent")
         )
         self.routing = Routing(self.vehicle, AUTOPILOT, OWN, lambda: self.now)
+        self.routing.intercept = lambda *_: False
         for client in (self.ground, self.script, self.silent):
             self.routing.attach(client)
         self.routing.from_client(self.ground, heartbeat(GROUND, 200))

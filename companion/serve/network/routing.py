@@ -73,7 +73,7 @@ class Routing:
 
     Attributes:
         stats: what became of frames.
-        intercept: see `Intercept`; None forwards everything.
+        intercept: see `Intercept`; until it is set, nothing of a client is forwarded.
         on_own: called with each client's frame that is for our component alone, or None.
     """
 
@@ -81,7 +81,7 @@ class Routing:
         self, vehicle: VehicleChannel, autopilot: Address, own: Address, clock: Callable[[], float]
     ) -> None:
         self.stats = RoutingStats()
-        self.intercept: Intercept | None = None
+        self.intercept: Intercept = lambda *_: True
         self.on_own: Callable[[Channel, Frame], None] | None = None
         self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
         self._heard: dict[Channel | VehicleChannel, set[Address]] = {vehicle: {autopilot}}
@@ -148,7 +148,7 @@ class Routing:
             if self.on_own is not None:
                 self.on_own(client, frame)
             return
-        if self.intercept is not None and self.intercept(client, frame):
+        if self.intercept(client, frame):
             return
         self._forward(client, frame.raw, target)
 

@@ -7,6 +7,8 @@ from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 
 _QUEUE = 64
 """Largest number of frames that wait for one client."""
+_OLDEST = 1.0
+"""An older frame is dropped, s: a command from before an outage of the link must not arm later."""
 _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
@@ -35,7 +37,7 @@ class Uplink:
 
     Attributes:
         sent: frames that left.
-        dropped: frames that found their client's queue full.
+        dropped: frames that found their client's queue full, or waited too long.
     """
 
     name = "vehicle"
@@ -46,7 +48,7 @@ class Uplink:
         self.sent = self.dropped = 0
         self._send, self._rate, self._burst, self._clock = send, rate, burst, clock
         self._allowed, self._since = burst, clock()
-        self._queues: dict[object, deque[bytes]] = {}
+        self._queues: dict[object, deque[tuple[float, bytes]]] = {}
         self._turns: deque[object] = deque()
 
     def put(self, frame: bytes, origin: object) -> None:
@@ -58,7 +60,7 @@ class Uplink:
         if len(queue) >= _QUEUE:
             self.dropped += 1
             return
-        queue.append(frame)
+        queue.append((self._clock(), frame))
 
     def drain(self) -> bool:
         """Send what may leave now, one frame of each client in turn; whether some are left."""
@@ -68,10 +70,15 @@ class Uplink:
         while self._turns and self._allowed > 0.0:
             origin = self._turns[0]
             queue = self._queues[origin]
-            if not self._send(queue[0]):
+            queued_at, frame = queue[0]
+            if now - queued_at > _OLDEST:
+                self.dropped += 1
+            elif self._send(frame):
+                self._allowed -= len(frame)
+                self.sent += 1
+            else:
                 return True
-            self._allowed -= len(queue.popleft())
-            self.sent += 1
+            queue.popleft()
             self._turns.popleft()
             if queue:
                 self._turns.append(origin)

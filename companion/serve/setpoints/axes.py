@@ -129,7 +129,9 @@ class Axes:
 
     def _end_repetition(self, demand: AxisDemand, now: float) -> None:
         """Stop at a commanded position that is repeated although it should move."""
-        moving = demand.position is not None and any(demand.velocity or ())
+        moving = demand.position is not None and any(
+            (*(demand.velocity or ()), *(demand.acceleration or ()))
+        )
         if moving and now - self._given_at > self._timeout:
             resting = AxisDemand(demand.position, None, None)
             self._carry_position(resting, self.at(now), now)
