@@ -190,6 +190,21 @@ def test_a_frozen_stream_that_is_repeated_for_ever_stops_at_its_last_position():
     assert furthest < 2.0 + 5.0 * TIMEOUT + 5.0**2 / ACCELERATION + 2.0
 
 
+def test_the_first_point_of_a_circle_that_is_repeated_for_ever_does_not_run_away():
+    """Its velocity is zero, its acceleration is not: a program that hangs before it begins."""
+    motion = begun()
+    frozen = request((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+    furthest = 0.0
+    for number in range(200):
+        now = 0.05 * number
+        motion.command(frozen, now, ORIGIN)
+        furthest = max(furthest, abs(motion.reference(now).position_ned[1]))
+    end = motion.reference(now)
+    assert end.position_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
+    assert end.velocity_ned == pytest.approx(ORIGIN, abs=1e-3)
+    assert furthest < 5.0
+
+
 def test_stopping_comes_to_rest_within_limits():
     motion = begun(velocity=(4.0, 0.0, -1.0))
     motion.command(request(velocity=(4.0, 0.0, -1.0)), 0.0, ORIGIN)

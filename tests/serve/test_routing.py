@@ -285,3 +285,11 @@ def test_no_frame_ever_returns_to_its_origin(net):
         origin = random.choice((net.ground, net.script, net.silent))
         net.routing.from_client(origin, command(target, source, number & 0xFF))
         assert origin.heard == []
+
+
+def test_until_somebody_judges_them_no_frame_of_a_client_is_forwarded():
+    vehicle, client = Ear("vehicle"), Ear("client")
+    routing = Routing(vehicle, AUTOPILOT, OWN, lambda: 0.0)
+    routing.attach(client)
+    routing.from_client(client, command(AUTOPILOT, GROUND))
+    assert not vehicle.heard

@@ -58,6 +58,21 @@ def test_a_frame_that_cannot_leave_waits_and_is_not_lost():
     assert line.sent == [b"x"]
 
 
+def test_what_waited_through_an_outage_is_not_sent_when_the_link_is_back():
+    """An arming command that nobody asks for any more must not arm."""
+    line = Line()
+    uplink = line.uplink()
+    line.open = False
+    uplink.put(b"arm", "a")
+    assert uplink.drain()
+    line.now, line.open = 30.0, True
+    uplink.put(b"new", "a")
+    while uplink.drain():
+        line.now += 0.01
+    assert line.sent == [b"new"]
+    assert uplink.dropped == 1
+
+
 def test_a_client_that_left_has_nothing_waiting():
     line = Line()
     uplink = line.uplink()
