@@ -78,8 +78,8 @@ class EventRecorder:
         self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
 
     def status(self, status: FlightStatus) -> None:
-        """Pass on."""
-        self._tell(lambda observer: observer.status(status))
+        """Pass on; the caller notes what the observer raises, and asks no more."""
+        self._observer.status(status)
 
     def event(self, time: float, text: str) -> None:
         """Write and pass on."""

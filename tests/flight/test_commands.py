@@ -112,5 +112,5 @@ def test_it_is_given_four_times_at_most():
 
 def test_a_mode_that_was_entered_and_left_again_is_somebodys(monkeypatch):
     monkeypatch.setattr("companion.flight.commands._ENTERED", 0.01)
-    with pytest.raises(FlightEnded, match=r"left again, not by us: Role\.HOLD"):
+    with pytest.raises(FlightEnded, match=r"left it again without our command: Role\.HOLD"):
         run(Vehicle((None, Role.HOLD)), change_mode)
