@@ -11,7 +11,7 @@ from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.flight.environment import THIS_COMPUTER, Environment
-from companion.flight.observer import Observer, Silent
+from companion.flight.observer import Observer, Silent, decline_landing
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
 from companion.recording.folder import flight_folder
@@ -68,7 +68,7 @@ async def flying(
 ) -> AsyncGenerator[Vehicle, None]:
     """As `connect`, with a configuration as it is; without a folder nothing is recorded."""
     program = Program()
-    session = Session(config, folder, observer or Silent(), _decline, program, environment)
+    session = Session(config, folder, observer or Silent(), decline_landing, program, environment)
     program.interrupt = session.interrupt
     flight = asyncio.create_task(_fly(session, program))
     try:
@@ -118,7 +118,3 @@ async def _fly(session: Session, program: Program) -> None:
         raise
     program.summary = summary
     program.end(ended_by(summary.result))
-
-
-async def _decline() -> bool:
-    return False

@@ -44,6 +44,11 @@ class Silent:
         """Ignore it."""
 
 
+async def decline_landing() -> bool:
+    """Answer no when asked whether to land: where nobody can be asked, the vehicle holds on."""
+    return False
+
+
 class EventRecorder:
     """An observer that keeps the phases, writes phases and events down, and passes all on.
 

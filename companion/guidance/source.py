@@ -124,9 +124,7 @@ class CommandedSource:
         """Hold `pose` until the first reference."""
         self.pose, self._given_at = pose, now
 
-    def give(
-        self, reference: Reference, now: float, jerk_ned: tuple[float, float, float] | None = None
-    ) -> None:
+    def give(self, reference: Reference, now: float, jerk_ned: Vector | None = None) -> None:
         """Take a new reference.
 
         Args:
@@ -201,22 +199,13 @@ def _kind(reference: Reference) -> tuple[bool, bool, bool]:
     return reference.closed_loop, reference.drifting, reference.holds_height
 
 
-def continued(
-    reference: Reference, jerk_ned: tuple[float, float, float], elapsed: float
-) -> Reference:
+def continued(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:
     """The reference `elapsed` seconds later, at a constant jerk (m/s³) and heading rate."""
-    position, velocity, acceleration = (
-        reference.position_ned,
-        reference.velocity_ned,
-        reference.acceleration_ned,
-    )
     t, t2, t3 = elapsed, 0.5 * elapsed**2, elapsed**3 / 6.0
-    (p0, p1, p2), (v0, v1, v2), (a0, a1, a2), (j0, j1, j2) = (
-        position,
-        velocity,
-        acceleration,
-        jerk_ned,
-    )
+    p0, p1, p2 = reference.position_ned
+    v0, v1, v2 = reference.velocity_ned
+    a0, a1, a2 = reference.acceleration_ned
+    j0, j1, j2 = jerk_ned
     return reference._replace(
         position_ned=(
             p0 + v0 * t + a0 * t2 + j0 * t3,

@@ -8,7 +8,7 @@ from companion.config import Config
 from companion.flight.assembly import assemble
 from companion.flight.context import cancel
 from companion.flight.environment import Environment
-from companion.flight.observer import EventRecorder, Observer
+from companion.flight.observer import EventRecorder, Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.mavlink.framing import Frame
@@ -75,7 +75,7 @@ class ServedFlight:
             config,
             link,
             EventRecorder(observer, self._clock, lambda _: None),
-            _decline,
+            decline_landing,
             None,
             TakeoverPlan(self._source),
             environment,
@@ -177,7 +177,3 @@ def _motion(config: Config) -> CommandedMotion:
             serve.setpoint_timeout,
         )
     )
-
-
-async def _decline() -> bool:
-    return False

@@ -14,7 +14,7 @@ from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding
-from companion.flight.observer import Observer, Silent
+from companion.flight.observer import Observer, Silent, decline_landing
 from companion.flight.session import Session
 from companion.recording.summary import Summary
 from companion.testing.vehicle import MockVehicle
@@ -93,7 +93,7 @@ def session(
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     return Session(
-        known, folder, observer or Silent(), ask_landing or _decline, environment=environment
+        known, folder, observer or Silent(), ask_landing or decline_landing, environment=environment
     )
 
 
@@ -161,7 +161,3 @@ def _known(config: Configuration) -> Config:
     if isinstance(config, Mapping):
         return changed(Config(), config, "the configuration")
     return load(Path(config))
-
-
-async def _decline() -> bool:
-    return False

@@ -20,7 +20,7 @@ from companion import demo
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files import bounded_yaml
-from companion.flight.observer import Silent
+from companion.flight.observer import Silent, decline_landing
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from companion.study.outcome import Tick
@@ -139,7 +139,7 @@ def fly(task: Task) -> Tracked:
         course.write_text(bounded_yaml.dump(task.course.file))
         config = _configured(shipped, task, course, wire.endpoint)
         truth = TruthRecorder(truth_port)
-        session = Session(config, folder, truth, _decline_landing)
+        session = Session(config, folder, truth, decline_landing)
         with demo.bundled_vehicle(vehicle, wire, folder / "vehicle.log", lockstep=True):
             summary = lockstep.run(session.fly())
     if summary.result != "ok":
@@ -178,10 +178,6 @@ def _configured(shipped: Config, task: Task, course: Path, endpoint: str) -> Con
         "hover": {"duration_s": HOLD_S},
     }
     return changed(shipped, changes, "study track")
-
-
-async def _decline_landing() -> bool:
-    return False
 
 
 class TruthRecorder(Silent):
