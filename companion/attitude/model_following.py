@@ -76,6 +76,7 @@ class ModelFollowingPlanner:
         self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self._plans)
         self._still = 0.0
         self._started = False
+        self.planned: PlannedTilt | None = None
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
@@ -159,6 +160,7 @@ class ModelFollowingPlanner:
         plausible = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:
             self._started = False
+            self.planned = None
             return BodyRates(*first_order(q, target, dt, constants))
         if not self._started:
             self._start(q, plausible)
@@ -168,6 +170,7 @@ class ModelFollowingPlanner:
         self._hold.take(dt)
         dt = self._hold.step
         by_tilt, by_yaw = self._plans.in_effect(self._hold.late)
+        self.planned = by_tilt
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed

@@ -7,7 +7,8 @@ the numbers out of it, in the order of the columns in `companion.recording.mcap_
 from math import nan, sqrt
 from typing import NamedTuple
 
-from companion.attitude import BodyRates, Coefficients, Limits, Target
+from companion.attitude import BodyRates, Limits, Target
+from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
 from companion.recording.mcap_file import cdr
@@ -42,7 +43,7 @@ class Answer(NamedTuple):
         thrust: 0..1.
         latency_ns: from the sample's arrival, ns.
         target: to which the planner flies; None: body rates of guidance, or idle.
-        planned: coefficients that the planner plans for now, or None.
+        planned: the plan in effect at the sample, or None.
         is_step: see `GuidanceCommand`.
         idle: see `GuidanceCommand`.
     """
@@ -51,7 +52,7 @@ class Answer(NamedTuple):
     thrust: float
     latency_ns: int
     target: Target | None
-    planned: Coefficients | None
+    planned: PlannedTilt | None
     is_step: bool
     idle: bool
 
@@ -130,7 +131,7 @@ class SampleRows:
             *(target or _NO_TARGET),
             -2.0 * ay,
             2.0 * ax,
-            *(planned or (nan, nan)),
+            *((nan, nan) if planned is None else planned[:2]),
             sqrt(roll * roll + pitch * pitch) >= self._tilt_rate,
             abs(yaw) >= self._yaw_rate,
             not idle and thrust in self._thrust_limits,

@@ -22,6 +22,24 @@ _DRAWN_EACH = 2
 """Each second step of guidance is drawn in 3D."""
 
 
+class StepFlags(NamedTuple):
+    """What a step of guidance found.
+
+    Attributes:
+        fresh: whether the position is fresh.
+        standing: whether the vehicle stands on the ground.
+        may_idle: whether zero thrust is safe.
+        armed: whether the vehicle is armed.
+        offboard_active: whether the autopilot obeys the setpoints.
+    """
+
+    fresh: bool
+    standing: bool
+    may_idle: bool
+    armed: bool
+    offboard_active: bool
+
+
 class StepInput(NamedTuple):
     """The telemetry that a step of guidance reads; None: unknown.
 
@@ -32,11 +50,7 @@ class StepInput(NamedTuple):
         battery: of the vehicle.
         autopilot_thrust: in ATTITUDE_TARGET.
         height: above home, m.
-        fresh: whether the position is fresh.
-        standing: whether the vehicle stands on the ground.
-        may_idle: whether zero thrust is safe.
-        armed: whether the vehicle is armed.
-        offboard_active: whether the autopilot obeys the setpoints.
+        flags: what the step found.
     """
 
     time: float
@@ -45,11 +59,7 @@ class StepInput(NamedTuple):
     battery: Battery | None
     autopilot_thrust: AttitudeTargetThrust | None
     height: float | None
-    fresh: bool
-    standing: bool
-    may_idle: bool
-    armed: bool
-    offboard_active: bool
+    flags: StepFlags
 
 
 class StepOutput(NamedTuple):
@@ -61,7 +71,6 @@ class StepOutput(NamedTuple):
         inputs: motion, wind and drag.
         reference: reference of the step.
         error: distance from the reference, m, or None.
-        command: what it left with the control loop; None: no new one.
     """
 
     measured_at: float
@@ -69,6 +78,19 @@ class StepOutput(NamedTuple):
     inputs: GuidanceInput
     reference: Reference
     error: float | None
+
+
+class StepEntry(NamedTuple):
+    """A step of guidance.
+
+    Attributes:
+        read: what it read.
+        made: what it computed; None: nothing, without a fresh position or on the ground.
+        command: what it left with the control loop; None: no new command.
+    """
+
+    read: StepInput
+    made: StepOutput | None
     command: GuidanceCommand | None
 
 
@@ -80,39 +102,21 @@ class StepRows:
         self._pose = cdr.PoseEncoder("world")
         self._count = 0
 
-    def step(
-        self, writer: McapWriter, time_ns: int, entry: tuple[StepInput, StepOutput | None]
-    ) -> None:
-        """Write the input of a step and what it computed."""
-        read, made = entry
+    def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
+        """Write what a step read and computed, and its command."""
+        read, made, command = entry
         writer.message("/guidance_input", time_ns, INPUT.packing.pack(cdr.CDR, *_input(read)))
-        if made is None:
-            return
-        flags = read.offboard_active
-        data = GUIDANCE.packing.pack(cdr.CDR, read.time, *_guidance(made), flags)
-        writer.message("/guidance", time_ns, data)
-        if made.command is not None:
-            self.target(writer, time_ns, made.command)
-        self._count += 1
-        if self._count % _DRAWN_EACH == 0:
-            self._draw(writer, time_ns, made)
-
-    def target(self, writer: McapWriter, time_ns: int, command: GuidanceCommand) -> None:
-        """Write a command of guidance."""
-        data = TARGET.packing.pack(
-            cdr.CDR,
-            command.made_at,
-            *command.target,
-            *(command.later or _NO_TARGET),
-            command.acceleration_down,
-            *(command.body_rates or _NO_VECTOR),
-            nan if command.thrust is None else command.thrust,
-            command.turn,
-            command.period,
-            command.idle,
-            command.is_step,
-        )
-        writer.message("/target", time_ns, data)
+        if command is not None:
+            data = TARGET.packing.pack(cdr.CDR, *_target(command))
+            writer.message("/target", time_ns, data)
+        if made is not None:
+            data = GUIDANCE.packing.pack(
+                cdr.CDR, read.time, *_guidance(made), read.flags.offboard_active
+            )
+            writer.message("/guidance", time_ns, data)
+            self._count += 1
+            if self._count % _DRAWN_EACH == 0:
+                self._draw(writer, time_ns, made)
 
     def _draw(self, writer: McapWriter, time_ns: int, made: StepOutput) -> None:
         pose = (*_east_north_up(made.inputs.now.position_ned), *_enu_from_flu(made.q))
@@ -143,11 +147,22 @@ def _input(read: StepInput) -> tuple[float, ...]:
         nan if thrust is None else thrust.received,
         nan if thrust is None else thrust.thrust,
         _number(read.height),
-        read.fresh,
-        read.standing,
-        read.may_idle,
-        read.armed,
-        read.offboard_active,
+        *read.flags,
+    )
+
+
+def _target(command: GuidanceCommand) -> tuple[float, ...]:
+    return (
+        command.made_at,
+        *command.target,
+        *(command.later or _NO_TARGET),
+        command.acceleration_down,
+        *(command.body_rates or _NO_VECTOR),
+        _number(command.thrust),
+        command.turn,
+        command.period,
+        command.idle,
+        command.is_step,
     )
 
 

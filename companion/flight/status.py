@@ -148,7 +148,9 @@ class StatusReporter:
             None if tilt is None else degrees(tilt),
             self._error(),
         )
-        self._trace.add_motion((now - self._began, *(nan if one is None else one for one in row)))
+        self._trace.add_motion(
+            now, (now - self._began, *(nan if one is None else one for one in row))
+        )
 
     def status(self) -> FlightStatus:
         """The state now."""

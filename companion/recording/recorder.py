@@ -5,11 +5,13 @@ of the thread.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from math import nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import ACTION, ACTIONS
 from companion.recording.mcap_file.fields import Channel
 from companion.recording.mcap_file.writer import McapWriter
 
@@ -79,10 +81,21 @@ class FlightRecorder(BackgroundFile[Entry]):
         """Record that a maneuver begins, or (None) the last one ends; see `ManeuverMark`."""
         self.add(time, _words, ("/maneuver", (time, vehicle_time), (name or "",)))
 
-    def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:  # noqa: FBT001
+    def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
         """Record that the alarm of a safety monitor is raised now, or is over."""
         now = self._clock()
         self.add(now, _words, ("/alarm", (now, float(raised)), (monitor, reason, action)))
+
+    def action(
+        self,
+        time: float,
+        name: str,
+        clock_offset: float | None = None,
+        drag: tuple[float, float] = (nan, nan),
+    ) -> None:
+        """Record what a phase tells guidance to do; the arguments are the columns of ACTION."""
+        offset = nan if clock_offset is None else clock_offset
+        self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
 
     def event(self, text: str) -> None:
         """Record an event of now, in words."""

@@ -54,5 +54,5 @@ class _TlogFile:
     def sync(self) -> None:
         os.fsync(self._file.fileno())
 
-    def close(self, *, complete: bool) -> None:  # noqa: ARG002  it needs no completion
+    def close(self, *, complete: bool) -> None:
         self._file.close()

@@ -28,7 +28,7 @@ ACTIONS = (
     "hold_reference",
     "give_up",
     "follow",
-    "step_now",
+    "drop_command",
     "drag_prior",
 )
 """What a phase told guidance to do, by number."""
