@@ -13,6 +13,7 @@ from companion.attitude import (
     InvalidQuaternionError,
     Limits,
     Planner,
+    Target,
     is_unit,
 )
 from companion.attitude.rotation import limit_rates
@@ -25,7 +26,7 @@ from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock_jumps import Misfit
-from companion.vehicle.records import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""

@@ -11,14 +11,8 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
-from companion.control.step_recorder import (
-    Clock,
-    Ground,
-    StepFlags,
-    StepOutput,
-    StepRecorder,
-    Telemetry,
-)
+from companion.control.step_recorder import Clock, Ground, StepRecorder, Telemetry
+from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion

@@ -11,13 +11,14 @@ from companion.attitude import BodyRates, Limits, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
+from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
-_CODES = {None: 0, **{reason: number for number, reason in enumerate(Unanswered, start=2)}}
+_CODES: dict[Unanswered | None, int] = {None: 0}
+_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
 CONTROL_OFF = 1
 """Code of a sample that came while the loop was off."""
 _MISFITS = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
@@ -93,7 +94,7 @@ class SampleRows:
         sample, reason, flags, checked, answer = entry
         code = _CODES[reason] if flags.on else CONTROL_OFF
         data = SAMPLE.packing.pack(
-            cdr.CDR,
+            CDR,
             sample.received,
             sample.vehicle_time,
             sample.time_boot_ms,
@@ -108,12 +109,12 @@ class SampleRows:
         )
         writer.message("/sample", time_ns, data)
         if answer is not None:
-            data = SETPOINT.packing.pack(cdr.CDR, *self._setpoint(sample, flags, answer))
+            data = SETPOINT.packing.pack(CDR, *self._setpoint(sample, flags, answer))
             writer.message("/setpoint", time_ns, data)
 
     def attitude_target(self, writer: McapWriter, time_ns: int, target: AttitudeTarget) -> None:
         """Write a new ATTITUDE_TARGET."""
-        data = ATTITUDE_TARGET.packing.pack(cdr.CDR, target.time_boot_ms, *target.q)
+        data = ATTITUDE_TARGET.packing.pack(CDR, target.time_boot_ms, *target.q)
         writer.message("/attitude_target", time_ns, data)
 
     def _setpoint(

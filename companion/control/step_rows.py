@@ -12,6 +12,7 @@ from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import GUIDANCE, INPUT, TARGET
+from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
 
@@ -105,13 +106,13 @@ class StepRows:
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
         """Write what a step read and computed, and its command."""
         read, made, command = entry
-        writer.message("/guidance_input", time_ns, INPUT.packing.pack(cdr.CDR, *_input(read)))
+        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input(read)))
         if command is not None:
-            data = TARGET.packing.pack(cdr.CDR, *_target(command))
+            data = TARGET.packing.pack(CDR, *_target(command))
             writer.message("/target", time_ns, data)
         if made is not None:
             data = GUIDANCE.packing.pack(
-                cdr.CDR, read.time, *_guidance(made), read.flags.offboard_active
+                CDR, read.time, *_guidance(made), read.flags.offboard_active
             )
             writer.message("/guidance", time_ns, data)
             self._count += 1

@@ -5,6 +5,7 @@ more than all the rest of recording. Twice a second it waits until the disk has 
 """
 
 import threading
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,16 +14,17 @@ from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
 T = TypeVar("T")
+Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _PERIOD = 0.05
 _SYNC_PERIOD = 0.5
 """After a power cut this much is missing, s, and the time that the disk takes."""
 
 
-class ItemFile(Protocol[T]):
+class ItemFile(Protocol[Item_contra]):
     """A file of one format, used by one thread."""
 
-    def write(self, items: Sequence[T]) -> None:
+    def write(self, items: Sequence[Item_contra]) -> None:
         """Write items. Raises OSError: the disk is full, or failed."""
         ...
 
@@ -35,8 +37,10 @@ class ItemFile(Protocol[T]):
         ...
 
 
-class BackgroundFile(Generic[T]):
+class BackgroundFile(ABC, Generic[T]):
     """Hands items to a file in a thread of its own; never delays, never raises in a flight.
+
+    Items are taken from the beginning, and written once the file is open.
 
     Attributes:
         path: where the file is.
@@ -45,7 +49,6 @@ class BackgroundFile(Generic[T]):
 
     Args:
         path: see above.
-        file: open.
         most_waiting: further items are dropped.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
     """
@@ -53,7 +56,6 @@ class BackgroundFile(Generic[T]):
     def __init__(
         self,
         path: Path,
-        file: ItemFile[T],
         most_waiting: int,
         on_failure: Callable[[str], None] | None = None,
     ) -> None:
@@ -64,8 +66,22 @@ class BackgroundFile(Generic[T]):
         self._most_waiting = most_waiting
         self._waiting: deque[T] = deque()
         self._closing = threading.Event()
-        self._file = file
-        self._thread = threading.Thread(target=self._run, name=path.name, daemon=True)
+        self._thread: threading.Thread | None = None
+
+    @abstractmethod
+    def _make_file(self) -> ItemFile[T]:
+        """Create the file. Raises OSError: it cannot be created."""
+
+    def open(self) -> None:
+        """Create the file, and begin to write.
+
+        Raises:
+            OSError: the file cannot be created.
+        """
+        file = self._make_file()
+        self._thread = threading.Thread(
+            target=self._run, args=(file,), name=self.path.name, daemon=True
+        )
         self._thread.start()
 
     @property
@@ -81,6 +97,7 @@ class BackgroundFile(Generic[T]):
             self.dropped += 1
 
     def __enter__(self) -> Self:
+        self.open()
         return self
 
     def __exit__(
@@ -94,22 +111,23 @@ class BackgroundFile(Generic[T]):
     def close(self) -> None:
         """Write out what waits and close the file."""
         self._closing.set()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
 
-    def _run(self) -> None:
+    def _run(self, file: ItemFile[T]) -> None:
         synced_at = monotonic()
         while not self._closing.wait(_PERIOD):
-            self._write_waiting()
+            self._write_waiting(file)
             if self.failure is None and monotonic() - synced_at >= _SYNC_PERIOD:
-                self._guarded(self._file.sync)
+                self._guarded(file.sync)
                 synced_at = monotonic()
-        self._write_waiting()
-        self._guarded(lambda: self._file.close(complete=self.failure is None))
+        self._write_waiting(file)
+        self._guarded(lambda: file.close(complete=self.failure is None))
 
-    def _write_waiting(self) -> None:
+    def _write_waiting(self, file: ItemFile[T]) -> None:
         items = [self._waiting.popleft() for _ in range(len(self._waiting))]
         if self.failure is None:
-            self._guarded(lambda: self._file.write(items))
+            self._guarded(lambda: file.write(items))
         if self.failure is not None:
             self.dropped += len(items)
 

@@ -56,11 +56,12 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
         course=Course(
             began=record.began,
             phases=tuple((each.time, each.name) for each in record.phases),
+            takeoff=_takeoff(record),
             early_end=EarlyEnd(record.duration, None, phase),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
             deadline=float(flight.get("deadline_s", "inf")),
-            lockstep=flight.get("lockstep") == "true",
+            lockstep=flight.get("real_time") == "no",
         ),
     )
     return summary.as_dict()
@@ -70,7 +71,9 @@ def trace_of(record: FlightRecord) -> FlightTrace:
     """The rows that the measurements after a flight take, as the flight itself kept them."""
     trace = FlightTrace()
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
-    answers = _answers(sample["received_s"], setpoint["received_s"])
+    sample = sample[sample["unanswered"] == 0]
+    # Of two samples that arrive together, the vehicle's stamps differ.
+    answers = _answers(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
     for row, number in zip(setpoint.tolist(), answers.tolist(), strict=True):
         (received, vehicle_time, roll, pitch, yaw, thrust, latency, north, east), flags = (
             row[:9],
@@ -78,7 +81,7 @@ def trace_of(record: FlightRecord) -> FlightTrace:
         )
         trace.add_latency(round(1e3 * latency))
         if number < 0:
-            continue
+            continue  # its sample was not recorded
         of = sample[number]
         if flags[3]:
             measured = [float(of[f"measured_{axis}_rad_s"]) for axis in ("roll", "pitch", "yaw")]
@@ -132,6 +135,17 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
         rate_hz=_rate(record),
         unanswered=unanswered,
     )
+
+
+def _takeoff(record: FlightRecord) -> float | None:
+    """When the vehicle left the ground, s since the flight began; None: it did not."""
+    read = record.rows("guidance_input")
+    begun = next((each.time for each in record.phases if each.name == "takeoff"), None)
+    if begun is None:
+        return None
+    times = record.since_start(read["time_s"])
+    left = times[(times >= begun) & (read["standing"] == 0)]
+    return float(left[0]) if len(left) else None
 
 
 def _rate(record: FlightRecord) -> float:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import ACTION, ACTIONS
-from companion.recording.mcap_file.fields import Channel
+from companion.recording.mcap_file.fields import CDR, Channel
 from companion.recording.mcap_file.writer import McapWriter
 
 _MOST_WAITING = 50_000
@@ -40,13 +40,10 @@ class FlightRecorder(BackgroundFile[Entry]):
     """Records a flight; never delays it, and never raises in the middle of it.
 
     Args:
-        path: file to create.
+        path: file that `open` creates.
         epoch: s since 1970 at which the flight's clock read 0.
         clock: the flight's, s.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
-
-    Raises:
-        OSError: the file cannot be created.
     """
 
     def __init__(
@@ -57,7 +54,10 @@ class FlightRecorder(BackgroundFile[Entry]):
         on_failure: Callable[[str], None] | None = None,
     ) -> None:
         self._epoch, self._clock = epoch, clock
-        super().__init__(path, _McapEntries(path, epoch), _MOST_WAITING, on_failure)
+        super().__init__(path, _MOST_WAITING, on_failure)
+
+    def _make_file(self) -> "_McapEntries":
+        return _McapEntries(self.path, self._epoch)
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
         """Record an entry of `time` (s on our clock)."""
@@ -148,4 +148,4 @@ def _log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> None:
 
 def _row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
     channel, numbers = values
-    writer.message(channel.topic, time_ns, channel.packing.pack(cdr.CDR, *numbers))
+    writer.message(channel.topic, time_ns, channel.packing.pack(CDR, *numbers))

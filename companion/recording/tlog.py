@@ -22,18 +22,19 @@ class TlogWriter(BackgroundFile[Record]):
     """Writes frames to a file; never delays, never raises in the middle of a flight.
 
     Args:
-        path: file to create.
+        path: file that `open` creates.
         epoch: seconds since 1970 at which the flight's clock read zero.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
-
-    Raises:
-        OSError: the file cannot be created.
     """
 
     def __init__(
         self, path: Path, epoch: float, on_failure: Callable[[str], None] | None = None
     ) -> None:
-        super().__init__(path, _TlogFile(path, epoch), _MOST_WAITING, on_failure)
+        super().__init__(path, _MOST_WAITING, on_failure)
+        self._epoch = epoch
+
+    def _make_file(self) -> "_TlogFile":
+        return _TlogFile(self.path, self._epoch)
 
     def __call__(self, time: float, frame: bytes) -> None:
         """Take one frame, seen at `time` on the flight's clock (s)."""
