@@ -45,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
+    tool_options.add_export(commands)
     tool_options.add_config(commands)
     return parser
 

@@ -105,7 +105,18 @@ def add_tools(commands: Commands) -> None:
     plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
-    plot.set_defaults(run="tools.plot")
+    plot.set_defaults(run="recordings.plot")
+
+
+def add_export(commands: Commands) -> None:
+    """Add `export`."""
+    export = commands.add_parser("export", help="write a recorded flight as CSV or Parquet")
+    export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    kind = export.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
+    kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
+    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: the flight's folder")
+    export.set_defaults(run="recordings.export")
 
 
 def add_config(commands: Commands) -> None:

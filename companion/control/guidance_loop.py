@@ -184,7 +184,7 @@ class GuidanceLoop:
         made = self._step(now, position, standing=standing, may_idle=may_idle)
         command = self._loop.command
         self._recorder.step(
-            StepFlags(position is not None, standing, may_idle, self._state.armed is True, active),
+            StepFlags(position is not None, standing, may_idle, active),
             now,
             made,
             None if command is before else command,

@@ -97,6 +97,7 @@ class StepRecorder:
             state.battery,
             state.attitude_target_thrust,
             state.height,
+            state.armed,
             flags,
         )
         self._recorder.add(now, self._rows.step, StepEntry(read, made, command))

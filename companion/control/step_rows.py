@@ -30,14 +30,12 @@ class StepFlags(NamedTuple):
         fresh: whether the position is fresh.
         standing: whether the vehicle stands on the ground.
         may_idle: whether zero thrust is safe.
-        armed: whether the vehicle is armed.
         offboard_active: whether the autopilot obeys the setpoints.
     """
 
     fresh: bool
     standing: bool
     may_idle: bool
-    armed: bool
     offboard_active: bool
 
 
@@ -51,6 +49,7 @@ class StepInput(NamedTuple):
         battery: of the vehicle.
         autopilot_thrust: in ATTITUDE_TARGET.
         height: above home, m.
+        armed: whether the vehicle is armed.
         flags: what the step found.
     """
 
@@ -60,6 +59,7 @@ class StepInput(NamedTuple):
     battery: Battery | None
     autopilot_thrust: AttitudeTargetThrust | None
     height: float | None
+    armed: bool | None
     flags: StepFlags
 
 
@@ -148,6 +148,7 @@ def _input(read: StepInput) -> tuple[float, ...]:
         nan if thrust is None else thrust.received,
         nan if thrust is None else thrust.thrust,
         _number(read.height),
+        read.armed is True,
         *read.flags,
     )
 

@@ -164,10 +164,10 @@ INPUT = Channel(
         Field("height_m", "Height above home, m."),
     ),
     (
+        Code("armed", "Whether the vehicle is armed."),
         Code("fresh", "Whether the position is fresh."),
         Code("standing", "Whether the vehicle stands on the ground."),
         Code("may_idle", "Whether zero thrust is safe."),
-        Code("armed", "Whether the vehicle is armed."),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )

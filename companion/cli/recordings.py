@@ -1,0 +1,34 @@
+"""The commands that read recorded flights: `plot` and `export`."""
+
+import argparse
+from pathlib import Path
+
+from companion.cli.exit_codes import EXIT_OK
+from companion.files.yaml_file import ConfigError
+from companion.recording.flight_record import read_flight
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a recorded flight."""
+    from companion.recording.figure import draw_flight  # noqa: PLC0415  no other command needs it
+
+    out = options.out or options.folder / "flight.png"
+    draw_flight(options.folder, out)
+    print(out)
+    return EXIT_OK
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write the tables of a recorded flight as CSV or Parquet."""
+    from companion.recording.export import export_csv, export_parquet  # noqa: PLC0415
+
+    record = read_flight(options.folder)
+    into: Path = options.into or options.folder
+    write = export_parquet if options.parquet else export_csv
+    try:
+        into.mkdir(parents=True, exist_ok=True)
+        for path in write(record, into):
+            print(path)
+    except OSError as error:
+        raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
+    return EXIT_OK
