@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.real.build import REAL, ROOT
-from tests.real.flown import positions
-from tests.real.measures import tracking_errors
+from tests.real.measures import rms
 from tests.real.stamps import stamp_offset
 from tests.real.vehicle import TUNED, merged, real_vehicle
 
@@ -26,8 +25,9 @@ PROGRAM_ARGUMENTS = {"px4": ("0.49", "MPC_THR_HOVER"), "ardupilot": ("0.363", "M
 DIRECT = {"px4": "udpin://0.0.0.0:14540", "ardupilot": "tcpout://127.0.0.1:5760"}
 OURS = "127.0.0.1:14551"
 _LONGEST_S = 240.0
-_AT_SPEED = 4.5
-"""The circle is the part that is flown faster than this, m/s."""
+SPEED, _NEAR_SPEED = 5.0, 0.1
+"""The circle is what is flown at this speed, m/s."""
+_LEAST_ROWS = 50
 
 
 def main() -> int:
@@ -90,15 +90,24 @@ def run(program: str, autopilot: str, endpoint: str) -> dict:
 
 
 def measured(vehicle, folder: Path, arrival: float) -> dict:
-    """The summary of a recorded flight, and the errors on its circle."""
+    """The summary of a recorded flight, and the errors on its circle at full speed, RMS in m."""
     summary = json.loads((folder / "summary.json").read_text())
     out = {"result": summary["result"], "latency_us": summary["latency_us"]}
     tracking = _rows(folder / "tracking.csv")
     tracking[:, 0] += stamp_offset(_rows(folder / "rates.csv"), folder / "flight.tlog")
+    speed = np.linalg.norm(np.gradient(tracking[:, 1:4], tracking[:, 0], axis=0), axis=1)
+    circle = tracking[abs(speed - SPEED) < _NEAR_SPEED]
+    if len(circle) < _LEAST_ROWS:
+        return out
+    time, reference = circle[:, 0], circle[:, 1:4]
+    out["circle_program_m"] = rms(circle[:, 4:7] - reference)
     truth = vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
-    errors = tracking_errors(tracking, positions(folder / "flight.tlog"), truth)
-    fast = [part for part in errors["moving"] if part["speed"] > _AT_SPEED]
-    return out | ({"circle": max(fast, key=lambda part: part["seconds"])} if fast else {})
+    if truth is not None:
+        true = truth.position_at(time)
+        # The estimator's origin is its own: laid over each other by one shift.
+        shift = (circle[:, 4:7] - true).mean(axis=0)
+        out["circle_truth_m"] = rms(true + shift - reference)
+    return out
 
 
 def _rows(path: Path):
