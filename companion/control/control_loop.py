@@ -13,7 +13,6 @@ from companion.attitude import (
     InvalidQuaternionError,
     Limits,
     Planner,
-    Target,
     is_unit,
 )
 from companion.attitude.rotation import limit_rates
@@ -84,7 +83,6 @@ class ControlLoop:
         self._trace = trace
         self._limits = limits
         self._rows = SampleRows(limits, hover_thrust.limits)
-        self._target: Target | None = None
         self._checked = nan
         self._sent: Answer | None = None
         if trace.recorder is not None:
@@ -175,7 +173,6 @@ class ControlLoop:
         Raises:
             AttitudeError: the attitude or the target cannot be used.
         """
-        self._target = None
         if command.idle:
             return BodyRates(0.0, 0.0, 0.0), 0.0
         # Checked here, because body rates from guidance bypass the planner's own check.
@@ -192,8 +189,8 @@ class ControlLoop:
         """The body rates of the planner, or those of guidance within the same limits."""
         if command.body_rates is None:
             target = command.target_at(sample.received - sample.age)
-            target = self._target = self.resets.target(target, command.turn)
-            return self.planner.rates(sample, target, period)
+            target = self.resets.target(target, command.turn)
+            return self.planner.rates(sample, target, period, is_step=command.is_step)
         limits = self._limits
         return BodyRates(*limit_rates(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
@@ -210,9 +207,11 @@ class ControlLoop:
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
-        target = self._target
-        plan = None if target is None else self.planner.planned
-        self._sent = Answer(rates, thrust, latency, target, plan, command.is_step, command.idle)
+        if self._trace.recorder is not None:
+            planned = not command.idle and command.body_rates is None
+            asked, plan = (self.planner.asked, self.planner.planned) if planned else (None, None)
+            flags = command.is_step, command.idle
+            self._sent = Answer(rates, thrust, latency, asked, plan, *flags)
         if self.offboard_active:
             self._hover_thrust.sent(thrust, sample.q)
             self._trace.add_rates(
@@ -224,7 +223,8 @@ class ControlLoop:
                 sample.age if sample.age_known else nan,
             )
         if command.is_step:
-            self._trace.add_response(sample.vehicle_time, sample.q, command.target)
+            q = self.planner.attitude(sample.q)
+            self._trace.add_response(sample.vehicle_time, q, command.target)
 
     def drop_command(self) -> None:
         """Drop the newest command, so that nothing is sent until guidance makes another one."""

@@ -1,12 +1,13 @@
-"""Runs the planner on each sample: periods, restarts, and the frame without estimator resets."""
+"""Runs the planner on each sample: periods, restarts, and the frame that the planner sees."""
 
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import BodyRates, Planner, Target
+from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_STEP = 0.1
@@ -14,7 +15,9 @@ _LONGEST_STEP = 0.1
 
 
 class PlannerRunner:
-    """Asks the planner for body rates, in the frame without estimator resets.
+    """Asks the planner for body rates, in a frame without estimator resets.
+
+    During open-loop steps that is the `StepFrame`.
 
     Args:
         planner: the planner.
@@ -24,14 +27,17 @@ class PlannerRunner:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
             along its axes, or None.
         on_attitude_target: called with each new one before the planner gets it.
+        asked: attitude and target of the newest sample, as the planner saw them, or None.
     """
 
     def __init__(self, planner: Planner, resets: EstimatorResets) -> None:
         self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
         self.on_attitude_target: Callable[[AttitudeTarget], None] | None = None
+        self.asked: tuple[Quaternion, Target] | None = None
         self._planner = planner
         self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._resets = resets
+        self._frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
         self._noted: AttitudeTarget | None = None
@@ -47,19 +53,31 @@ class PlannerRunner:
         """The plan in effect at the newest sample; None for a planner without a plan."""
         return None if self._follower is None else self._follower.planned
 
-    def rates(self, sample: AttitudeSample, target: Target, arrival_period: float) -> BodyRates:
+    def attitude(self, q: Quaternion) -> Quaternion:
+        """An attitude of the autopilot in the frame that the planner sees."""
+        return self._frame.attitude(self._resets.attitude(q))
+
+    def rates(
+        self, sample: AttitudeSample, target: Target, arrival_period: float, *, is_step: bool
+    ) -> BodyRates:
         """Body rates for a sample, rad/s; resets the planner first after a gap or a restart.
 
         Args:
             sample: the sample to answer.
             target: target in the frame without resets.
             arrival_period: vehicle time since the sample before, s.
+            is_step: whether the target is an open-loop step.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.
         """
-        q = self._resets.attitude(sample.q)
         period = sample.vehicle_time - self._planned_at
+        # Over a gap the body rates are not known, so the frame does not follow the estimator.
+        stepping = is_step and period <= _LONGEST_STEP
+        self._frame.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
+        q = self.attitude(sample.q)
+        if not is_step:
+            target = self._frame.target(target)
         if period > _LONGEST_STEP:
             self._planner.reset(q, sample.body_rates)
             # A gap is not the period of the samples, so an earlier period is used.
@@ -67,6 +85,7 @@ class PlannerRunner:
         self._period = period
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
+        self.asked = q, target
         return self._planner.rates(q, target, period, sample.body_rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
@@ -85,4 +104,4 @@ class PlannerRunner:
         if self._turned_ms < target.time_boot_ms <= sample.time_boot_ms:
             self._noted = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
-            self._planner.note_attitude_target(self._resets.attitude(target.q), age)
+            self._planner.note_attitude_target(self.attitude(target.q), age)

@@ -7,7 +7,7 @@ the numbers out of it, in the order of the columns in `companion.recording.mcap_
 from math import nan, sqrt
 from typing import NamedTuple
 
-from companion.attitude import BodyRates, Limits, Target
+from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
@@ -43,7 +43,7 @@ class Answer(NamedTuple):
         rates: rad/s.
         thrust: 0..1.
         latency_ns: from the sample's arrival, ns.
-        target: to which the planner flies; None: body rates of guidance, or idle.
+        asked: attitude and target as the planner saw them; None: body rates of guidance, or idle.
         planned: the plan in effect at the sample, or None.
         is_step: see `GuidanceCommand`.
         idle: see `GuidanceCommand`.
@@ -52,7 +52,7 @@ class Answer(NamedTuple):
     rates: BodyRates
     thrust: float
     latency_ns: int
-    target: Target | None
+    asked: tuple[Quaternion, Target] | None
     planned: PlannedTilt | None
     is_step: bool
     idle: bool
@@ -120,8 +120,9 @@ class SampleRows:
     def _setpoint(
         self, sample: AttitudeSample, flags: LoopFlags, answer: Answer
     ) -> tuple[float, ...]:
-        rates, thrust, latency_ns, target, planned, is_step, idle = answer
-        _, ax, ay = tilt_products(*sample.q)
+        rates, thrust, latency_ns, asked, planned, is_step, idle = answer
+        q, target = asked or (sample.q, _NO_TARGET)
+        _, ax, ay = tilt_products(*q)
         roll, pitch, yaw = rates
         return (
             sample.received,
@@ -129,7 +130,8 @@ class SampleRows:
             *rates,
             thrust,
             1e-3 * latency_ns,
-            *(target or _NO_TARGET),
+            *target,
+            *q,
             -2.0 * ay,
             2.0 * ax,
             *((nan, nan) if planned is None else planned[:2]),

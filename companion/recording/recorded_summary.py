@@ -19,6 +19,9 @@ from companion.recording.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
 _LONGEST = 1 << 26
+_AXES = "roll", "pitch", "yaw"
+_SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
+_STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
 _REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
 _NO_REASONS = 2
 """The first of `REASONS` are no reasons of an unanswered sample."""
@@ -74,23 +77,16 @@ def trace_of(record: FlightRecord) -> FlightTrace:
     sample = sample[sample["unanswered"] == 0]
     # Of two samples that arrive together, the vehicle's stamps differ.
     answers = _answers(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
-    for row, number in zip(setpoint.tolist(), answers.tolist(), strict=True):
-        (received, vehicle_time, roll, pitch, yaw, thrust, latency, north, east), flags = (
-            row[:9],
-            row[-6:],
-        )
-        trace.add_latency(round(1e3 * latency))
-        if number < 0:
-            continue  # its sample was not recorded
-        of = sample[number]
-        if flags[3]:
-            measured = [float(of[f"measured_{axis}_rad_s"]) for axis in ("roll", "pitch", "yaw")]
-            age = float(of["age_s"]) if of["age_known"] else float("nan")
-            trace.rates.add(
-                [vehicle_time, received, roll, pitch, yaw, thrust, *measured, age],
-            )
-        if flags[4]:
-            trace.response.add([vehicle_time, *(float(of[f"q_{p}"]) for p in "wxyz"), north, east])
+    measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
+    ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
+    for row, number in zip(setpoint, answers.tolist(), strict=True):
+        trace.add_latency(round(1e3 * float(row["latency_us"])))
+        time = float(row["vehicle_time_s"])
+        if row["offboard_active"] and number >= 0:  # else its sample was not recorded
+            sent = row[_SENT].tolist()
+            trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
+        if row["is_step"]:
+            trace.response.add([time, *row[_STEP].tolist()])
     for row in tracking_rows(guidance):
         trace.tracking.add(row.tolist())
     for row in record.rows("motion").tolist():

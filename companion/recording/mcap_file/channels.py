@@ -86,7 +86,11 @@ SETPOINT = Channel(
         Field("target_east", "The same, east."),
         Field("target_heading_rad", "Heading that the planner flies to, rad."),
         Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
-        Field("measured_north", "Acceleration coefficient of the measured attitude, north."),
+        *(
+            Field(f"q_{part}", "Attitude as the planner sees it, body FRD to NED.")
+            for part in "wxyz"
+        ),
+        Field("measured_north", "Acceleration coefficient of this attitude, north."),
         Field("measured_east", "The same, east."),
         Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
         Field("planned_east", "The same, east."),
