@@ -11,8 +11,9 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
-from companion.control.step_recorder import Clock, Ground, StepRecorder, Telemetry
+from companion.control.step_recorder import StepRecorder
 from companion.control.step_rows import StepFlags, StepOutput
+from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
@@ -72,14 +73,12 @@ class GuidanceLoop:
         self.learning = HoverLearning(hover_thrust, state)
         self._loop = loop
         self._guidance = guidance
-        self._state = state
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
         self._max_tilt = max_tilt
         self._period = period
-        self._position_stale = position_stale
+        self._fresh = FreshPosition(state, vehicle_clock, position_stale)
         self._clock = clock
-        self._vehicle_clock = vehicle_clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._ticker = Ticker(period, clock)
         self._recorder = StepRecorder(trace.recorder, state, vehicle_clock)
@@ -92,14 +91,7 @@ class GuidanceLoop:
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it arrived, or was measured, too long ago."""
-        return self._fresh_position(self._clock())
-
-    def _fresh_position(self, now: float) -> LocalPosition | None:
-        position = self._state.position
-        if position is None or now - position.received > self._position_stale:
-            return None
-        age = self._vehicle_clock.age(position.vehicle_time, now)
-        return None if age is not None and age > self._position_stale else position
+        return self._fresh.at(self._clock())
 
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
@@ -177,7 +169,7 @@ class GuidanceLoop:
     def step(self) -> None:
         """Make one command, unless the position is stale."""
         now = self._clock()
-        position = self._fresh_position(now)
+        position = self._fresh.at(now)
         standing = self._ground.standing
         may_idle = standing and self._ground.may_idle
         before, active = self._loop.command, self._loop.offboard_active

@@ -3,7 +3,7 @@
 from math import sin
 
 from companion.attitude import Quaternion, Target
-from companion.control.step_recorder import Telemetry
+from companion.control.telemetry import Telemetry
 from companion.guidance import GRAVITY, HoverThrust
 from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt

@@ -8,7 +8,7 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.loop_record import Deadlines
 from companion.control.outer_loop import make_guidance, motion_estimate
-from companion.control.step_recorder import Clock, Ground, Telemetry
+from companion.control.telemetry import Clock, Ground, Telemetry
 from companion.recording.trace import FlightTrace
 
 

@@ -1,67 +1,9 @@
-"""Records the steps of guidance, and names what guidance reads of the vehicle."""
-
-from typing import Protocol
+"""Records the steps of guidance."""
 
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
+from companion.control.telemetry import Clock, Telemetry
 from companion.recording.recorder import FlightRecorder
-from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
-
-
-class Telemetry(Protocol):
-    """The telemetry that guidance reads; attributes as in `VehicleState`."""
-
-    @property
-    def position(self) -> LocalPosition | None:
-        """The newest position."""
-        ...
-
-    @property
-    def battery(self) -> Battery | None:
-        """The newest state of the battery."""
-        ...
-
-    @property
-    def attitude_target_thrust(self) -> AttitudeTargetThrust | None:
-        """The newest thrust of the autopilot."""
-        ...
-
-    @property
-    def height(self) -> float | None:
-        """Height above home, m."""
-        ...
-
-    @property
-    def armed(self) -> bool | None:
-        """Whether the vehicle is armed; None: unknown."""
-        ...
-
-
-class Ground(Protocol):
-    """Whether the vehicle stands on the ground, as `GroundContact` tells it."""
-
-    @property
-    def standing(self) -> bool:
-        """Whether it stands on the ground."""
-        ...
-
-    @property
-    def may_idle(self) -> bool:
-        """Whether zero thrust is safe."""
-        ...
-
-
-class Clock(Protocol):
-    """The vehicle's clock, as `VehicleClock` tells it."""
-
-    @property
-    def offset(self) -> float | None:
-        """Vehicle time minus event-loop time, s, or None."""
-        ...
-
-    def age(self, vehicle_time: float, now: float) -> float | None:
-        """Age at the event-loop time `now` of a message stamped with `vehicle_time`, s."""
-        ...
 
 
 class StepRecorder:
