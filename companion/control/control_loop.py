@@ -232,6 +232,12 @@ class ControlLoop:
         if self._trace.recorder is not None:
             self._trace.recorder.action(self._clock(), "drop_command")
 
+    def restart_planner(self) -> None:
+        """Reset the planner at the next sample, because its state is not valid any more."""
+        self.planner.restart()
+        if self._trace.recorder is not None:
+            self._trace.recorder.action(self._clock(), "restart_planner")
+
     def _record_attitude_target(self, target: AttitudeTarget) -> None:
         if self._trace.recorder is not None:
             self._trace.recorder.add(self._clock(), self._rows.attitude_target, target)

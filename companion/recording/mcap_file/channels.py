@@ -29,6 +29,7 @@ ACTIONS = (
     "give_up",
     "follow",
     "drop_command",
+    "restart_planner",
     "drag_prior",
 )
 """What a phase told guidance to do, by number."""
@@ -124,6 +125,7 @@ GUIDANCE = Channel(
     (
         Code("holds_position", "Whether the vehicle should be at the horizontal reference."),
         Code("holds_height", "Whether the vehicle should be at the height of the reference."),
+        Code("height_steady", "Whether the commanded thrust is steady: no doublet, no own thrust."),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )
