@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from companion.cli import tool_options
+from companion.cli import recording_options, tool_options
 from companion.cli.tool_options import Commands, number
 
 _PACKAGE = "mavlink-companion"
@@ -45,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
+    recording_options.add_report(commands)
     tool_options.add_export(commands)
     tool_options.add_config(commands)
     return parser
