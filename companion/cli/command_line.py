@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from companion.cli import recording_options, tool_options
+from companion.cli import tool_options
+from companion.cli.recording_options import add_recordings
 from companion.cli.tool_options import Commands, number
 
 _PACKAGE = "mavlink-companion"
@@ -45,8 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
-    recording_options.add_report(commands)
-    tool_options.add_export(commands)
+    add_recordings(commands)
     tool_options.add_config(commands)
     return parser
 
@@ -61,6 +61,9 @@ def _add_flights(commands: Commands) -> None:
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
     show.add_argument(
         "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
+    )
+    show.add_argument(
+        "--open", action="store_true", help="open the report in the browser after the flight"
     )
     show.set_defaults(run="flights.demo")
     for command in (fly, show):

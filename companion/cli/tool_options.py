@@ -113,17 +113,6 @@ def add_tools(commands: Commands) -> None:
     plot.set_defaults(run="recordings.plot")
 
 
-def add_export(commands: Commands) -> None:
-    """Add `export`."""
-    export = commands.add_parser("export", help="write a recorded flight as CSV or Parquet")
-    export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
-    kind = export.add_mutually_exclusive_group(required=True)
-    kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
-    kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
-    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: the flight's folder")
-    export.set_defaults(run="recordings.export")
-
-
 def add_config(commands: Commands) -> None:
     """Add `config`, `init` and `check-config`."""
     show = commands.add_parser(

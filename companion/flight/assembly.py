@@ -15,7 +15,7 @@ from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
-from companion.flight.flown_config import description
+from companion.flight.flown_config import description, flat
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import EventRecorder
 from companion.flight.plan import Plan
@@ -203,6 +203,7 @@ def assemble(
             if config.guidance.kind == "nmpc":
                 guidance_loop.predictive = predictive(config, part, flight.note)
     if record is not None:
+        record.metadata("configuration", flat(config.model_dump(mode="json")))
         record.begin(flight.began, description(config, plan, real_time=real_time))
         ladder.on_change = record.alarm
         memory.on_begin = partial(_record_drag, record, clock)

@@ -1,7 +1,9 @@
 """The configuration of a flight in the flight's own folder, with what it flies: it flies again."""
 
+import json
 import platform
 import shutil
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,17 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
         "real_time": "yes" if real_time else "no",
         **({} if seed is None else {"seed": str(seed)}),
     }
+
+
+def flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    """The keys of a configuration as `section.key`, and their values as JSON."""
+    found: dict[str, str] = {}
+    for key, value in section.items():
+        if isinstance(value, dict):
+            found.update(flat(value, f"{prefix}{key}."))
+        else:
+            found[f"{prefix}{key}"] = json.dumps(value)
+    return found
 
 
 def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:

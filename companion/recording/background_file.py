@@ -8,6 +8,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -115,7 +116,7 @@ class BackgroundFile(ABC, Generic[T]):
             self._thread.join()
 
     def _run(self, file: ItemFile[T]) -> None:
-        synced_at = monotonic()
+        synced_at = -inf  # the first items are on the disk at once
         while not self._closing.wait(_PERIOD):
             self._write_waiting(file)
             if self.failure is None and monotonic() - synced_at >= _SYNC_PERIOD:

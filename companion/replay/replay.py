@@ -71,7 +71,7 @@ class Replay:
     """
 
     def __init__(self, record: FlightRecord, config: Config) -> None:
-        flew_program = record.metadata["flight"].get("plan") != "configuration"
+        flew_program = record.metadata["flight"].get("plan") == "program"
         self.follows_record = flew_program or config.guidance.kind == "nmpc"
         self._record = record
         self._now = 0.0

@@ -17,6 +17,7 @@ from companion.report.plots import (
     axes,
     line,
     over_time,
+    time_axis,
 )
 
 _STEPS_SHOWN = 6

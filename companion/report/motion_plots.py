@@ -13,6 +13,7 @@ from companion.report.plots import (
     line,
     numbers,
     over_time,
+    time_axis,
 )
 
 _NORTH, _EAST, _HEIGHT = range(3)

@@ -10,6 +10,7 @@ from typing import Any
 from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
+from companion.report import PAGE
 from companion.report.control_plots import control_plots
 from companion.report.flight_data import FlightData, recorded
 from companion.report.motion_plots import motion_plots
@@ -17,9 +18,6 @@ from companion.report.plots import Plot
 from companion.report.tables import Table, beside_each_other, configuration, flight_tables
 from companion.report.timeline import timeline
 from companion.report.tlog_data import logged
-
-FILE = "report.html"
-"""Name of the page in a flight's folder."""
 
 
 def read(path: Path) -> FlightData:
@@ -47,7 +45,7 @@ def write_report(path: Path, out: Path | None = None) -> Path:
     _require_extra()
     flight = read(path)
     if out is None:
-        out = path.with_suffix(".html") if path.is_file() else path / FILE
+        out = path.with_suffix(".html") if path.is_file() else path / PAGE
     words = None if flight.figures is None else closing_words(flight.figures, None)
     plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
     tables = flight_tables(flight)

@@ -1,5 +1,6 @@
 """The tables of the page: maneuvers, figures, configuration, and flights beside each other."""
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -48,11 +49,16 @@ def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
     labels = dict.fromkeys(label for figures in known for label in figures)
     figures = [(label, *(each.get(label, _EMPTY) for each in known)) for label in labels]
     keys = [
-        {f"{key.section}.{key.name}": _value(key.value) for key in flight.differences or ()}
+        None
+        if flight.differences is None
+        else {f"{key.section}.{key.name}": _value(key.value) for key in flight.differences}
         for flight in flights
     ]
-    changed = sorted({key for each in keys for key in each})
-    settings = [(key, *(each.get(key, "default") for each in keys)) for key in changed]
+    changed = sorted({key for each in keys for key in each or {}})
+    settings = [
+        (key, *(_EMPTY if each is None else each.get(key, "default") for each in keys))
+        for key in changed
+    ]
     differ = [row for row in settings if len(set(row[1:])) > 1]
     tables = [
         Table("Figures", ("figure", *names), figures),
@@ -127,6 +133,4 @@ def _maneuvers(figures: Any) -> Table:
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return ", ".join(map(_value, value)) or "none"
-    return "null" if value is None else str(value)
+    return json.dumps(value, ensure_ascii=False) if not isinstance(value, str) else value
