@@ -52,6 +52,10 @@ _POSITION_TIME = 0.1
 _POSITION_PULL = 4.0, 8.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
+_OBSERVER_BANDWIDTH = 1.5, 2.4
+"""Bandwidth of the observer times the delay of the attitude, with a slow and a quick rate loop. A
+quick observer follows the corrected position, and errors of the autopilot's velocity matter less.
+On a slow rate loop it would reduce the stability margins."""
 _CORRECTS_WITHIN = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_WINDOW = 0.1
@@ -77,31 +81,42 @@ def hold_weights(config: Config) -> Weights:
     )
 
 
-def _rate_loop_quickness(config: Config) -> float:
+def _rate_loop_quickness(config: Config, *, slewing: bool = True) -> float:
     """1 for rate loops up to `_QUICK`; 0 from `_SLOW` on and for an unidentified rate loop.
 
     A rate loop that slews slowly is late in large motions only: a stiff hold would swing on after
     them for good, as on the ArduPilot mock at 200 °/s.
+
+    Args:
+        config: configuration of the flight.
+        slewing: whether the time in which the rate loop slews counts.
     """
     if not config.vehicle.known:
         return 0.0
     lag, dead_time = slower_tilt(config)
-    limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
-    slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
-    slewing = config.limits.max_tilt_rate / min(slews) if slews else 0.0
-    late = dead_time + 0.5 * lag + 0.5 * slewing
+    late = dead_time + 0.5 * lag + (0.5 * _slewing_time(config) if slewing else 0.0)
     return min(max(0.0, (_SLOW - late) / (_SLOW - _QUICK)), 1.0)
 
 
-def _position_pull(config: Config) -> float:
-    slow, quick = _POSITION_PULL
-    return slow + _rate_loop_quickness(config) * (quick - slow)
+def _slewing_time(config: Config) -> float:
+    """Time in which the rate loop slews to the largest roll-pitch rate, s; 0 if unlimited."""
+    limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
+    slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
+    return config.limits.max_tilt_rate / min(slews) if slews else 0.0
+
+
+def _for_rate_loop(config: Config, slow_and_quick: tuple[float, float]) -> float:
+    """A setting of the observer, between its values for a slow and a quick rate loop."""
+    slow, quick = slow_and_quick
+    return slow + _rate_loop_quickness(config, slewing=False) * (quick - slow)
 
 
 def disturbance_bandwidth(config: Config) -> float:
-    """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
+    """Bandwidth of the observer of velocity and wind, rad/s, if it is not configured."""
     configured = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / attitude_delay(config) if configured is None else configured
+    if configured is not None:
+        return configured
+    return _for_rate_loop(config, _OBSERVER_BANDWIDTH) / attitude_delay(config)
 
 
 def attitude_delay(config: Config) -> float:
@@ -171,7 +186,7 @@ def motion_estimate(
     guidance = config.guidance
     bandwidth = _CALM_BANDWIDTH if _flies_identify(config) else disturbance_bandwidth(config)
     settings = ObserverSettings(
-        bandwidth, _POSITION_TIME, _position_pull(config), guidance.max_disturbance_m_s2
+        bandwidth, _POSITION_TIME, _for_rate_loop(config, _POSITION_PULL), guidance.max_disturbance_m_s2
     )
     correction = CorrectionSettings(
         _CORRECTS_WITHIN,

@@ -46,7 +46,8 @@ def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     assert (weights.position, weights.velocity) == pytest.approx((2.0 * delay**-4, delay**-2))
     heavy = believed(*VEHICLES[-1])
     assert hold_weights(heavy).position == pytest.approx(attitude_delay(heavy) ** -4)
-    assert disturbance_bandwidth(config) == pytest.approx(1.5 / delay)
+    assert disturbance_bandwidth(config) == pytest.approx(2.4 / delay)
+    assert disturbance_bandwidth(heavy) == pytest.approx(1.5 / attitude_delay(heavy))
     told = believed(
         47.0,
         40.0,
