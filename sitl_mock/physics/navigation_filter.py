@@ -18,6 +18,10 @@ _SAG_S = 2.0
 """Time constant with which the height error follows the acceleration, s."""
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
+_COMPASS_S = 20.0
+"""Time constant with which the heading follows the compass in a calm, s."""
+_SHOWN = 0.15
+"""Rate at which an acceleration of 1 m/s^2 shows the true heading, 1/s; it grows as the square."""
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 
@@ -68,6 +72,7 @@ class NavigationFilter:
 
     __slots__ = (
         "_at",
+        "_calm",
         "_config",
         "_corrected",
         "_decay",
@@ -82,6 +87,7 @@ class NavigationFilter:
         "_upright",
         "_yaw",
         "_yaw_decay",
+        "_yaw_pending",
     )
 
     def __init__(self, config: EkfConfig, start: Snapshot, seed: int) -> None:
@@ -93,6 +99,7 @@ class NavigationFilter:
         self._lead = config.acceleration_lead_ms * 1e-3
         self._random = Random(f"{seed}/navigation")
         self._yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
+        self._calm = self._yaw_pending = 0.0
         self._at = 0.0
         self._fixed_way, self._fixed_speed = _horizontal(start.position), _horizontal(start.motion)
         self._corrected = self._sag = 0.0
@@ -136,7 +143,10 @@ class NavigationFilter:
         noise = self._next_noise(self._upright.noise, share)
         still = _extrapolated(self._upright.errors, elapsed)
         upright = self._corrected_state(self._upright, still, noise, noise, settled, share * kick)
+        before = self._heading_error
         self._turn(speed, pull)
+        self._rest_on_compass(abs(pull), elapsed)
+        self._yaw_pending = settled * self._yaw_pending + self._heading_error - before
         sag = config.height_sag_s4_per_m * abs(pull) ** 2
         self._sag += (1.0 - exp(-elapsed / _SAG_S)) * (sag - self._sag)
         self._level, self._upright = level, upright
@@ -158,8 +168,17 @@ class NavigationFilter:
             (place.real, place.imag, down.real),
             (speed.real, speed.imag, (sink - settled * pending[1]).real),
             # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-            (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, self._yaw),
+            (
+                tilt.imag / _GRAVITY,
+                -tilt.real / _GRAVITY,
+                self._heading_error - settled * self._yaw_pending,
+            ),
         )
+
+    @property
+    def _heading_error(self) -> float:
+        """Heading error after the latest fix, rad."""
+        return self._yaw + self._calm
 
     def _turn(self, speed: complex, pull: complex) -> None:
         """Update the heading error: coloured noise about a mean that follows the turn rate."""
@@ -169,13 +188,28 @@ class NavigationFilter:
         learned = -turn_rate * config.turn_yaw_ms * 1e-3
         self._yaw = learned + decay * (self._yaw - learned) + self._random.gauss(0.0, spread)
 
+    def _rest_on_compass(self, pull: float, elapsed: float) -> None:
+        """Update the part of the heading error that comes from the compass.
+
+        Without acceleration only the compass tells the heading. An acceleration shows the true
+        heading: the fixes measure its direction.
+
+        Args:
+            pull: horizontal acceleration, m/s^2.
+            elapsed: time since the last fix, s.
+        """
+        slow = 1.0 / _COMPASS_S
+        rate = slow + _SHOWN * pull**2
+        rest = radians(self._config.compass_error_deg) * slow / rate
+        self._calm = rest + (self._calm - rest) * exp(-rate * elapsed)
+
     def _propagated(self, truth: Snapshot, elapsed: float) -> Errors:
         """Return the horizontal errors ``elapsed`` s after the fix.
 
         The filter integrated an acceleration that was rotated and scaled.
         """
         place, speed, tilt = _extrapolated(self._level.errors, elapsed)
-        wrong = complex(self._config.acceleration_scale, self._yaw)
+        wrong = complex(self._config.acceleration_scale, self._heading_error)
         before = self._fixed_speed
         way = _horizontal(truth.position) - self._fixed_way
         return (

@@ -26,7 +26,7 @@ class Estimate(NamedTuple):
     position_ned: Vector  # m
     velocity_ned: Vector  # m/s
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
-    gyro: Vector  # rad/s, what the (bias-free) gyro measures
+    gyro: Vector  # rad/s, what the gyro measures
 
 
 class WhiteNoise:
@@ -73,6 +73,7 @@ class Estimator:
         "_position_delay",
         "_rotation",
         "_yaw",
+        "_yaw_rate_bias",
         "reset_counter",
         "trail_length",
     )
@@ -95,6 +96,8 @@ class Estimator:
         self._attitude_delay = round(config.attitude_delay_ms * 1e-3 / dt)
         self._position_delay = round(config.position_delay_ms * 1e-3 / dt)
         self._filter = None if config.ekf is None else NavigationFilter(config.ekf, start, seed)
+        bias = 0.0 if config.ekf is None else config.ekf.yaw_rate_bias_deg_s
+        self._yaw_rate_bias = radians(bias)
         self._horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
         self.trail_length = 1 + max(self._attitude_delay, self._position_delay, self._horizon)
         """Steps whose motion an estimate needs, the present one included."""
@@ -134,7 +137,7 @@ class Estimator:
         noise = [0.0 + z * s for z, s in zip(self._noise.draw(15), self._deviations, strict=True)]
         turn_x, turn_y, turn_z, p_noise, q_noise, r_noise, *rest = noise
         turned = multiply(self.as_estimated((w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
-        gyro = (p + p_noise, q + q_noise, r + r_noise)
+        gyro = (p + p_noise, q + q_noise, r + r_noise + self._yaw_rate_bias)
         return Estimate(
             normalise(turned),
             gyro,
