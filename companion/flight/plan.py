@@ -75,14 +75,14 @@ class TakeoverPlan:
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The checks, perhaps the take-off, the takeover, control, and the hand-back."""
-        config, autopilot = context.config.flight, context.link.autopilot
+        config = context.config.flight
         connect, *_ = ground_phases(config)
         yield connect
-        for phase in (
-            takeoff_for_client_phases(config, autopilot)
-            if self._from_ground
-            else takeover_phases(config)
-        ):
+        if self._from_ground:
+            phases = takeoff_for_client_phases(config, context.link.autopilot)
+        else:
+            phases = takeover_phases(config)
+        for phase in phases:
             yield phase
         work = partial(fly_commanded, source=self._source)
         yield program_phase("control", f"{self._source.name} to end its control", work)

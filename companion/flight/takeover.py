@@ -1,11 +1,16 @@
 """The phases before a takeover: a vehicle that somebody else armed, in the air or on the ground."""
 
+import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 
 from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
 from companion.flight.preflight_phases import note_heartbeat_rate, report_offboard_loss
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
+
+_ARMED_SHOWS = 1.5
+"""Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
 
 
 async def look_over(context: FlightContext) -> None:
@@ -21,9 +26,14 @@ async def look_over(context: FlightContext) -> None:
 async def look_over_standing(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only telemetry is asked of it.
 
+    It may have been armed since the newest heartbeat.
+
     Raises:
         FlightEnded: it does not stand armed, or a finding blocks the take-off.
     """
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_ARMED_SHOWS):
+            await context.until(context.armed, "the vehicle to show that it is armed")
     await _look_over(context, Stage.ARMED, _require_standing)
     await context.until(lambda: context.link.state.home is not None, "the home position")
 

@@ -205,8 +205,8 @@ class ServedControl:
     def _no_takeoff(self, request: Request) -> str | None:
         """Why the vehicle does not take off for a client that asks for control on the ground."""
         state, situation = self._link.state, self._keeper.situation()
-        if not state.armed or not state.landed or situation is None:
-            return "arm first, or take off first"
+        if not state.landed or situation is None:
+            return "take off first: it is not known whether the vehicle stands on the ground"
         if climbs(request, situation):
             return None
         return "command a height of 1 m or more above the ground, or take off first"

@@ -101,7 +101,7 @@ class Program:
         report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
         async with asyncio.timeout(90.0):  # ArduPilot is ready after 40 s
             begin = self.starts_on_ground if from_ground else self.takes_off
-            while not await begin(5.0):
+            while not await begin(5.0):  # noqa: ASYNC110
                 await asyncio.sleep(1.0)
         await self.climbed(4.6)
         await asyncio.sleep(3.0)

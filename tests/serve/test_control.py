@@ -219,7 +219,7 @@ def test_px4_takes_off_for_a_client_that_asks_for_offboard_on_the_ground(tmp_pat
             await asyncio.sleep(10.0)
             await stream(0.5, lambda _: script.local(POSITION, up))
             assert await script.offboard() == REJECTED
-            assert "arm first" in " ".join(script.texts())
+            assert "arm it first" in " ".join(script.texts())
             script.command(400, 1)
             await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, 0.0)))
             assert await script.offboard() == REJECTED
@@ -255,9 +255,9 @@ def test_what_stops_the_takeoff_for_a_client_ends_it():
             hold = lambda _: script.local(POSITION, (0.0, 0.0, -8.0))  # noqa: E731
             for stop, height in (((400, 0), 0.0), ((176, 1, 4, 3), 0.8)):
                 script.command(400, 1)
-                await stream(1.5, hold)
+                await stream(0.2, hold)
                 asked = asyncio.ensure_future(script.offboard())
-                await stream(0.5, hold)
+                await stream(1.5, hold)
                 while -vehicle.state()["position"][2] < height:
                     await stream(0.1, hold)
                 station.command(*stop)
