@@ -69,9 +69,7 @@ def add_tune(commands: Commands) -> None:
         "--output", type=Path, metavar="FILE", help="default: tuned.yaml beside the vehicle file"
     )
     tune.add_argument("--force", action="store_true", help="replace FILE if it exists")
-    tune.add_argument(
-        "--no-flights", action="store_true", help="do not fly it on the mock vehicle"
-    )
+    tune.add_argument("--no-flights", action="store_true", help="do not fly it on the mock vehicle")
     tune.add_argument("--json", action="store_true", help="end with one line of JSON")
     tune.set_defaults(run="tune.tune")
 

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 from dataclasses import asdict
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from companion.config.files import changed, load
 from companion.config.known_drag import drag_prior
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
+from companion.recording.learned_file import newest
 from companion.tuning import Disturbances, Proposal, propose
 from companion.tuning.flights import COURSES, Flown, autopilot_like, flown
 from companion.tuning.noise import measured_disturbances
@@ -34,6 +36,7 @@ def tune(options: argparse.Namespace) -> int:
     output = options.output or vehicle.with_name(_OUTPUT)
     _check_output(output, options.force)
     config, included = _configuration(source, vehicle, options.config)
+    config = _with_learned_drag(config, source)
     log = source / _LOG
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
@@ -44,10 +47,10 @@ def tune(options: argparse.Namespace) -> int:
     write_whole(output, proposal_text(proposal, include, flights, source.name))
     load(output)
     console.print("\n".join(summary_lines(proposal, flights)))
+    keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
     console.print(
-        f"Written to {output}. Let your configuration include it, and remove "
-        f"{', '.join(f'{section}.{key}' for section, keys in proposal.changes.items() for key in keys)}"
-        " from your own file: its own keys would win."
+        f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
+        "from your own file: its own keys would win."
     )
     good = all(after.ok for _, after in flights.values())
     if options.json:
@@ -64,7 +67,9 @@ def _check_output(output: Path, force: bool) -> None:
     if output.is_dir():
         raise ConfigError(f"{output} is a folder; name a file in it with --output")
     if output.exists() and not force:
-        raise ConfigError(f"{output} exists; name another with --output, or replace it with --force")
+        raise ConfigError(
+            f"{output} exists; name another with --output, or replace it with --force"
+        )
     if not output.parent.is_dir():
         raise ConfigError(f"{output}: there is no folder {output.parent}")
 
@@ -90,6 +95,18 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
         return _flyable(identified), True
     told = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
     return _flyable(changed(load(base), told, str(vehicle))), True
+
+
+def _with_learned_drag(config: Config, source: Path) -> Config:
+    """The configuration with the drag that the flights beside a flight folder have learned."""
+    learned = newest(source.resolve().parent) if source.is_dir() else None
+    if config.guidance.drag is not None or learned is None:
+        return config
+    drag = {
+        "drag_per_s": learned.drag.linear,
+        "quadratic_drag_per_m": learned.drag.quadratic,
+    }
+    return changed(config, {"guidance": drag}, str(learned.path))
 
 
 def _flyable(config: Config) -> Config:
@@ -149,5 +166,5 @@ def _figures(
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, float):
-        return round(value, 4) if value == value else None
+        return round(value, 4) if isfinite(value) else None
     return value

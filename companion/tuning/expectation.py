@@ -129,12 +129,12 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     )
     parts = (gusts, path, noise)
     # Both axes are disturbed independently, therefore the factor 2.
-    moved = (
-        sum(2.0 * _variance(omega, response[0], density) for response, density in part)
+    by_gusts, on_path, by_noise = (
+        sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in part))
         for part in parts
     )
     turned = sum(2.0 * _variance(omega, r[1], density) for part in parts for r, density in part)
-    return Errors(*map(sqrt, moved), sqrt(turned))
+    return Errors(by_gusts, on_path, by_noise, sqrt(turned))
 
 
 def _slow(omega: Floats, deviation: float, time: float) -> Floats:
@@ -170,7 +170,8 @@ def _after_gust(config: Config) -> tuple[float, float]:
     """Peak (m) and settling time (s) of the position after an impulse of 1 m/s."""
     offset = 0.1  # 1/s; the frequencies are shifted by it, as for `frequencies`
     omega = np.arange(0.0, 60.0, 0.05)
-    place, _ = control_loop(config, offset + 1j * omega).by_acceleration()
+    s = np.asarray(offset + 1j * omega, dtype=np.complex128)
+    place, _ = control_loop(config, s).by_acceleration()
     time = np.arange(0.0, _LONGEST, _STEP)
     terms = np.real(np.exp(1j * np.outer(time, omega)) @ (place * _trapezoid(omega)))
     response = np.abs(np.exp(offset * time) * terms / pi)

@@ -41,9 +41,8 @@ class Margins(NamedTuple):
         """For the user."""
         if not self.stable:
             return "unstable"
-        return (
-            f"{self.gain_db:.1f} dB, {self.phase_deg:.0f}°, {1e3 * self.delay:.0f} ms of added delay"
-        )
+        delay = 1e3 * self.delay
+        return f"{self.gain_db:.1f} dB, {self.phase_deg:.0f}°, {delay:.0f} ms of added delay"
 
 
 def margins(s: Complex, loop_gain: Complex) -> Margins:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY
-from companion.mavlink.errors import LogError
 from companion.mavlink.tlog_file import messages
 from companion.tuning.expectation import Disturbances
 from companion.vehicle.registry import AUTOPILOTS

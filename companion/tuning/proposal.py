@@ -39,14 +39,21 @@ class Proposal:
 
     @property
     def changes(self) -> dict[str, dict[str, float]]:
-        """The proposed keys by section, as `companion.config.files.changed` takes them."""
-        design = self.design
+        """The proposed keys by section, as `companion.config.files.changed` takes them.
+
+        A known drag is among them: the feedforward needs it, and the analysis counted on it.
+        """
+        design, drag = self.design, self.tuned.guidance.drag
+        known = {}
+        if drag is not None:
+            known = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
         return {
             "planner": {"gain_per_s": design.gain},
             "guidance": {
                 "position_weight_per_s4": design.position,
                 "velocity_weight_per_s2": design.velocity,
                 "disturbance_bandwidth_rad_s": design.bandwidth,
+                **known,
             },
         }
 
@@ -81,7 +88,10 @@ def propose(
     after = expectation(tuned, disturbances)
     found = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.
-    if not found.stable or min(found.gain_db / aims.gain_db, found.phase_deg / aims.phase_deg) < 0.95:
+    if (
+        not found.stable
+        or min(found.gain_db / aims.gain_db, found.phase_deg / aims.phase_deg) < 0.95
+    ):
         raise ConfigError(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
             "vehicle; look at its lag and dead time"

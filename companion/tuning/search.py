@@ -10,7 +10,7 @@ from companion.control.expected_response import LARGEST_PRODUCT
 from companion.control.inner_loop import slower_tilt
 from companion.control.outer_loop import attitude_delay
 from companion.tuning.expectation import Disturbances, expected_errors
-from companion.tuning.loop import EXACT, ModelError, control_loop
+from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
@@ -166,9 +166,7 @@ def _cost(
     tried = design.applied(config)
     s = frequencies()
     loop = control_loop(tried, s)
-    expected = expected_errors(
-        loop, disturbances, 1.0 / config.link.position_rate_hz
-    )
+    expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     exact = smaller(margins(s, loop.whole), margins(s, loop.outer))
     missed = _missed(exact, aims.gain_db, aims.phase_deg)
     missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)

@@ -46,9 +46,11 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         *_compared(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
-        f"aims: {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin, stable with the errors below",
+        f"aims: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°, and the margins below",
     ]
-    lines += [f"margin {_error(error)}: {found.sentence()}" for error, found in proposal.with_errors]
+    lines += [
+        f"margin {_error(error)}: {found.sentence()}" for error, found in proposal.with_errors
+    ]
     used = 3.0 * degrees(after.errors.rate)
     lines.append(
         f"cost: these disturbances command up to {used:.0f}°/s (3 standard deviations) of the "
@@ -83,9 +85,9 @@ def _flight_line(name: str, before: Flown, after: Flown) -> str:
     if not (before.ok and after.ok):
         return f"{name}: {before.result} -> {after.result}"
     return (
-        f"{name}: reported {before.reported:.3f} -> {after.reported:.3f}, true {before.true:.3f} -> "
-        f"{after.true:.3f} (of which the estimate's own {after.estimate:.3f}), rates "
-        f"{degrees(before.rate):.0f} -> {degrees(after.rate):.0f} °/s"
+        f"{name}: reported {before.reported:.3f} -> {after.reported:.3f}, true "
+        f"{before.true:.3f} -> {after.true:.3f} (estimate off by {after.estimate:.3f}), "
+        f"rates {degrees(before.rate):.0f} -> {degrees(after.rate):.0f} °/s"
     )
 
 
@@ -104,7 +106,10 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
         )
     else:
         why = f"below {limit:.2f}, the quickest sensible gain, for the margins"
+    drag = "as configured, or learned in an earlier flight of this vehicle"
     return {
+        "drag_per_s": drag,
+        "quadratic_drag_per_m": drag,
         "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {why}",
         "position_weight_per_s4": f"before {weights.position:.3g}; a stiffer hold tracks better, "
         "until the margins are used up",
