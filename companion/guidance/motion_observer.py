@@ -36,20 +36,28 @@ class ObserverSettings:
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
         largest: largest disturbance, m/s².
+        sharpening: relative increase of the bandwidth with smooth positions.
     """
 
     bandwidth: float
     position_time: float
     position_pull: float
     largest: float
+    sharpening: float = 0.0
 
-    def gains(self, dt: float) -> ObserverGains:
-        """The gains for measurements `dt` seconds apart."""
+    def gains(self, dt: float, smoothness: float = 0.0) -> ObserverGains:
+        """The gains for measurements `dt` seconds apart.
+
+        Args:
+            dt: s.
+            smoothness: 1 if the positions are smooth, 0 if they are noisy.
+        """
+        bandwidth = (1.0 + smoothness * self.sharpening) * self.bandwidth
         position = 1.0 if self.position_time <= 0.0 else 1.0 - exp(-dt / self.position_time)
         return ObserverGains(
             position,
-            1.0 - exp(-2.0 * self.bandwidth * dt),
-            (1.0 - exp(-self.bandwidth * dt)) ** 2 / dt,
+            1.0 - exp(-2.0 * bandwidth * dt),
+            (1.0 - exp(-bandwidth * dt)) ** 2 / dt,
         )
 
 
@@ -75,13 +83,16 @@ class MotionObserver:
         self._motion = None
         self.disturbance = (0.0, 0.0)
 
-    def observe(self, time: float, measured: VehicleMotion, known: Horizontal) -> None:
+    def observe(
+        self, time: float, measured: VehicleMotion, known: Horizontal, smoothness: float = 0.0
+    ) -> None:
         """Take a measured position and velocity.
 
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
             known: horizontal acceleration by thrust and drag since the last measurement, m/s².
+            smoothness: 1 if the positions are smooth, 0 if they are noisy.
         """
         motion, dt = self._motion, time - self._time
         self._time = time
@@ -89,7 +100,7 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        gains = settings.gains(dt)
+        gains = settings.gains(dt, smoothness)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):

@@ -16,8 +16,9 @@ from companion.attitude.reference_model import braking_lead, model_lag
 from companion.config import Config
 from companion.config.guidance import LINEAR
 from companion.config.known_drag import drag_prior
+from companion.control.hold_settings import observer_settings
 from companion.control.inner_loop import slower_tilt
-from companion.control.outer_loop import linear_settings, observer_settings
+from companion.control.outer_loop import linear_settings
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY
 from companion.tuning.feedback import Complex, guidance_feedback, hold_element
@@ -25,7 +26,7 @@ from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 POSITION_LATENESS = 0.010
 """Delay of the autopilot's position that its time stamp does not show, s."""
 _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
-"""Rate loop of a heavy vehicle, s, as `outer_loop` assumes it if none is identified."""
+"""Rate loop of a heavy vehicle, s, as `hold_settings` assumes it if none is identified."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from companion.config import Config
 from companion.control.expected_response import LARGEST_PRODUCT
+from companion.control.hold_settings import attitude_delay
 from companion.control.inner_loop import slower_tilt
-from companion.control.outer_loop import attitude_delay
 from companion.tuning.expectation import Disturbances, expected_errors
 from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller
@@ -80,7 +80,7 @@ _SMALLEST = Design(1.0, 0.01, 0.01, 0.3)
 def slewing_delay(config: Config) -> float:
     """Additional delay of the rate loop while it slews to the largest roll-pitch rate, s.
 
-    It is half the time for which the rate loop slews, as in `outer_loop.hold_weights`.
+    It is half the time for which the rate loop slews, as in `hold_settings.hold_weights`.
     """
     axes = config.vehicle.axes
     slews = [axes[name].acceleration_limit for name in ("roll", "pitch")]
@@ -127,7 +127,7 @@ def _improved(
 
 
 def _starts(config: Config) -> Iterator[Design]:
-    """Designs like those of the program's rule (`outer_loop.hold_weights`), but calmer.
+    """Designs like those of the program's rule (`hold_settings.hold_weights`), but calmer.
 
     The pattern search finds only the nearest minimum, therefore it has three starts.
     """

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from math import degrees
 from pathlib import Path
 
-from companion.control.outer_loop import disturbance_bandwidth, hold_weights
+from companion.control.hold_settings import disturbance_bandwidth, hold_weights
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
 from companion.tuning.flights import Flown

@@ -32,7 +32,7 @@ def configured(name, gain, **guidance):
 
 CONFIGS = {
     "px4": configured("px4", 5.0),
-    "ardupilot": configured("ardupilot", 8.0),
+    "ardupilot": configured("ardupilot", 8.0, disturbance_bandwidth_rad_s=8.0),
     "soft": configured(
         "px4",
         3.0,
