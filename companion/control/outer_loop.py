@@ -168,23 +168,25 @@ def motion_estimate(
         config: configuration of the flight.
         offset: returns vehicle time minus event-loop time, s, or None.
     """
-    guidance = config.guidance
-    bandwidth = _CALM_BANDWIDTH if _flies_identify(config) else disturbance_bandwidth(config)
-    settings = ObserverSettings(
-        bandwidth, _POSITION_TIME, _position_pull(config), guidance.max_disturbance_m_s2
-    )
     correction = CorrectionSettings(
         _CORRECTS_WITHIN,
         _CORRECTION_WINDOW,
         _LARGEST_CORRECTION,
-        guidance.position_lateness,
+        config.guidance.position_lateness,
     )
     return MotionEstimate(
-        MotionObserver(settings),
+        MotionObserver(observer_settings(config)),
         PositionCorrection(correction),
         DragEstimate(drag_prior(config)),
         offset,
     )
+
+
+def observer_settings(config: Config) -> ObserverSettings:
+    """Settings of the motion observer."""
+    bandwidth = _CALM_BANDWIDTH if _flies_identify(config) else disturbance_bandwidth(config)
+    largest = config.guidance.max_disturbance_m_s2
+    return ObserverSettings(bandwidth, _POSITION_TIME, _position_pull(config), largest)
 
 
 def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
