@@ -14,6 +14,7 @@ from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
+from companion.flight.status import FlightStatus
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
@@ -23,19 +24,27 @@ from companion.serve.session import ServeSession
 def serve(options: argparse.Namespace) -> int:
     """Pass everything between the vehicle and other programs, and fly their setpoints."""
     config = _as_told(load(options.config), options)
-    observer = TerminalObserver(FlightConsole(stderr=options.json, highlight=False))
+    observer = _Events(FlightConsole(stderr=options.json, highlight=False))
     began = time.monotonic()
 
     def note(text: str) -> None:
         observer.event(time.monotonic() - began, text)
 
+    session = ServeSession(config, note, observer, directory=config.recording.directory)
     try:
-        counters = link_loop.run(_until_stopped(ServeSession(config, note, observer)))
+        counters = link_loop.run(_until_stopped(session))
     finally:
         observer.close()
     if options.json:
         print(json.dumps(counters))
     return EXIT_OK
+
+
+class _Events(TerminalObserver):
+    """Shows phases and events; no live lines, which would stay between two flights."""
+
+    def status(self, status: FlightStatus) -> None:
+        """Ignore it."""
 
 
 async def _until_stopped(session: ServeSession) -> dict[str, Any]:

@@ -44,13 +44,13 @@ class Key(NamedTuple):
     """One key of a section.
 
     Attributes:
-        section: where it stands.
-        name: of the key.
-        value: as it stands in a file.
-        default: the same.
-        unit: such as °/s; empty: none.
-        allowed: range or choices, in words; empty: as the type says.
-        meaning: what it is.
+        section: name of its section.
+        name: name of the key.
+        value: its value as YAML.
+        default: its default as YAML.
+        unit: unit such as °/s; empty without a unit.
+        allowed: range or choices, in words; empty if the type allows any value.
+        meaning: what the key means.
     """
 
     section: str

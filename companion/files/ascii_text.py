@@ -35,7 +35,7 @@ _WORDS = {
     "┃": "|",
     "█": "#",
 }
-"""No double quotation mark or backslash among them: JSON must stay JSON."""
+"""ASCII for some characters. It has no quotation mark or backslash, so JSON stays valid."""
 
 
 def ascii_for(text: str) -> str:
@@ -51,7 +51,7 @@ def ascii_for(text: str) -> str:
 
 
 def _one(char: str) -> str:
-    """One character that is not ASCII."""
+    """ASCII for one character that is not ASCII."""
     if char in _WORDS:
         return _WORDS[char]
     kept = [one for one in unicodedata.normalize("NFKD", char) if not unicodedata.combining(one)]

@@ -1,4 +1,4 @@
-"""YAML as plain values, read within bounds: a file from anywhere must cost neither time nor memory.
+"""YAML as plain values, read within bounds: no file may cost much time or memory.
 
 Numbers and words mean what YAML 1.2 says (its core schema): 010 is ten, 1:30 and a date are texts,
 and so are yes, no, on and off. Tags and aliases are refused: no file of ours needs them, and a few
@@ -12,17 +12,17 @@ from typing import Any, NamedTuple
 import yaml
 
 MOST_BYTES = 250_000
-"""Of a file; a thousand waypoints take 50 kB."""
+"""Largest size of a file, bytes. A thousand waypoints take 50 kB."""
 MOST_NODES = 6000
-"""Keys, values, lists and mappings together."""
+"""Largest number of keys, values, lists and mappings together."""
 DEEPEST = 20
-"""Levels of lists and mappings."""
+"""Largest nesting depth of lists and mappings."""
 LONGEST_TEXT = 4096
-"""Characters of a value."""
+"""Most characters of a value."""
 LONGEST_KEY = 100
-"""Characters of a key."""
+"""Most characters of a key."""
 LONGEST_NUMBER = 40
-"""Characters of a number."""
+"""Most characters of a number."""
 
 _WORDS = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL")),
@@ -42,7 +42,7 @@ class YamlError(Exception):
 
     Args:
         problem: what is wrong.
-        line: where, from 1; None: in the file as a whole.
+        line: line number from 1; None if the fault is not on one line.
     """
 
     def __init__(self, problem: str, line: int | None = None) -> None:
@@ -97,7 +97,7 @@ def read(text: str) -> Document:
 
 
 def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
-    """What is wrong and how to mend it, for the mistakes that are made most."""
+    """The fault and its remedy, for the commonest mistakes."""
     problem = str(error.problem)
     lines, mark = text.splitlines(), error.problem_mark
     line = lines[mark.line] if mark and mark.line < len(lines) else ""

@@ -1,4 +1,4 @@
-"""Writing a file whole or not at all: whoever reads it, at any time, reads the old or the new."""
+"""Atomic writing of a file: at any time a reader finds either the old or the new content."""
 
 import os
 from contextlib import suppress
@@ -32,7 +32,7 @@ def write_whole(path: Path, text: str, mode: int = 0o666) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have the file's new name on the disk, too, where the file system can do that."""
+    """Write the folder's entries to the disk, if the file system supports it."""
     with suppress(OSError):  # some network file systems refuse; the file itself is whole
         descriptor = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""What is wrong with a value or a key, and how to mend it: one sentence for each fault."""
+"""Error messages about keys and values of a YAML file: one sentence with fault and remedy."""
 
 import difflib
 import re
@@ -60,7 +60,7 @@ def without_consequences(details: list[Any]) -> list[Any]:
 
 
 def other_unit(key: str, value: float) -> tuple[str, float]:
-    """The unit that this key's is mistaken for, and the value converted from it."""
+    """The unit that is often confused with this key's unit, and the value converted from it."""
     unit, convert = next((unit, convert) for end, unit, convert in _SLIPS if key.endswith(end))
     return unit, convert(value)
 
@@ -88,7 +88,7 @@ def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) ->
 
 
 def _remedy(detail: Any, key: str) -> str | None:
-    """What to write instead, for values of another kind than the key's."""
+    """What to write instead of a value of the wrong type."""
     kind, value = detail["type"], detail["input"]
     if kind == "value_error" and "must be a number" in detail["msg"]:
         return f"must be a number: {_number_in(key, value)} (got {shortened(value)})"
@@ -123,7 +123,7 @@ def _number_in(key: str, text: str) -> str:
 
 
 def _slip(detail: Any, where: str) -> str:
-    """A hint where the value would keep its bound in the unit that it is mistaken for."""
+    """A hint if the value would be in range in the unit that is often confused with the key's."""
     bound = detail.get("ctx", {})
     value = detail["input"]
     if not isinstance(value, int | float) or not value:
@@ -134,7 +134,7 @@ def _slip(detail: Any, where: str) -> str:
 
 
 def _unknown(location: tuple[int | str, ...], value: Any, model: type[BaseModel]) -> str:
-    """That a key is unknown, and the key that was meant."""
+    """The message about an unknown key, with the key that was probably meant."""
     name = str(location[-1])
     beside = list(_model_at(location, model).model_fields)
     everywhere = [(key, place) for place, key in _keys(model) if place != location[:-1]]
@@ -163,7 +163,7 @@ def _either(places: list[str]) -> str:
 
 
 def _likeness(one: str, other: str) -> float:
-    """From 0 to 1; a key that lacks only its unit is very like."""
+    """Similarity of two keys, 0 to 1. Two keys that differ only in the unit are very similar."""
     if other.startswith(f"{one}_"):
         return 0.99
     return difflib.SequenceMatcher(None, one, other).ratio()

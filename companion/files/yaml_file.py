@@ -154,7 +154,7 @@ def _contents(text: str, name: str, model: type[Section]) -> Contents:
 
 
 def _filled(key: Any, value: Any, model: type[Section]) -> Any:
-    """The value; an empty section for a section name without keys."""
+    """The value, or an empty section if a section's name stands without keys."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
         return value

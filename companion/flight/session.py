@@ -1,27 +1,20 @@
 """A session: one flight with its folder, recording, link and summary."""
 
 import asyncio
-import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, replace
 from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.flight import flown_config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
 from companion.flight.context import cancel
-from companion.flight.course import advice, course_of
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.observer import EventRecorder, Observer
+from companion.flight.flight_record import FlightRecord
+from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
-from companion.mavlink.texts import TextFrames
 from companion.realtime import Wishes
 from companion.recording.summary import Summary
-from companion.recording.tlog import TlogWriter
 from companion.safety.actions import internal
 from companion.vehicle.link import Link
 
@@ -91,13 +84,14 @@ class Session:
         """
         # This takes up to a second, during which an open link would not be read.
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
-        if self._folder is not None:
-            flown_config.record(self._config, self._folder, follows=self._plan is None)
         environment = self._environment
+        record = FlightRecord(
+            self._config, self._folder, environment, self.note, follows=self._plan is None
+        )
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
-        with realtime.asked_for(wishes) as grants, self._tlog() as tlog:
-            recorder = EventRecorder(self._observer, *self._writer(tlog))
-            async with open_link(self._config, tlog, self.note, environment.open_transport) as link:
+        with realtime.asked_for(wishes) as grants, record:
+            recorder, opener = record.recorder(self._observer), environment.open_transport
+            async with open_link(self._config, record.tap, self.note, opener) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
@@ -113,37 +107,9 @@ class Session:
                     result = await self._run(link, self._assembled)
                 finally:
                     self._assembled.close()
-            summary = self._summary(link, self._assembled, recorder, result, grants)
+            summary = record.summary(link.stats, self._assembled, recorder, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
-        dropped = 0 if tlog is None else tlog.dropped
-        summary = replace(summary, link={**summary.link, "not_recorded": dropped})
-        if self._folder is not None:
-            self._save(self._folder, summary)
-        return summary
-
-    def _tlog(self) -> AbstractContextManager[TlogWriter | None]:
-        """What writes the frames of the flight, if they are recorded."""
-        if self._folder is None:
-            return nullcontext()
-        loop = asyncio.get_running_loop()
-        in_vehicle_time = self._config.link.lockstep or not self._environment.realtime
-        epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
-
-        def on_failure(text: str) -> None:  # called in the writing thread
-            loop.call_soon_threadsafe(self.note, text)
-
-        return TlogWriter(self._folder / "flight.tlog", epoch, on_failure)
-
-    def _writer(self, tlog: TlogWriter | None) -> tuple[Callable[[], float], Callable[[str], None]]:
-        """Our clock, and what writes words into the `.tlog` as STATUSTEXT of ours."""
-        clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
-
-        def write(words: str) -> None:
-            if tlog is not None:
-                for frame in texts.frames(words):
-                    tlog(clock(), frame)
-
-        return clock, write
+        return record.save(summary)
 
     async def _run(self, link: Link, assembled: Assembled) -> str:
         """Fly over the open link."""
@@ -167,47 +133,3 @@ class Session:
             await assembled.reporter.run()
         except Exception as error:
             assembled.flight.note(internal(error))
-
-    def _summary(
-        self,
-        link: Link,
-        assembled: Assembled,
-        recorder: EventRecorder,
-        result: str,
-        grants: tuple[realtime.Grant, ...],
-    ) -> Summary:
-        """The summary of a flight that is over, while its log is still open."""
-        counts = {
-            name: value for name, value in asdict(link.stats).items() if isinstance(value, int)
-        }
-        flight, trace = assembled.flight, assembled.trace
-        dead_times = assembled.dead_time_watch.over_the_flight()
-        advised = advice(assembled, dead_times)
-        for text in advised:  # shown with the figures, not here
-            if text == dead_times.warning():
-                continue  # told in flight
-            flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
-            recorder.write(text)
-        assembled.memory.save()
-        return Summary(
-            result=result,
-            phase=(flight.failed_in or flight.phase).name,
-            planner=self._config.planner_name,
-            gain=self._config.planner.gain_per_s,
-            counts=assembled.counts(),
-            link=counts,
-            trace=trace,
-            events=flight.events,
-            log=self._folder,
-            dead_times=dead_times,
-            predictive=assembled.predictive_figures(),
-            realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            course=course_of(assembled, recorder.phases, result, advised),
-        )
-
-    def _save(self, folder: Path, summary: Summary) -> None:
-        try:
-            (folder / "summary.json").write_text(summary.as_json() + "\n", encoding="utf-8")
-            summary.trace.save(folder)
-        except OSError as error:
-            self.note(f"{folder}: some files were not written: {error.strerror}")

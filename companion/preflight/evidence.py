@@ -22,11 +22,11 @@ class Stage(Enum):
     """What the vehicle is about to do; the value completes "ready …"."""
 
     GROUND = "to be armed"
-    """It stands disarmed."""
+    """The vehicle stands on the ground, disarmed."""
     ARMED = "to take off"
-    """It stands armed."""
+    """The vehicle stands on the ground, armed."""
     AIRBORNE = "to be taken over"
-    """It holds in the air, flown by its autopilot."""
+    """The vehicle hovers, flown by its autopilot."""
 
 
 class Identity(NamedTuple):

@@ -170,7 +170,7 @@ def _thrust(told: Reference, drag: Drag) -> Vector:
 def _answer(
     told: Reference, tilt: tuple[float, float], gain: float, period: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Rates of the thrust axis (north, east) now, and the coefficients a period later."""
+    """Rates of the coefficients (north, east) now, 1/s, and the coefficients a period later."""
     if told.coefficients is not None:
         aim = told.coefficients
         left = exp(-gain * period)

@@ -20,14 +20,14 @@ from companion.vehicle.link import Link
 
 Word = Annotated[str, Field(max_length=100)]
 LARGEST = 3.5e38
-"""PARAM_SET carries a 32-bit float."""
+"""Largest magnitude of a parameter: PARAM_SET carries a 32-bit float."""
 
 
 class Undo(Section):
     """What to restore, and on which vehicle."""
 
     autopilot: Word
-    """Name of the autopilot."""
+    """Autopilot of the vehicle, by name."""
     system: Annotated[int, Field(ge=1, le=255)]
     """The vehicle's system id."""
     uid: Word | None
@@ -85,7 +85,7 @@ class UndoFile:
 
 
 def _unused(directory: Path, name: str) -> Path:
-    """A path that does not exist yet: another run may have begun within the same second."""
+    """A path that does not exist yet, even if another run began within the same second."""
     path, number = directory / f"{name}.yaml", 1
     while path.exists():
         number += 1
@@ -96,7 +96,7 @@ def _unused(directory: Path, name: str) -> Path:
 _SINGLE = 1e-6
 """Relative resolution of a single-precision parameter."""
 _KNOWN_FOR = 3.0
-"""An older heartbeat no longer tells whether the vehicle is armed, s."""
+"""Largest age of a heartbeat that still tells whether the vehicle is armed, s."""
 
 
 class Answer(Enum):

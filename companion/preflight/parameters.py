@@ -97,7 +97,7 @@ def _untold(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _hidden(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether it, or its counterpart in other versions, may exist although it was not read."""
+    """Whether the parameter, or its counterpart in another version, may exist unread."""
     places = {rule.name, rule.instead}
     return places.isdisjoint(survey.values) and not places.isdisjoint(survey.untold)
 

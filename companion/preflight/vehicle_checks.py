@@ -14,7 +14,7 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 NOT_READY = CheckResult.NOT_READY
 
 _FEW_UNUSABLE = 0.01
-"""Share of unusable attitude samples above which it is more than single damaged messages."""
+"""Largest share of unusable attitude samples that single damaged messages explain."""
 
 
 def armed(state: VehicleState) -> Finding:
@@ -71,7 +71,7 @@ def motors(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def power(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """The battery."""
+    """Whether the battery allows a flight: see `battery`."""
     if evidence.booting and evidence.state.battery is None:
         yield Finding(Key.BATTERY, NOT_READY, "the vehicle has not told its battery's charge yet")
     else:
@@ -134,7 +134,7 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether it stands on the ground, at home's height."""
+    """Whether the vehicle stands on the ground, at the height of home."""
     state, source = evidence.state, "EXTENDED_SYS_STATE, LOCAL_POSITION_NED, HOME_POSITION"
     if evidence.stage is Stage.AIRBORNE:
         return
@@ -190,7 +190,7 @@ def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether it stands inside a fence given by latitude and longitude."""
+    """Whether the vehicle stands inside a fence given by latitude and longitude."""
     corners, told = config.safety.fence_polygon_deg, evidence.state.global_position
     if not corners:
         return

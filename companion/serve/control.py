@@ -1,6 +1,7 @@
 """Control by clients: whose setpoints are flown, and who asks for control."""
 
 import asyncio
+import gc
 from typing import NamedTuple
 
 from companion.config import Config
@@ -8,6 +9,7 @@ from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
 from companion.serve.component import Component
+from companion.serve.flight_records import FlightRecords
 from companion.serve.mode_requests import asks_for_control, leaves_control, starves_control
 from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
@@ -46,6 +48,7 @@ class ServedControl:
         keeper: knows where the vehicle is.
         observer: is told of phases and events of each flight.
         environment: of the flights.
+        records: makes their records.
     """
 
     def __init__(
@@ -56,7 +59,9 @@ class ServedControl:
         keeper: SituationKeeper,
         observer: Observer,
         environment: Environment,
+        records: FlightRecords,
     ) -> None:
+        self._records = records
         self._config, self._link, self._component = config, link, component
         self._keeper, self._observer, self._environment = keeper, observer, environment
         self._clock = asyncio.get_running_loop().time
@@ -65,6 +70,7 @@ class ServedControl:
         self._newest: dict[_Owner, Request] = {}
         self._flight: ServedFlight | None = None
         self._task: asyncio.Task[None] | None = None
+        self._unfinished: set[asyncio.Task[None]] = set()
         self._not_before = 0.0
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
@@ -100,10 +106,11 @@ class ServedControl:
         return False
 
     async def close(self, reason: str) -> None:
-        """Hand the vehicle back, if a client has it, and wait until that is done."""
-        if self._flight is not None and self._task is not None:
+        """Hand the vehicle back, if a client has it, and wait until that is done and recorded."""
+        if self._flight is not None:
             self._flight.interrupt(reason)
-            await asyncio.wait({self._task})
+        if self._unfinished:
+            await asyncio.wait(self._unfinished)
 
     def leave(self) -> None:
         """Stop sending setpoints at once."""
@@ -205,11 +212,15 @@ class ServedControl:
             self.ownership,
             self._observer,
             self._environment,
+            self._records,
         )
         flight.give(self._newest[owner])
-        self._task = asyncio.create_task(self._fly(flight, asked))
+        self._task = task = asyncio.create_task(self._fly(flight, asked))
+        self._unfinished.add(task)
+        task.add_done_callback(self._unfinished.discard)
 
     async def _fly(self, flight: ServedFlight, asked: Asked | None) -> None:
+        """Fly; when the next flight may begin, write the rest of the record."""
         begun = False
         try:
             begun = await flight.run(asked)
@@ -218,6 +229,9 @@ class ServedControl:
             self._flight = self._task = None
             if not begun:
                 self._not_before = self._clock() + _TRY_AGAIN
+            await flight.save()
+            if not gc.isenabled():  # `realtime.freeze_gc`: its work is done between flights
+                gc.collect()
 
     def _answer(self, client: Client, frame: Frame, result: int) -> None:
         """Answer a client's command in the autopilot's name: it was addressed to the autopilot."""

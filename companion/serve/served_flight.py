@@ -1,19 +1,23 @@
 """One flight under a client's control: the takeover, the answers meanwhile, and its end."""
 
 import asyncio
-from typing import NamedTuple
+from collections.abc import Coroutine
+from typing import Any, NamedTuple
 
 from companion.attitude.representation import heading
 from companion.config import Config
 from companion.flight.assembly import assemble
 from companion.flight.context import cancel
 from companion.flight.environment import Environment
-from companion.flight.observer import EventRecorder, Observer, decline_landing
+from companion.flight.observer import Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
+from companion.recording.summary import Summary
+from companion.safety.actions import internal
 from companion.serve.component import Component
+from companion.serve.flight_records import FlightRecords
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.ownership import Control, Ownership
@@ -53,6 +57,7 @@ class ServedFlight:
         ownership: says whose requests are flown, and for how long.
         observer: is told of phases and events.
         environment: of the flight.
+        records: makes the record of the flight.
     """
 
     def __init__(
@@ -64,9 +69,14 @@ class ServedFlight:
         ownership: Ownership,
         observer: Observer,
         environment: Environment,
+        records: FlightRecords,
     ) -> None:
         self.let_go = False
+        self._records, self._record = records, records.new()
+        self._recorder = self._record.recorder(observer)
+        self._summary: Summary | None = None
         self._link, self._component, self._ownership = link, component, ownership
+        self._environment = environment
         self._clock = asyncio.get_running_loop().time
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
@@ -74,9 +84,9 @@ class ServedFlight:
         self._assembled = assemble(
             config,
             link,
-            EventRecorder(observer, self._clock, lambda _: None),
+            self._recorder,
             decline_landing,
-            None,
+            self._record.folder,
             TakeoverPlan(self._source),
             environment,
         )
@@ -107,19 +117,45 @@ class ServedFlight:
 
     async def run(self, asked: Asked | None) -> bool:
         """Fly; returns whether control had begun."""
-        beside = [
-            asyncio.create_task(work) for work in (self._follow_up(asked), self._send_values())
-        ]
-        result = "left at once"
+        with self._records.recording(self._record):
+            result = "left at once"
+            self._record.begin_counting(self._link.stats)
+            try:
+                result = await self._fly(asked)
+            finally:
+                self._assembled.close()
+                self._tell_end(asked, result)
+                self._summary = self._record.summary(
+                    self._link.stats, self._assembled, self._recorder, result, self._records.grants
+                )
+        return self._source.pose is not None
+
+    async def save(self) -> None:
+        """Write the rest of the record, beside the event loop; of a failed takeover, remove it."""
+        if self._summary is None or self._source.pose is None:
+            self._records.discard(self._record)
+        elif self._environment.realtime:
+            await asyncio.to_thread(self._records.keep, self._record, self._summary)
+        else:  # a virtual clock knows no threads
+            self._records.keep(self._record, self._summary)
+
+    async def _fly(self, asked: Asked | None) -> str:
+        """Fly, tell clients meanwhile; returns the result."""
+        beside = [self._follow_up(asked), self._send_values(), self._assembled.reporter.run()]
+        tasks = [asyncio.create_task(self._guarded(work)) for work in beside]
         try:
             with connected(self._link, self._assembled):
-                result = await self._assembled.flight.run()
+                return await self._assembled.flight.run()
         finally:
-            for task in beside:
+            for task in tasks:
                 await cancel(task)
-            self._assembled.close()
-            self._tell_end(asked, result)
-        return self._source.pose is not None
+
+    async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run what goes on beside the flight; a fault in it does not end the flight."""
+        try:
+            await work
+        except Exception as error:
+            self._assembled.flight.note(internal(error))
 
     def _tell_end(self, asked: Asked | None, result: str) -> None:
         name = self._source.name

@@ -3,15 +3,19 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion import realtime
 from companion.config import Config
-from companion.flight.assembly import open_link
+from companion.flight.assembly import open_link, realtime_wishes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, StateLogger
 from companion.mavlink.framing import Frame
+from companion.realtime import Wishes
 from companion.serve.component import Component
+from companion.serve.flight_records import FlightRecords
 from companion.serve.network.addresses import target_of
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
@@ -37,6 +41,8 @@ class ServeSession:
         note: takes events as sentences.
         observer: is told of the phases and events of each flight under a client's control.
         environment: what the link and the flights get from the computer.
+        directory: in which each flight under a client's control is recorded in its own folder;
+            None: nothing is recorded.
 
     Attributes:
         network: of the clients, once it is open.
@@ -49,8 +55,10 @@ class ServeSession:
         note: Note,
         observer: Observer | None = None,
         environment: Environment = THIS_COMPUTER,
+        directory: Path | None = None,
     ) -> None:
         self._config, self._note = config, note
+        self._records = FlightRecords(config, directory, environment, note)
         self._observer, self._environment = observer or Silent(), environment
         self._stop = asyncio.Event()
         self.network: Network | None = None
@@ -71,10 +79,19 @@ class ServeSession:
 
         Raises:
             EndpointError: the link or an endpoint of `serve.clients` could not be opened.
+            RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """
-        config = self._config
-        async with open_link(config, None, self._note, self._environment.open_transport) as link:
+        wishes = realtime_wishes(self._config) if self._environment.realtime else Wishes()
+        with realtime.asked_for(wishes) as grants:
+            self._records.grants = grants
+            for grant in grants:
+                self._note(str(grant))
+            return await self._run_open()
+
+    async def _run_open(self) -> dict[str, Any]:
+        config, opener = self._config, self._environment.open_transport
+        async with open_link(config, self._records, self._note, opener) as link:
             state_logger = StateLogger(link.state, self._note)
             link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
             async with Network(link, config.serve.clients) as network:
@@ -89,7 +106,13 @@ class ServeSession:
 
             keeper = SituationKeeper(link, network)
             self.control = ServedControl(
-                self._config, link, component, keeper, self._observer, self._environment
+                self._config,
+                link,
+                component,
+                keeper,
+                self._observer,
+                self._environment,
+                self._records,
             )
             beside.append(keeper.keep_telemetry(self.control.needed_rates))
         gate = _Gate(

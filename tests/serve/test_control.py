@@ -1,12 +1,15 @@
 """Control by clients on both mock vehicles, in vehicle time."""
 
 import asyncio
+import json
 import math
 
 import pytest
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
+from companion.config.files import load
 from tests.serve.virtual import (
     ALL,
     POSITION,
@@ -29,16 +32,22 @@ OFFBOARD = 176, 1, 6
 def fly(autopilot, scene, **settings):
     """Run a scene with an airborne vehicle and a connected script."""
     serve = settings.pop("serve", {})
+    directory = settings.pop("directory", None)
     vehicle = mock(autopilot, **settings)
 
     async def whole():
-        async with serving(vehicle, autopilot, **serve) as session:
+        async with serving(vehicle, autopilot, directory=directory, **serve) as session:
             ground = await airborne(session, vehicle, autopilot)
             script = MemoryClient().connect(session)
             await scene(vehicle, session, script, ground)
 
     testing.run(vehicle, whole())
     return vehicle
+
+
+def sent_rates(tlog):
+    log = mavutil.mavlink_connection(str(tlog))
+    return list(iter(lambda: log.recv_match(type="SET_ATTITUDE_TARGET"), None))
 
 
 def place(session):
@@ -207,10 +216,11 @@ def test_two_clients_at_once_and_what_is_refused(autopilot):
     fly(autopilot, scene)
 
 
-def test_px4_is_asked_for_offboard_by_the_rules_of_px4():
+def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorded(tmp_path):
     async def scene(vehicle, session, script, ground):
         assert await script.offboard() == REJECTED, "no stream"
         assert "setpoints first" in " ".join(script.texts())
+        assert not list(tmp_path.iterdir())
         begin = place(session)
         await begin_control(session, script, "px4", lambda _: script.local(ALL, begin))
         assert await script.offboard() == dialect.MAV_RESULT_ACCEPTED, "again"
@@ -223,8 +233,18 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4():
         assert vehicle.state()["mode"] == "LOITER"
         assert not session.control.in_control
         assert any("it let go" in text for text in script.texts())
+        (folder,) = tmp_path.iterdir()
+        summary = json.loads((folder / "summary.json").read_text())
+        assert [phase["name"] for phase in summary["phases"]][:2] == ["connect", "checks"]
+        assert "took over" in summary["result"]
+        assert summary["link"]["frames"] < session.control._link.stats.frames, "of this flight"
+        assert summary["tracking"]["position_rms_m"] < 0.1
+        assert load(folder / "config.yaml").limits.max_tilt_deg == 45.0
+        sent = sent_rates(folder / "flight.tlog")
+        assert len(sent) == summary["setpoints"]
+        assert {name.name for name in folder.glob("*.csv")} >= {"tracking.csv", "rates.csv"}
 
-    fly("px4", scene)
+    fly("px4", scene, directory=tmp_path)
 
 
 def test_a_single_setpoint_in_guided_gives_no_control():

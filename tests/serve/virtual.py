@@ -136,7 +136,9 @@ async def begin_control(session, script, autopilot, hold):
 
 
 @asynccontextmanager
-async def serving(vehicle, autopilot, notes=None, **serve) -> AsyncIterator[ServeSession]:
+async def serving(
+    vehicle, autopilot, notes=None, directory=None, **serve
+) -> AsyncIterator[ServeSession]:
     """A session over the vehicle in memory; nobody listens at sockets."""
     config = changed(
         load(CONFIGS / f"mock-{autopilot}.yaml"),
@@ -148,7 +150,7 @@ async def serving(vehicle, autopilot, notes=None, **serve) -> AsyncIterator[Serv
         "the test",
     )
     notes = [] if notes is None else notes
-    session = ServeSession(config, notes.append, None, testing.environment)
+    session = ServeSession(config, notes.append, None, testing.environment, directory)
     running = asyncio.ensure_future(session.run())
     while session.network is None:
         await asyncio.sleep(0.01)

@@ -23,19 +23,19 @@ from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryEr
 from companion.guidance.trajectory.septic_spline import Floats
 
 _FEWEST = 4
-"""Samples; fewer do not determine a smooth curve."""
+"""Smallest number of samples of a table. Fewer do not determine a smooth curve."""
 
 _MOST = 50_000
 """Largest number of samples of a table; reading them takes half a second."""
 
 _MOST_BYTES = 20_000_000
-"""Of a file: `_MOST` samples of twenty columns with all their digits."""
+"""Largest size of a file, bytes: `_MOST` samples of twenty columns with all their digits."""
 
 _LEAST_STEP, _LONGEST_STEP = 1e-4, 10.0
 """Shortest and longest time between two samples, s."""
 
 _SHORTEST = 0.1
-"""The whole file, s."""
+"""Shortest duration of a table, s."""
 
 _RANGES = {
     "time": (1e10, "s"),
@@ -45,10 +45,10 @@ _RANGES = {
     "yaw": (1e4, "rad"),
     "quaternion": (2.0, "for a component"),
 }
-"""Largest number of each quantity, and its unit."""
+"""Largest magnitude of each quantity, and its unit as messages show it."""
 
 _LENGTH_ERROR = 0.1
-"""Largest error of a quaternion's length: files round it."""
+"""Largest error of a quaternion's length. Files hold rounded numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,9 @@ class Table:
     Attributes:
         times: (m,), s, increasing from 0.
         position: (m, 3), m.
-        derivatives: velocity, or velocity and acceleration, (m, 3) each, as far as the file goes.
-        yaw: (m,), rad, of tilt-yaw and without jumps; None if the file does not tell.
-        frame: as the comment before the header names it; None if there is none.
+        derivatives: velocity in m/s, then acceleration in m/s², (m, 3) each, if the file has them.
+        yaw: tilt-yaw heading (m,), rad, unwrapped; None if the file has neither yaw nor quaternion.
+        frame: the frame that the comment before the header names; None without such a comment.
         unused: names of the columns that are not read.
     """
 
@@ -73,12 +73,12 @@ class Table:
 
 
 def read_csv(path: Path) -> Table:
-    """Read a file.
+    """Read a CSV file.
 
     Raises:
-        TrajectoryError: it cannot be read or is too large, a column is missing, a value is not a
-            number or outside its range, time does not rise by steps that mean something, or there
-            are too few samples or too many.
+        TrajectoryError: the file cannot be read or is too large, a column is missing, a value is
+            not a number or is out of range, a step in time is out of range, or the number of
+            samples is.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -90,14 +90,14 @@ def read_csv(path: Path) -> Table:
 
 
 def table(lines: Iterable[str], name: str) -> Table:
-    """Take the samples from lines of text, the first of them the header.
+    """Parse lines of text; the first line is the header.
 
     Args:
-        lines: of the file; empty ones and those that begin with # are passed over.
-        name: stands for them in errors.
+        lines: the text. Empty lines and lines that begin with # are skipped.
+        name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: as `read`.
+        TrajectoryError: as `read_csv`, except that no file is read.
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST + 2))
@@ -133,7 +133,7 @@ def _numbers(
     names: tuple[str, ...],
     name: str,
 ) -> Floats:
-    """The columns of these names, (m, k)."""
+    """The values (m, k) of the columns `names`."""
     columns = [header.index(column) for column in names]
     numbers = np.empty((len(rows), len(columns)))
     for k, (line, row) in enumerate(rows):
@@ -153,7 +153,7 @@ def _numbers(
 
 
 def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
-    """Check that time increases by steps within their range."""
+    """Check that each step in time is within `_LEAST_STEP` and `_LONGEST_STEP`."""
     steps = np.diff(times)
     wrong = np.flatnonzero(~((steps >= 0.999 * _LEAST_STEP) & (steps <= _LONGEST_STEP)))
     if wrong.size:
@@ -190,7 +190,7 @@ def _require_range(
 
 
 def _yaw(data: dict[str, Floats]) -> Floats | None:
-    """From the yaw column, else from the quaternion."""
+    """Tilt-yaw heading (m,), rad, from the yaw column, else from the quaternion."""
     if "yaw" in data:
         return np.unwrap(data["yaw"][:, 0])
     if "quaternion" in data:

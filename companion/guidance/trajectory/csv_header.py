@@ -21,23 +21,23 @@ _SPELLINGS: dict[str, _Spellings] = {
     "yaw": (("yaw",), ("psi",), ("heading",)),
     "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
 }
-"""Column names by quantity, in lower case; the first spelling that is complete counts."""
+"""Column names of each quantity, in lower case. The first complete set of names is used."""
 
 _UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(m_s2|m/s\^?2|m/s²|m_s|m/s|rad|m|s)[\])]?")
 """A column name with its unit behind it."""
 _OTHER_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(deg|°|ms|us|ns|cm|mm|ft)[\])]?")
-"""The same in a unit that is not read."""
+"""A column name followed by a unit that is refused."""
 _FRAME = re.compile(r"#\s*frame\s*[:=]\s*(\S+)\s*")
 
 _SHOWN = 60
-"""Characters of the file in a message."""
+"""Most characters of the file that a message quotes."""
 
 
 def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """The lines and cells of the header and of the samples.
+    """Yield the line number and the cells of the header and of each sample.
 
     Args:
-        reader: of the `csv` module.
+        reader: a reader of the `csv` module.
         frames: receives the frames that comments before the header name.
     """
     header = True
@@ -58,12 +58,12 @@ def without_unit(column: str) -> str:
 
 
 def columns_of(header: list[str], named: list[str], name: str) -> dict[str, tuple[str, ...]]:
-    """The columns of each quantity that the file tells.
+    """The columns of each quantity that the file has.
 
     Args:
         header: names of the columns, without their units.
-        named: as the file names them.
-        name: of the file.
+        named: names of the columns as the file spells them.
+        name: the file's name, for error messages.
 
     Raises:
         TrajectoryError: time or position is missing, or the header is none.

@@ -23,9 +23,9 @@ class PhaseSampling(NamedTuple):
     """Phases at which to check a curve, so that no extreme between two of them is missed.
 
     Attributes:
-        step: phase between two checks; None where `phases` lists them.
-        period: phase after which it repeats, apart from a steady rise; None: it does not.
-        phases: of the checks, ascending.
+        step: phase between two checks; None if `phases` lists the checks.
+        period: phase after which the curve repeats, apart from a steady climb; None if it does not.
+        phases: the phases of the checks, ascending; empty if `step` is given.
     """
 
     step: float | None
@@ -40,14 +40,14 @@ MOST_CHECKS = 80_000
 """Most checks of one trajectory, about a second of work."""
 
 _CHECKS_PER_LAP = 720
-"""With so many, an extreme of the k-th harmonic is missed by at most 0.001 k² %."""
+"""Checks of one lap. They miss an extreme of the k-th harmonic by at most 0.001 k² %."""
 
 
 def require_checkable(needed: float) -> None:
     """Check that a trajectory can be checked with a bounded number of samples.
 
     Raises:
-        TrajectoryError: it takes more than MOST_CHECKS.
+        TrajectoryError: the trajectory needs more than MOST_CHECKS samples.
     """
     if not needed <= MOST_CHECKS:
         raise TrajectoryError(
@@ -83,10 +83,10 @@ class Figure(Curve, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """A straight line; the phase is the way along it in m.
+    """A straight line. Its phase is the distance from the start, m.
 
     Attributes:
-        direction: of length 1.
+        direction: unit vector, NED.
     """
 
     direction: Vector

@@ -16,8 +16,8 @@ class Slowed:
     """A trajectory flown more slowly, all along or in parts; its path is the same.
 
     Attributes:
-        trajectory: as it was.
-        law: its time over ours.
+        trajectory: the original trajectory.
+        law: the original time as a function of the slowed time.
         moments: of the trajectory at which to check it, s; none: its own check times, which do
             where it is slowed down evenly.
     """

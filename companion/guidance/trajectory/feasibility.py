@@ -12,12 +12,12 @@ from companion.guidance.trajectory.demand import Floats, Motion, demand, sampled
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
-"""Share of a limit by which it may be exceeded: the fastest place may lie exactly on it."""
+"""Share by which a limit may be exceeded, for rounding. Some trajectories just meet a limit."""
 
 _DEGREES = 180.0 / pi
 
 SLOWER = "fly it more slowly (--slow-down finds how much), or change the limit"
-"""What to do where the motion breaks a limit."""
+"""The remedy for a limit that a slower motion keeps."""
 
 
 class Violation(NamedTuple):

@@ -27,10 +27,10 @@ _REST = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Hover:
-    """Stay at the start.
+    """A hover at the start.
 
     Attributes:
-        duration: s.
+        duration: how long it lasts, s.
     """
 
     duration: float
@@ -42,7 +42,7 @@ class Hover:
         return True
 
     def check_times(self) -> list[float]:
-        """Its beginning and its end."""
+        """The beginning and the end, s."""
         return [0.0, self.duration]
 
     def at(self, time: float) -> Sample:
@@ -63,8 +63,8 @@ def line(
         along: face along it, instead of holding the heading.
 
     Raises:
-        TrajectoryError: it leads nowhere, or a limit is not positive, or it is vertical and
-            `along`.
+        TrajectoryError: the line has no length, a limit is not positive, or the line is vertical
+            and `along` is set.
     """
     length = sqrt(sum(x * x for x in to))
     if length < LEAST_WAY:
@@ -79,14 +79,14 @@ def line(
 
 @dataclass(frozen=True, slots=True)
 class Laps:
-    """Laps of a figure: from rest to rest, at a steady rate between the ramps.
+    """How laps of a figure are flown: from rest to rest, at a steady rate between two ramps.
 
     Attributes:
-        speed: at the fastest place, m/s.
-        laps: how often round, with the ramps.
-        acceleration: largest along the path on a ramp, m/s²; exceeded where the laps are too few.
-        direction: in which the figure lies from the start, clockwise from north, rad.
-        along: face along the path, instead of holding the heading.
+        speed: speed at the fastest place, m/s.
+        laps: number of laps; both ramps are part of them.
+        acceleration: largest acceleration along the path on a ramp, m/s². Few laps may need more.
+        direction: direction from the start to the figure, clockwise from north, rad.
+        along: whether the vehicle faces along the path. Otherwise it holds its heading.
     """
 
     speed: float
@@ -106,15 +106,15 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
 
 
 def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
-    """Laps of a circle whose centre lies north of the start, set off eastwards, heading held.
+    """Laps of a circle north of the start. The vehicle leaves eastwards and holds its heading.
 
     The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s².
 
     Args:
         radius: m.
-        speed: between the ramps, m/s.
-        laps: how often round, with the ramps.
-        longest: it is refused if it lasts longer than this, s.
+        speed: speed between the ramps, m/s.
+        laps: number of laps; both ramps are part of them.
+        longest: longest duration that a check allows, s.
     """
     length = tau * radius * laps
     ramp = min(speed / _RAMP_ACCELERATION, length / speed)
@@ -123,7 +123,7 @@ def steady_circle(radius: float, speed: float, laps: float, longest: float) -> T
 
 
 def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
-    """A circle that rises by `rise` metres each lap; sinks, if that is negative.
+    """A circle that climbs by `rise` metres in each lap, or sinks if `rise` is negative.
 
     Raises:
         TrajectoryError: as `circle`.
@@ -132,18 +132,19 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
 
 
 def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Gerono, `half_width` metres to both sides along `laps.direction`.
+    """A lemniscate of Gerono that reaches `half_width` metres to both sides along `laps.direction`.
 
-    The rate of its phase is steady, as is usual in the literature: it is fastest in the middle.
+    Its phase advances at a steady rate, as is usual in the literature, so the vehicle is fastest in
+    the middle.
 
     Raises:
-        TrajectoryError: as `circle`, or the laps are not whole.
+        TrajectoryError: as `circle`, or the number of laps is not whole.
     """
     return _eight("gerono eight", half_width, GeronoEight(half_width), laps)
 
 
 def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Bernoulli; with a steady rate of its phase it is fastest at the tips.
+    """A lemniscate of Bernoulli. Its phase advances at a steady rate: it is fastest at the tips.
 
     Raises:
         TrajectoryError: as `gerono_eight`.

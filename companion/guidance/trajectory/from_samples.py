@@ -1,4 +1,4 @@
-"""A trajectory from samples of it, in whatever frame they are given."""
+"""A smooth trajectory through the samples of a table, given in ENU, NWU or NED."""
 
 from enum import Enum
 from math import inf
@@ -28,25 +28,25 @@ _AT_REST = 0.1
 """Samples that begin or end slower than this count as at rest there, m/s."""
 
 _CHECKS_PER_PIECE = 16
-"""Checks of each piece of the spline; two pieces are one period of the cutoff."""
+"""Checks of each piece of the spline. A piece lasts half a period of the cutoff frequency."""
 
 _MOST_PIECES = 4500
-"""Pieces of the spline, two for each period of the cutoff; it is fitted within a second."""
+"""Largest number of pieces of the spline. Fitting so many takes a second."""
 
 _LARGEST_RAMP = 0.5
 """Longest ramp, as a share of the duration."""
 
 
 class _Quantity(NamedTuple):
-    """A derivative that a file may give, and how far it may be off: floor + share × its size.
+    """A derivative in a file, and its allowed RMS error: floor + share × its RMS.
 
-    Both as root of the mean square. Published accelerations may jump where ours does not.
+    Published accelerations may jump where the spline is smooth.
 
     Attributes:
-        name: of it.
-        unit: of it and of the floor.
-        share: allowed, of its size.
-        floor: allowed, however small it is.
+        name: name in messages.
+        unit: unit of the derivative and of `floor`.
+        share: allowed error as a share of the derivative's RMS.
+        floor: allowed error of a small derivative.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Frame(Enum):
 
 
 class _ToNed(NamedTuple):
-    """(3, 3), and heading = offset + sign·yaw in rad."""
+    """Conversion to NED: a rotation matrix (3, 3), and heading = offset + sign·yaw, rad."""
 
     rotation: Floats
     offset: float
@@ -88,25 +88,25 @@ _TO_NED = {
 
 
 class HeadingFrom(Enum):
-    """Where the heading comes from."""
+    """Source of the heading."""
 
     FIXED = "fixed"
-    """The start."""
+    """Hold the heading at the start."""
     ALONG = "along"
-    """The path."""
+    """Face along the path."""
     FILE = "file"
-    """The samples' yaw; fixed if they have none."""
+    """Follow the samples' yaw; hold the heading if they have none."""
 
 
 class SampleOptions(NamedTuple):
     """How to interpret the samples.
 
     Attributes:
-        frame: in which they are given.
+        frame: frame of the samples.
         heading: source of the heading.
-        cutoff: faster changes count as noise or rounding, Hz.
-        acceleration: largest along the path while speed is gathered or lost where the samples do
-            not begin or end at rest, m/s².
+        cutoff: cutoff frequency, Hz. Faster changes are smoothed away as noise.
+        acceleration: largest acceleration along the path, m/s², of the ramp that is added where the
+            samples begin or end in motion.
     """
 
     frame: Frame = Frame.ENU
@@ -118,12 +118,12 @@ class SampleOptions(NamedTuple):
 def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> TimedCurve:
     """A smooth trajectory through samples, from rest to rest.
 
-    Samples that are in motion at an end are flown more slowly there: the time of the file then
-    runs from standstill up to its true pace, and the trajectory lasts longer than the samples.
+    Where the samples begin or end in motion, the trajectory follows them more slowly, by a ramp
+    from or to rest. It then lasts longer than the samples.
 
     Raises:
-        TrajectoryError: velocity or acceleration are not the derivatives of the position, or it
-            lasts too long.
+        TrajectoryError: velocity or acceleration is not the derivative of the position, or the
+            samples last too long.
     """
     _require_short(table, options.cutoff)
     to_ned = _TO_NED[options.frame]
@@ -145,7 +145,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
 
 def _require_short(table: Table, cutoff: float) -> None:
-    """Check that fitting it takes bounded work."""
+    """Check that the table is short enough to be fitted within bounded time."""
     lasts = float(table.times[-1])
     require_duration(lasts)
     if lasts * 2.0 * cutoff > _MOST_PIECES:
@@ -182,7 +182,7 @@ def _root_mean_square(values: Floats) -> float:
 def _heading(
     spline: SepticSpline, table: Table, options: SampleOptions, resting: tuple[bool, bool]
 ) -> Heading:
-    """As the options say."""
+    """The heading that the options ask for."""
     if options.heading is HeadingFrom.ALONG:
         return tangent_heading(spline, resting)
     if options.heading is HeadingFrom.FIXED or table.yaw is None:

@@ -1,9 +1,9 @@
-"""The smoothest septic spline through what is fixed and near what was observed.
+"""The septic spline of minimum snap through fixed states and near observed values.
 
-Smoothest is the one whose snap has the smallest integral of squares: Mellinger & Kumar, Minimum
-snap trajectory generation and control for quadrotors, ICRA 2011. The unknowns are the states at the
-knots (Richter, Bry & Roy 2013); as a piece joins only two of them, the equations are
-block-tridiagonal, and the work grows as the number of knots.
+Minimum snap means the smallest integral of squared snap: Mellinger & Kumar, Minimum snap trajectory
+generation and control for quadrotors, ICRA 2011. The unknowns are the states at the knots (Richter,
+Bry & Roy 2013). Each piece joins two neighbouring knots, so the equations are block-tridiagonal,
+and the work is proportional to the number of knots.
 """
 
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ from companion.guidance.trajectory.septic_spline import (
 )
 
 _CONDITION = 1e-13
-"""Of the scaled equations at a knot; below it they do not determine the spline."""
+"""Smallest eigenvalue of the scaled equations at the last knot that determines the spline."""
 
 
 class Fixed(NamedTuple):
-    """What the spline must meet.
+    """States that the spline must meet exactly.
 
     Attributes:
         states: (k, 4, n), value and three derivatives of n series at each knot.
-        mask: (k, 4), which of them are meant.
+        mask: (k, 4), true for each value or derivative that is fixed.
     """
 
     states: Floats
@@ -38,12 +38,12 @@ class Fixed(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Observations:
-    """What the spline should come near to.
+    """Values that the spline approximates.
 
     Attributes:
         times: (m,), s.
         values: (m, n).
-        weights: (m,), of the squared differences.
+        weights: (m,), weights of the squared differences.
         derivative: which derivative was observed; 0 is the value.
     """
 
@@ -54,7 +54,13 @@ class Observations:
 
 
 class _Equations(NamedTuple):
-    """A symmetric block-tridiagonal system: (k, 4, 4), (k−1, 4, 4) right of it, and (k, 4, n)."""
+    """A symmetric block-tridiagonal system.
+
+    Attributes:
+        diagonal: (k, 4, 4), blocks on the diagonal.
+        upper: (k−1, 4, 4), blocks to the right of the diagonal.
+        right: (k, 4, n), right-hand side.
+    """
 
     diagonal: Floats
     upper: Floats
@@ -64,16 +70,16 @@ class _Equations(NamedTuple):
 def minimum_snap(
     knots: Floats, fixed: Fixed, observations: tuple[Observations, ...] = (), stiffness: float = 1.0
 ) -> SepticSpline:
-    """Minimise stiffness·∫ snap² dt + the weighted squares of what is missed of the observations.
+    """Minimise stiffness·∫ snap² dt + Σ weight·residual².
 
     Args:
         knots: (k,), increasing, s.
-        fixed: met exactly.
-        observations: met as well as smoothness allows; within the knots.
-        stiffness: of the integral.
+        fixed: states that the spline meets exactly.
+        observations: values that the spline approximates, at times between the knots.
+        stiffness: weight of the integral.
 
     Raises:
-        numpy.linalg.LinAlgError: too little is fixed and observed.
+        numpy.linalg.LinAlgError: the fixed and observed values do not determine the spline.
     """
     # Time is counted in mean spans: the entries, powers of spans up to the seventh, stay near 1.
     unit = float((knots[-1] - knots[0]) / (knots.size - 1))
@@ -106,7 +112,7 @@ def _smoothness(spans: Floats, stiffness: float, series: int) -> _Equations:
 def _add(
     equations: _Equations, knots: Floats, spans: Floats, unit: float, observed: Observations
 ) -> None:
-    """Add half the gradient of the squares of what is missed of the observations."""
+    """Add half the gradient of the weighted squares of the residuals."""
     piece = np.clip(np.searchsorted(knots, observed.times, side="right") - 1, 0, spans.size - 1)
     span = spans[piece]
     fractions = (observed.times - knots[piece]) / (span * unit)
@@ -141,7 +147,7 @@ def _eliminated(diagonal: Floats, upper: Floats, right: Floats) -> Floats:
     """Solve a symmetric positive definite block-tridiagonal system by Gaussian elimination.
 
     Raises:
-        numpy.linalg.LinAlgError: it is not positive definite.
+        numpy.linalg.LinAlgError: the system is not positive definite.
     """
     scale = 1.0 / np.sqrt(np.einsum("kii->ki", diagonal))
     diagonal = diagonal * scale[:, :, None] * scale[:, None, :]

@@ -14,13 +14,13 @@ LONGEST = 3600.0
 """Longest trajectory, s."""
 
 FARTHEST = 10_000.0
-"""Largest distance from the beginning along an axis in a file, m."""
+"""Largest coordinate that a file may hold, m from the start."""
 
 FASTEST = 100.0
-"""Largest speed along an axis in a file, m/s."""
+"""Largest velocity component that a file may hold, m/s."""
 
 LEAST_WAY = 1e-3
-"""Places nearer to each other than this count as one, m."""
+"""Points closer together than this are the same point, m."""
 
 
 class TrajectoryError(ValueError):
@@ -35,8 +35,8 @@ class Sample(NamedTuple):
         velocity: m/s.
         acceleration: m/s².
         jerk: m/s³.
-        heading: tilt-yaw heading, rad, not wrapped. It counts from north, but from the heading at
-            the start for a trajectory that `holds_heading`.
+        heading: tilt-yaw heading, rad, not wrapped. It counts from north. For a trajectory that
+            `holds_heading` it counts from the heading at the start.
         heading_rate: rad/s.
     """
 
@@ -63,18 +63,18 @@ class Trajectory(Protocol):
 
     @property
     def holds_heading(self) -> bool:
-        """Whether it keeps the heading at its start; `heading` of its samples is then 0."""
+        """Whether the vehicle keeps its heading. The samples' `heading` is then 0."""
         ...
 
     def at(self, time: float) -> Sample:
-        """The sample `time` seconds after the beginning; at rest before it and past the end."""
+        """The sample `time` seconds after the start; at rest before the start and after the end."""
         ...
 
     def check_times(self) -> Sequence[float]:
-        """Times at which to check it against limits, s: see `timed_curve.check_times`.
+        """Times at which to check the trajectory against limits, s: `timed_curve.check_times`.
 
         Raises:
-            TrajectoryError: it is too long to be checked.
+            TrajectoryError: the trajectory is too long to be checked.
         """
         ...
 

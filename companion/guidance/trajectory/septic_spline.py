@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 ORDER = 4
-"""So many numbers make the state at a knot: the value and its derivatives up to the third."""
+"""Size of the state at a knot: the value and its first three derivatives."""
 
 _DEGREE = 2 * ORDER - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
-    """Derivatives of 1, u, … u⁷ at (n,) places u; (n, 8)."""
+    """Derivatives of 1, u, … u⁷, (n, 8), at the fractions u, (n,), of a piece."""
     rows = np.zeros((fractions.size, _DEGREE + 1))
     for power in range(derivative, _DEGREE + 1):
         factor = np.prod(np.arange(power - derivative + 1, power + 1))
@@ -24,13 +24,13 @@ def derivative_rows(fractions: Floats, derivative: int) -> Floats:
 
 
 def _from_ends() -> Floats:
-    """(8, 8): from the states at u = 0 and u = 1 to the coefficients of 1, u, … u⁷."""
+    """Matrix (8, 8) from the states at u = 0 and u = 1 to the coefficients of 1, u, … u⁷."""
     ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(ORDER)]
     return np.round(np.linalg.inv(np.array(ends)) * 6.0) / 6.0
 
 
 FROM_ENDS = _from_ends()
-"""Multiples of 1/6: rounded to them they are exact."""
+"""Matrix (8, 8) from end states to coefficients. Its entries are multiples of 1/6, so exact."""
 
 
 class SepticSpline:
@@ -79,7 +79,7 @@ class SepticSpline:
 
     @property
     def knots(self) -> Floats:
-        """All of them, (k,), s."""
+        """Times of all knots, (k,), s."""
         return self._arrays[0]
 
 

@@ -11,7 +11,7 @@ from companion.guidance.trajectory.time_laws import Progress
 
 _NEWTON_STEPS = 20
 _NEAR = 1e-14
-"""Precision with which a time is found, as a share of a piece."""
+"""Tolerance of Newton's method, as a share of a piece."""
 
 Number = Any
 """A number, or an array of them."""
@@ -62,7 +62,8 @@ class SlowerTime:
 
     Attributes:
         length: duration of the original trajectory, s.
-        coefficients: of w, three more than pieces; equal ones stretch time evenly.
+        coefficients: B-spline coefficients of w, three more than there are pieces. Equal
+            coefficients stretch time evenly.
     """
 
     length: float

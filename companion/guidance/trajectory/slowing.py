@@ -1,10 +1,15 @@
-"""A trajectory slowed down where it breaks limits, and no more than that takes.
+"""A trajectory slowed down where it breaks limits.
 
-The path stays as it is; only its time changes. First each moment is asked how much slower it would
-have to be flown if all were flown so. A smooth slowness at least as large as that (`SlowerTime`)
-then takes the speed away before it and gives it back after it. Its ramps need acceleration
-themselves, so the limits are checked again with them, and the slowness is raised where they are
-broken. If no such slowness is quicker than an even one, all of the trajectory is slowed down alike.
+The path stays; only its timing changes.
+
+1. For each moment, find the factor by which the whole trajectory would have to be slowed down for
+   this moment to keep all limits.
+2. Find a smooth slowness (`SlowerTime`) that is nowhere below that factor. It brakes before a slow
+   part and speeds up after it.
+3. Braking needs acceleration, so check the limits again, and raise the slowness where they are
+   broken.
+
+If slowing down evenly is as quick, the whole trajectory is slowed down by one factor.
 """
 
 from collections.abc import Iterator
@@ -21,40 +26,43 @@ from companion.guidance.trajectory.slower_time import SlowerTime
 _SLOWEST = 64.0
 """The largest factor tried."""
 _PRECISION = 1e-3
-"""Of the factor, as a share of it."""
+"""Relative precision of a factor."""
 _HALVINGS = 16
-"""Of the range of a moment's factor."""
+"""Bisection steps in the search for a moment's factor."""
 _WIDTHS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-"""Widths of the pieces of the slowness that are tried, s; a ramp takes four pieces or more."""
+"""Widths of the slowness' pieces to try, s. A ramp takes at least four pieces."""
 _FEWEST_PIECES = 4
 _ROUNDS = 60
-"""Most times that the slowness is raised."""
+"""How often the slowness is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
 _MOST_MOMENTS = 20_000
-"""Moments of a trajectory that is slowed down in parts; the search then takes some seconds."""
-_EVEN_MOMENTS, _SHORTEST_STEP, _MOMENTS_A_PIECE = 8000, 0.006, 8.0
-"""Of them, at equal distances: how many at most, their step in s at least, and how many a piece of
-the slowness takes at least, so that no extreme of its ramps is missed."""
+"""Largest number of moments for slowing down in parts. The search then takes some seconds."""
+_EVEN_MOMENTS = 8000
+"""Largest number of evenly spaced moments."""
+_SHORTEST_STEP = 0.006
+"""Shortest step between evenly spaced moments, s."""
+_MOMENTS_A_PIECE = 8.0
+"""Fewest moments in a piece of the slowness; they do not miss an extreme of its ramps."""
 _GAP = 3.0
-"""A gap between two check times, in usual ones, from which on moments are filled in."""
+"""Ratio of a gap between check times to the usual gap from which moments are filled in."""
 _WORTH = 0.98
 """Slowing down in parts must last less than this share of slowing down evenly."""
 _NOTICEABLE = 1.02
-"""A part counts as slowed down from this factor on."""
+"""Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""Share of the slowing down from which on a moment is near the slowest."""
+"""A moment counts as near the slowest if its factor is at least this share of the largest."""
 _FILLED = 2.0
-"""Time between moments that are filled in, in usual gaps."""
+"""Time between filled-in moments, in usual gaps."""
 
 
 class SlowedPart(NamedTuple):
     """A part of a trajectory that is flown more slowly.
 
     Attributes:
-        begin, end: of the slowed trajectory, s.
-        factor: the largest, by which the speed is divided.
-        time: when it is slowest, s.
-        limit: the key of the limit that asks for it.
+        begin, end: time in the slowed trajectory, s.
+        factor: the largest factor by which the speed is divided.
+        time: when the factor is largest, s.
+        limit: configuration key of the limit that requires it.
     """
 
     begin: float
@@ -68,10 +76,10 @@ class SlowDown(NamedTuple):
     """A trajectory within its limits.
 
     Attributes:
-        trajectory: as it can be flown.
-        parts: what was slowed down of it, in order; empty: nothing had to be.
-        even: whether all of it was slowed down alike.
-        reason: why it was, as the end of a sentence.
+        trajectory: the trajectory that keeps the limits.
+        parts: the parts that were slowed down, in order; empty if none was.
+        even: whether the whole trajectory was slowed down by one factor.
+        reason: why it was slowed down evenly, as the end of a sentence.
     """
 
     trajectory: Trajectory
@@ -84,7 +92,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
     """The trajectory as it is if it keeps all limits, else slowed down until it does.
 
     Raises:
-        TrajectoryError: however slowly it is flown, it breaks a limit.
+        TrajectoryError: the trajectory breaks a limit at any speed.
     """
     with computable():
         motion = sampled(trajectory)
@@ -114,7 +122,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
 def _even_factor(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> float:
-    """The smallest factor by which all of it may be slowed down."""
+    """The smallest single factor with which the whole trajectory keeps the limits."""
     for one in broken:
         if not one.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
@@ -135,7 +143,7 @@ def _even_factor(
 
 
 def _moments(times: Floats) -> Floats:
-    """The check times, with those of laps that are alike filled in: now they may differ."""
+    """The check times, and more in the laps that were left out because they are alike."""
     gaps = np.diff(times)
     usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])
@@ -152,7 +160,7 @@ def _step(length: float) -> float:
 
 
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
-    """The quickest of the slownesses of several widths; None if none keeps the limits."""
+    """The quickest slowness among the widths to try; None if none keeps the limits."""
     needed = _needed_factors(motion, envelope)
     least = _MOMENTS_A_PIECE * _step(length)
     widths = [w for w in _WIDTHS if w >= least and length / w >= _FEWEST_PIECES]
@@ -161,7 +169,7 @@ def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime |
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
-    """How much slower each moment must be flown if all are flown so, (m,)."""
+    """For each moment (m,), the single factor with which it keeps the limits."""
     low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_SLOWEST))
     high[_over(motion, envelope) <= 0.0] = 0.0
     for _ in range(_HALVINGS):

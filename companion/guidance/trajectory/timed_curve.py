@@ -23,14 +23,15 @@ _CHECKS_PER_PIECE = 256
 """Fewest checks in each smooth part of a time law whose rate changes."""
 
 _TABLE = 2048
-"""Rows of the table that finds the time of a phase; it need not be exact."""
+"""Rows of the table that maps a phase to a time. It need not be exact."""
 
 
 def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST) -> list[float]:
     """Times at which to check a curve with a time law, ascending, s.
 
     Raises:
-        TrajectoryError: it lasts longer than `longest` seconds, or takes more than MOST_CHECKS.
+        TrajectoryError: the trajectory lasts longer than `longest` seconds, or needs more than
+            MOST_CHECKS checks.
     """
     require_duration(law.duration, longest)
     parts = [
@@ -47,17 +48,17 @@ def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST)
 
 
 def require_duration(seconds: float, longest: float = LONGEST) -> None:
-    """Check that a trajectory does not last too long.
+    """Check that a trajectory lasts at most `longest` seconds.
 
     Raises:
-        TrajectoryError: it does.
+        TrajectoryError: the trajectory lasts longer.
     """
     if not seconds <= longest:
         raise TrajectoryError(f"it lasts {seconds:.4g} s, and {longest:.0f} s is the longest")
 
 
 def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
-    """The piece; if it is steady and longer than two laps, its first and its last lap."""
+    """The parts to check: the piece, or its first and last lap if it is steady and longer."""
     if piece.steady and sampling.period is not None:
         lap = sampling.period / law.at(piece.begin).first
         if piece.end - piece.begin > 2.0 * lap:
@@ -113,7 +114,11 @@ class HeldHeading:
 
 @dataclass(frozen=True, slots=True)
 class FixedHeading:
-    """Keeps one heading all along, rad."""
+    """Keeps one heading.
+
+    Attributes:
+        heading: rad from north.
+    """
 
     heading: float
 
@@ -127,7 +132,8 @@ class TangentHeading:
     """Faces along the curve, whose first derivative must never be vertical or zero.
 
     Attributes:
-        middle: the heading stays within π of it, so that it does not jump, rad.
+        middle: centre of the heading's range, rad. The heading stays within π of it and so does not
+            jump.
         winding: change of `middle` per unit of phase, rad.
     """
 
@@ -147,11 +153,11 @@ class TimedCurve:
     """A trajectory: a curve, a time law along it and a heading.
 
     Attributes:
-        name: what the user calls it.
+        name: name in the configuration.
         curve: the path.
         law: progress along the path over time.
-        heading: along the path.
-        longest: it is refused if it lasts longer than this, s.
+        heading: heading along the path.
+        longest: longest duration that `check_times` allows, s.
     """
 
     name: str

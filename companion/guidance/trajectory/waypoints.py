@@ -33,10 +33,10 @@ def waypoints(
     along: bool = False,
     headings: Sequence[float | None] = (),
 ) -> TimedCurve:
-    """From rest at the start through all points without a stop, to rest at the last.
+    """A trajectory from rest at the start through all points without a stop, to rest at the last.
 
-    A segment lasts in proportion to what a trapezoid of speed from rest to rest takes for it. The
-    whole is then made as fast as the two limits allow: one of them is met exactly.
+    The durations of the segments have the ratios of trapezoidal speed profiles from rest to rest.
+    The whole trajectory is then scaled in time until it just meets one of the two limits.
 
     Args:
         points: (north, east, down) of the start, m; the start itself is not among them.
@@ -85,7 +85,7 @@ def _fault(distances: Floats) -> str:
 
 
 def _trapezoids(distances: Floats, speed: float, acceleration: float) -> Floats:
-    """How long each distance takes from rest to rest, s."""
+    """Duration of a trapezoidal speed profile from rest to rest over each distance, s."""
     full = distances / speed + speed / acceleration
     short = 2.0 * np.sqrt(distances / acceleration)
     return np.where(distances < speed**2 / acceleration, short, full)
@@ -107,9 +107,9 @@ def _resting_ends(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _stretch(spline: SepticSpline, knots: Floats, speed: float, acceleration: float) -> float:
-    """By which factor to stretch time so that the largest speed or acceleration is the allowed one.
+    """Factor for the knots with which the spline just meets the speed or the acceleration limit.
 
-    Stretching the knots stretches the minimum-snap spline, without changing its form.
+    A minimum-snap spline over stretched knots has the same path.
     """
     fine = np.linspace(0.0, knots.size - 1.0, _SAMPLES_PER_SEGMENT * (knots.size - 1) + 1)
     times = np.interp(fine, np.arange(knots.size), knots)

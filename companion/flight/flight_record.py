@@ -1,0 +1,157 @@
+"""The records of one flight: its folder, its `.tlog`, and its summary."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from types import TracebackType
+
+from companion import realtime
+from companion.config import Config
+from companion.flight import flown_config
+from companion.flight.assembly import Assembled
+from companion.flight.course import advice, course_of
+from companion.flight.environment import Environment
+from companion.flight.observer import EventRecorder, Observer
+from companion.mavlink.stats import LinkStats
+from companion.mavlink.texts import TextFrames
+from companion.recording.summary import Summary
+from companion.recording.tlog import TlogWriter
+
+
+class FlightRecord:
+    """Records one flight. Use it as a context manager around the flight, inside the event loop.
+
+    `config.yaml` is written at the beginning, `flight.tlog` meanwhile, the rest by `save`.
+
+    Args:
+        config: of the flight.
+        folder: an existing one for the files; None: nothing is written.
+        environment: of the flight.
+        note: takes a failure of the recording.
+        follows: whether the maneuvers of the configuration are flown.
+
+    Attributes:
+        folder: as the argument.
+        tap: writes frames down, or None if they are not recorded.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        folder: Path | None,
+        environment: Environment,
+        note: Callable[[str], None],
+        *,
+        follows: bool,
+    ) -> None:
+        self._config, self.folder, self._note = config, folder, note
+        self._in_vehicle_time = config.link.lockstep or not environment.realtime
+        self._counted: dict[str, int] = {}
+        self.tap: TlogWriter | None = None
+        if folder is not None:
+            flown_config.record(config, folder, follows=follows)
+
+    def __enter__(self) -> "FlightRecord":
+        if self.folder is not None:
+            loop = asyncio.get_running_loop()
+            epoch = 0.0 if self._in_vehicle_time else time.time() - loop.time()
+
+            def on_failure(text: str) -> None:  # called in the writing thread
+                loop.call_soon_threadsafe(self._note, text)
+
+            self.tap = TlogWriter(self.folder / "flight.tlog", epoch, on_failure)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.tap is not None:
+            self.tap.close()
+
+    def recorder(self, observer: Observer) -> EventRecorder:
+        """Passes phases and events on, and writes them into the `.tlog` as STATUSTEXT of ours."""
+        clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
+
+        def write(words: str) -> None:
+            if self.tap is not None:
+                for frame in texts.frames(words):
+                    self.tap(clock(), frame)
+
+        return EventRecorder(observer, clock, write)
+
+    def begin_counting(self, stats: LinkStats) -> None:
+        """Count the link's frames from now on, where the link was open before the flight."""
+        self._counted = _counters(stats)
+
+    def summary(
+        self,
+        stats: LinkStats,
+        assembled: Assembled,
+        recorder: EventRecorder,
+        result: str,
+        grants: tuple[realtime.Grant, ...],
+    ) -> Summary:
+        """The summary of a flight that is over, while its log is still open.
+
+        Args:
+            stats: of its link.
+            assembled: what has flown.
+            recorder: has kept the phases.
+            result: "ok", or the reason why it ended early.
+            grants: real-time settings that were requested.
+        """
+        flight, trace = assembled.flight, assembled.trace
+        dead_times = assembled.dead_time_watch.over_the_flight()
+        advised = advice(assembled, dead_times)
+        for text in advised:  # shown with the figures, not here
+            if text == dead_times.warning():
+                continue  # told in flight
+            flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
+            recorder.write(text)
+        assembled.memory.save()
+        return Summary(
+            result=result,
+            phase=(flight.failed_in or flight.phase).name,
+            planner=self._config.planner_name,
+            gain=self._config.planner.gain_per_s,
+            counts=assembled.counts(),
+            link={
+                name: value - self._counted.get(name, 0) for name, value in _counters(stats).items()
+            },
+            trace=trace,
+            events=flight.events,
+            log=self.folder,
+            dead_times=dead_times,
+            predictive=assembled.predictive_figures(),
+            realtime={grant.name: grant.refusal or "granted" for grant in grants},
+            course=course_of(assembled, recorder.phases, result, advised),
+        )
+
+    def save(self, summary: Summary) -> Summary:
+        """Write `summary.json` and the CSV files, once the log is closed; return the summary.
+
+        A file that cannot be written is noted.
+        """
+        dropped = 0 if self.tap is None else self.tap.dropped
+        whole = replace(summary, link={**summary.link, "not_recorded": dropped})
+        folder = self.folder
+        if folder is None:
+            return whole
+        try:
+            (folder / "summary.json").write_text(whole.as_json() + "\n", encoding="utf-8")
+            whole.trace.save(folder)
+        except OSError as error:
+            self._note(f"{folder}: some files were not written: {error.strerror}")
+        return whole
+
+
+def _counters(stats: LinkStats) -> dict[str, int]:
+    return {name: value for name, value in asdict(stats).items() if isinstance(value, int)}

@@ -1,0 +1,219 @@
+"""The one reader of a recorded flight, also of one that was cut off: `flight.mcap` in its folder.
+
+    record = read_flight(Path("flights/2026-11-22T15-00-00Z"))
+    guidance = record.rows("guidance")       # a structured array, one named field per column
+    guidance["estimated_north_m"]            # (N,) float64
+
+The columns of each channel are in `companion.recording.mcap_file.channels`, with their units. A
+channel without messages has 0 rows, never an error. NaN: not known, or does not apply.
+
+Three clocks: our clock (event-loop time; `began` is when the flight began on it), the vehicle's
+clock (`vehicle_time_s`), and the time since the flight began, which phases, events, alarms and the
+channel `motion` are in. `since_start` converts from our clock. A flight in lockstep or in memory
+has its clock in vehicle time; then `epoch` is 0.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.files import bounded_yaml
+from companion.files.bounded_file import FileRefusedError, read_text
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.mcap_file.fields import Row
+from companion.recording.mcap_file.reader import McapContent, read_mcap
+from companion.recording.trace import ManeuverMark
+
+FILE = "flight.mcap"
+_BY_NAME = {channel.name: channel for channel in CHANNELS}
+_LONGEST_CONFIGURATION = 1 << 20
+
+
+class RecordError(Exception):
+    """A folder holds no record of a flight that can be read; the message says what and where."""
+
+
+class Phase(NamedTuple):
+    """A phase of the flight.
+
+    Attributes:
+        time: when it began, s since the flight began.
+        name: shown to the user.
+        waits_for: the condition that ends it.
+    """
+
+    time: float
+    name: str
+    waits_for: str
+
+
+class Event(NamedTuple):
+    """Something that happened, in words.
+
+    Attributes:
+        time: s since the flight began.
+        text: as the user saw it.
+        level: 2 information, 3 warning, 4 error (foxglove_msgs/msg/Log).
+        source: "flight", "safety", "autopilot" or "phase".
+    """
+
+    time: float
+    text: str
+    level: int
+    source: str
+
+
+class AlarmChange(NamedTuple):
+    """A safety monitor raised its alarm, or its alarm is over.
+
+    Attributes:
+        time: s since the flight began.
+        raised: false: it is over.
+        monitor: its name, as in `companion.safety.table`.
+        reason: what was wrong; empty when it is over.
+        action: what the flight does about it, in words.
+    """
+
+    time: float
+    raised: bool
+    monitor: str
+    reason: str
+    action: str
+
+
+@dataclass(frozen=True)
+class FlightRecord:
+    """A recorded flight.
+
+    Attributes:
+        folder: of the flight.
+        content: of `flight.mcap`, as messages.
+        complete: whether the recording was closed. False: the power went, the process was killed,
+            or the disk was full; then up to the last second is missing.
+        damage: why reading ended before the end of the file, or None.
+        began: when the flight began, s on our clock.
+        epoch: s since 1970 at which our clock read 0; 0 if our clock is the vehicle's.
+        metadata: "flight" (versions, start, seed and so on) and others, by name.
+    """
+
+    folder: Path
+    content: McapContent
+    complete: bool
+    damage: str | None
+    began: float
+    epoch: float
+    metadata: Mapping[str, Mapping[str, str]]
+
+    def rows(self, name: str) -> Row:
+        """All rows of a channel of numbers, such as "sample" or "guidance", in time order.
+
+        Raises:
+            KeyError: there is no such channel.
+        """
+        return self._rows[name]
+
+    @cached_property
+    def _rows(self) -> "_Rows":
+        return _Rows(self.content)
+
+    def since_start(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Times on our clock (s) as s since the flight began."""
+        return times - self.began
+
+    @cached_property
+    def duration(self) -> float:
+        """From the beginning of the flight to the last row or event, s."""
+        newest = [messages[-1][0] for messages in self.content.messages.values() if messages]
+        return max(newest, default=0) * 1e-9 - self.epoch - self.began if newest else 0.0
+
+    @cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases that began, in order."""
+        found = (cdr.words_of(data, 1, 2) for data in self._messages("/phase"))
+        return tuple(Phase(time - self.began, *words) for (time,), words in found)
+
+    @cached_property
+    def maneuvers(self) -> tuple[ManeuverMark, ...]:
+        """When each maneuver began, and the last one ended (name None). `time` is on our clock."""
+        found = (cdr.words_of(data, 2, 1) for data in self._messages("/maneuver"))
+        return tuple(
+            ManeuverMark(time, vehicle_time, name or None)
+            for (time, vehicle_time), (name,) in found
+        )
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """All events, in order."""
+        events = []
+        for time_ns, data in self.content.messages["/log"]:
+            level, text, source = cdr.log_of(data)
+            events.append(Event(time_ns * 1e-9 - self.epoch - self.began, text, level, source))
+        return tuple(events)
+
+    @cached_property
+    def alarms(self) -> tuple[AlarmChange, ...]:
+        """What the safety monitors said, in order."""
+        found = (cdr.words_of(data, 2, 3) for data in self._messages("/alarm"))
+        return tuple(
+            AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
+        )
+
+    @cached_property
+    def configuration(self) -> dict[str, Any]:
+        """The resolved configuration by section, as in the flight's `config.yaml`; all keys.
+
+        Raises:
+            RecordError: it is missing or damaged.
+        """
+        try:
+            text = read_text(self.folder / "config.yaml", _LONGEST_CONFIGURATION)
+            found = bounded_yaml.parse(text)
+        except (FileRefusedError, bounded_yaml.YamlError) as error:
+            raise RecordError(f"{self.folder / 'config.yaml'}: {error}") from error
+        if not isinstance(found, dict):
+            raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
+        return found
+
+    def _messages(self, topic: str) -> list[bytes]:
+        return [data for _, data in self.content.messages[topic]]
+
+
+class _Rows(dict[str, Row]):
+    """The rows of each channel of numbers, decoded when they are asked for."""
+
+    def __init__(self, content: McapContent) -> None:
+        self._content = content
+
+    def __missing__(self, name: str) -> Row:
+        channel = _BY_NAME[name]
+        found = channel.rows([data for _, data in self._content.messages[channel.topic]])
+        self[name] = found
+        return found
+
+
+def read_flight(folder: Path) -> FlightRecord:
+    """Read the record in the folder of a flight.
+
+    Raises:
+        RecordError: there is none, or it cannot be read.
+    """
+    path = folder / FILE
+    try:
+        content = read_mcap(path)
+    except OSError as error:
+        raise RecordError(f"{path}: {error.strerror}; is this the folder of a flight?") from error
+    flight = content.metadata.get("flight", {})
+    try:
+        began, epoch = float(flight["began_s"]), float(flight["epoch_s"])
+    except (KeyError, ValueError) as error:
+        why = content.damage or "it does not say when the flight began"
+        raise RecordError(f"{path}: not the record of a flight: {why}") from error
+    return FlightRecord(
+        folder, content, content.complete, content.damage, began, epoch, content.metadata
+    )

@@ -1,0 +1,182 @@
+"""Words in CDR messages of ROS 2, and the message types of Foxglove that we write.
+
+Foxglove, Lichtblick and PlotJuggler know these types by their names and draw them as they are.
+"""
+
+import struct
+from typing import NamedTuple
+
+from companion.recording.mcap_file.fields import CDR, PACKAGE
+
+_POSE = struct.Struct("<7d")
+_STAMP = struct.Struct("<iI")
+_COUNT = struct.Struct("<I")
+_NANOSECONDS = 1_000_000_000
+
+_TIME = """MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+_QUATERNION = """MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+_VECTOR = """MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
+_POINT = _VECTOR.replace("Vector3", "Point")
+_POSE_TYPE = """MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+"""
+_RULE = "=" * 80 + "\n"
+
+
+class MessageType(NamedTuple):
+    """A message type: its ROS 2 name and its definition (ros2msg)."""
+
+    name: str
+    schema: bytes
+
+
+def _type(name: str, *parts: str) -> MessageType:
+    return MessageType(name, _RULE.join(parts).encode())
+
+
+FRAME_TRANSFORM = _type(
+    "foxglove_msgs/msg/FrameTransform",
+    "builtin_interfaces/Time timestamp\nstring parent_frame_id\nstring child_frame_id\n"
+    "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
+    _TIME,
+    _VECTOR,
+    _QUATERNION,
+)
+POSE_IN_FRAME = _type(
+    "foxglove_msgs/msg/PoseInFrame",
+    "builtin_interfaces/Time timestamp\nstring frame_id\ngeometry_msgs/Pose pose\n",
+    _TIME,
+    _POSE_TYPE,
+    _POINT,
+    _QUATERNION,
+)
+LOG = _type(
+    "foxglove_msgs/msg/Log",
+    "uint8 UNKNOWN=0\nuint8 DEBUG=1\nuint8 INFO=2\nuint8 WARNING=3\nuint8 ERROR=4\nuint8 FATAL=5\n"
+    "builtin_interfaces/Time timestamp\nuint8 level\nstring message\nstring name\nstring file\n"
+    "uint32 line\n",
+    _TIME,
+)
+PHASE = _type(
+    f"{PACKAGE}/Phase",
+    "# A phase of the flight began.\n# When, on our clock, s.\nfloat64 time_s\nstring name\n"
+    "# The condition that ends it.\nstring waits_for\n",
+)
+MANEUVER = _type(
+    f"{PACKAGE}/Maneuver",
+    "# A maneuver began; an empty name: the last one ended.\n# When, on our clock, s.\n"
+    "float64 time_s\n# The same on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
+)
+ALARM = _type(
+    f"{PACKAGE}/Alarm",
+    "# A safety monitor raised its alarm, or its alarm is over.\n# When, on our clock, s.\n"
+    "float64 time_s\n# 1: raised, 0: over.\nfloat64 raised\nstring monitor\nstring reason\n"
+    "# What the flight does about it.\nstring action\n",
+)
+Pose = tuple[float, float, float, float, float, float, float]
+"""Position x, y, z (m) and orientation x, y, z, w."""
+
+
+def words_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
+    """A message of float64 fields and then strings, as PHASE, MANEUVER and ALARM are."""
+    message = bytearray(struct.pack(f"<4s{len(numbers)}d", CDR, *numbers))
+    for text in texts:
+        _add_string(message, text)
+    return bytes(message)
+
+
+def words_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
+    """Decode what `words_message` made: the numbers and the strings.
+
+    Raises:
+        ValueError: it is not such a message.
+    """
+    try:
+        found = struct.unpack_from(f"<{numbers}d", message, 4)
+        at, strings = 4 + 8 * numbers, []
+        for _ in range(texts):
+            text, at = _string(message, at)
+            strings.append(text)
+    except struct.error as error:
+        raise ValueError(f"a message is too short: {error}") from error
+    return found, strings
+
+
+def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
+    """A message of the type LOG, at a time in ns since 1970."""
+    message = bytearray(CDR + _stamp(time_ns) + bytes((level,)))
+    for each in (text, name, ""):
+        _add_string(message, each)
+    _align(message)
+    return bytes(message + _COUNT.pack(0))
+
+
+def log_of(message: bytes) -> tuple[int, str, str]:
+    """Level, text and name of a message of the type LOG.
+
+    Raises:
+        ValueError: it is not such a message.
+    """
+    try:
+        text, at = _string(message, 13)
+        name, _ = _string(message, at)
+        return message[12], text, name
+    except (struct.error, IndexError) as error:
+        raise ValueError(f"a log message is too short: {error}") from error
+
+
+class PoseEncoder:
+    """Makes messages of the types FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
+
+    Args:
+        frames: names of the frames, which are the same in all messages.
+    """
+
+    def __init__(self, *frames: str) -> None:
+        names = bytearray(12)
+        for frame in frames:
+            _add_string(names, frame)
+        while (len(names) - 4) % 8:
+            names.append(0)
+        self._names = bytes(names[12:])
+
+    def message(self, time_ns: int, pose: Pose) -> bytes:
+        """The message for `pose` at a time in ns since 1970."""
+        return CDR + _stamp(time_ns) + self._names + _POSE.pack(*pose)
+
+
+def _stamp(time_ns: int) -> bytes:
+    return _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
+
+
+def _align(message: bytearray) -> None:
+    """Pad to 4 bytes; positions count after the 4 bytes of the header, so this is the same."""
+    message.extend(bytes(-len(message) % 4))
+
+
+def _add_string(message: bytearray, text: str) -> None:
+    _align(message)
+    encoded = text.encode("utf-8", "replace") + b"\0"
+    message.extend(_COUNT.pack(len(encoded)) + encoded)
+
+
+def _string(message: bytes, at: int) -> tuple[str, int]:
+    at += -at % 4
+    (length,) = _COUNT.unpack_from(message, at)
+    begin, end = at + 4, at + 4 + length
+    if not 1 <= length <= len(message) - begin:
+        raise ValueError(f"a string of {length} bytes in a message of {len(message)}")
+    return message[begin : end - 1].decode("utf-8", "replace"), end

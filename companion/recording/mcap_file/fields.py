@@ -1,0 +1,110 @@
+"""Channels of `flight.mcap` whose messages are numbers: their schemas and their bytes.
+
+Each message is a ROS 2 message in CDR: 4 bytes of header, then all float64 fields, then all uint8
+fields. So every message of a channel has the same length, and NumPy reads many at once.
+"""
+
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+CDR = b"\x00\x01\x00\x00"
+"""Header of a little-endian CDR message."""
+PACKAGE = "companion_msgs/msg"
+
+Row = NDArray[np.void]
+"""A structured array: one row per message, one named field per column."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One column of a channel.
+
+    Attributes:
+        name: ends with the unit, if the column has one.
+        meaning: what it is.
+    """
+
+    name: str
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class Code(Field):
+    """A column of small numbers, each of which has a name.
+
+    Attributes:
+        names: the name of each number; the first is that of 0.
+    """
+
+    names: tuple[str, ...] = ("no", "yes")
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of numbers.
+
+    Attributes:
+        topic: name in the file, with a slash in front.
+        meaning: what one message is.
+        numbers: the float64 columns. NaN: not known, or does not apply.
+        codes: the uint8 columns.
+    """
+
+    topic: str
+    meaning: str
+    numbers: tuple[Field, ...]
+    codes: tuple[Code, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The topic without its slash; this is how the reader names the channel."""
+        return self.topic[1:]
+
+    @property
+    def schema_name(self) -> str:
+        """The ROS 2 name of the message type."""
+        words = "".join(word.capitalize() for word in self.name.split("_"))
+        return f"{PACKAGE}/{words}"
+
+    @cached_property
+    def schema(self) -> bytes:
+        """The message definition (ros2msg); the names of codes are constants."""
+        lines = [f"# {self.meaning}"]
+        for field in self.numbers:
+            lines += [f"# {field.meaning}", f"float64 {field.name}"]
+        for code in self.codes:
+            lines.append(f"# {code.meaning}")
+            if code.names != ("no", "yes"):
+                lines += [
+                    f"uint8 {code.name.upper()}_{name.upper()}={number}"
+                    for number, name in enumerate(code.names)
+                ]
+            lines.append(f"uint8 {code.name}")
+        return ("\n".join(lines) + "\n").encode()
+
+    @cached_property
+    def packing(self) -> struct.Struct:
+        """Packs the header and the columns of one message."""
+        return struct.Struct(f"<4s{len(self.numbers)}d{len(self.codes)}B")
+
+    @cached_property
+    def dtype(self) -> np.dtype[np.void]:
+        """The columns of the structured array that the reader returns."""
+        return np.dtype(
+            [(field.name, "<f8") for field in self.numbers]
+            + [(code.name, "u1") for code in self.codes]
+        )
+
+    def rows(self, messages: list[bytes]) -> Row:
+        """All messages of the channel as a structured array; those of a wrong length are left out.
+
+        Args:
+            messages: as they stand in the file, in their order.
+        """
+        length = self.packing.size
+        data = b"".join(message[4:] for message in messages if len(message) == length)
+        return np.frombuffer(data, self.dtype)

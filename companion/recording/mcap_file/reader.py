@@ -1,0 +1,70 @@
+"""Reads a `.mcap` by the format's own library, also one that was cut off anywhere."""
+
+import struct
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+_MOST_BYTES = 1 << 28
+"""No record of ours is longer; a longer one is damage."""
+_DAMAGE = (McapError, ValueError, RuntimeError, EOFError, KeyError, IndexError, struct.error)
+"""What the library and its decompression raise on damaged bytes."""
+
+
+@dataclass
+class McapContent:
+    """What a `.mcap` holds.
+
+    Attributes:
+        messages: (time ns, data) of each message, by topic, in the order of the file.
+        order: the topic of each message, in the order of the file.
+        metadata: metadata records by name; of several with one name the last.
+        complete: whether the file was closed, with its index at the end.
+        damage: why reading ended before the end of the file, or None.
+    """
+
+    messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=lambda: defaultdict(list))
+    order: list[str] = field(default_factory=list)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    complete: bool = False
+    damage: str | None = None
+
+
+def read_mcap(path: Path) -> McapContent:
+    """Read all messages up to the end or to the first damage.
+
+    Raises:
+        OSError: the file cannot be opened.
+    """
+    content = McapContent()
+    topics: dict[int, str] = {}
+    with path.open("rb") as file:
+        reader = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_BYTES)
+        try:
+            for record in reader.records:
+                _take(record, topics, content)
+            content.complete = True
+        except _DAMAGE as error:
+            if file.read(1):  # else it was cut off in the middle of this record
+                content.damage = str(error) or type(error).__name__
+    return content
+
+
+def _take(record: McapRecord, topics: dict[int, str], content: McapContent) -> None:
+    if isinstance(record, Chunk):
+        if record.uncompressed_size > _MOST_BYTES:
+            raise ValueError(f"a chunk of {record.uncompressed_size} bytes")
+        for inner in breakup_chunk(record, validate_crc=True):
+            _take(inner, topics, content)
+    elif isinstance(record, Message):
+        topic = topics[record.channel_id]
+        content.messages[topic].append((record.log_time, record.data))
+        content.order.append(topic)
+    elif isinstance(record, Channel):
+        topics[record.id] = record.topic
+    elif isinstance(record, Metadata):
+        content.metadata[record.name] = record.metadata

@@ -1,0 +1,92 @@
+"""The records of the flights under clients' control, each in a folder of its own."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from companion import realtime
+from companion.config import Config
+from companion.files.yaml_file import ConfigError
+from companion.flight.environment import Environment
+from companion.flight.flight_record import FlightRecord
+from companion.mavlink.transport.base import Tap
+from companion.recording.folder import flight_folder
+from companion.recording.summary import Summary
+
+
+class FlightRecords:
+    """Makes the record of each flight; between flights nothing is recorded.
+
+    The link stays open between flights and has one tap, which is this object.
+
+    Args:
+        config: of the flights.
+        directory: in which each flight makes its own folder; None: nothing is recorded.
+        environment: of the flights.
+        note: takes events as sentences.
+
+    Attributes:
+        grants: real-time settings that were requested.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        directory: Path | None,
+        environment: Environment,
+        note: Callable[[str], None],
+    ) -> None:
+        self.grants: tuple[realtime.Grant, ...] = ()
+        self._config, self._directory = config, directory
+        self._environment, self._note = environment, note
+        self._tap: Tap | None = None
+
+    def __call__(self, time: float, frame: bytes) -> None:
+        """Take a frame of the link, seen at `time` on our clock, s."""
+        if self._tap is not None:
+            self._tap(time, frame)
+
+    def new(self) -> FlightRecord:
+        """The record of a new flight; if its folder cannot be made, it flies without one."""
+        folder = None
+        if self._directory is not None:
+            try:
+                folder = flight_folder(self._directory)
+                return self._record(folder)
+            except (ConfigError, OSError) as error:
+                self._note(f"this flight is not recorded: {error}")
+                _remove(folder)
+        return self._record(None)
+
+    @contextmanager
+    def recording(self, record: FlightRecord) -> Iterator[None]:
+        """Write the frames of the link to a record while the block runs.
+
+        Raises:
+            OSError: its files cannot be made.
+        """
+        with record:
+            self._tap = record.tap
+            try:
+                yield
+            finally:
+                self._tap = None
+
+    def keep(self, record: FlightRecord, summary: Summary) -> None:
+        """Write the summary of a flight that is over; its log is closed."""
+        record.save(summary)
+        if record.folder is not None:
+            self._note(f"recorded in {record.folder}")
+
+    def discard(self, record: FlightRecord) -> None:
+        """Remove the record of a takeover that failed: nothing was flown."""
+        _remove(record.folder)
+
+    def _record(self, folder: Path | None) -> FlightRecord:
+        return FlightRecord(self._config, folder, self._environment, self._note, follows=False)
+
+
+def _remove(folder: Path | None) -> None:
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,114 @@
+"""The channels of `flight.mcap`, as our writer writes them, read by our reader and the official."""
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from companion.control.loop_record import Unanswered
+from companion.recording.flight_record import RecordError, read_flight
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import CHANNELS, REASONS
+from companion.recording.mcap_file.writer import WORDS, McapWriter
+
+ROWS = 50
+
+
+def test_the_reasons_are_those_of_the_control_loop():
+    assert REASONS[2:] == tuple(reason.value for reason in Unanswered)
+
+
+def write(folder):
+    """A file with `ROWS` rows in each channel of numbers, and one message in each other."""
+    writer = McapWriter(folder / "flight.mcap")
+    writer.metadata("flight", {"began_s": "1.0", "epoch_s": "0.0"})
+    for row in range(ROWS):
+        for channel in CHANNELS:
+            numbers = [row + 0.125 * k for k in range(len(channel.numbers))]
+            data = channel.packing.pack(cdr.CDR, *numbers, *([row % 2] * len(channel.codes)))
+            writer.message(channel.topic, row * 4_000_000, data)
+        if row == ROWS // 2:
+            writer.flush()
+    second = 1_000_000_000
+    writer.message("/phase", second, cdr.words_message((1.5,), ("connect", "a heartbeat é")))
+    writer.message("/maneuver", second, cdr.words_message((2.0, 3.0), ("hover",)))
+    writer.message("/maneuver", second, cdr.words_message((4.0, 5.0), ("",)))
+    writer.message("/alarm", second, cdr.words_message((3.0, 1.0), ("fence", "too far", "land")))
+    writer.message("/log", 3 * second, cdr.log_message(3 * second, 3, "armed", "autopilot"))
+    writer.message(
+        "/tf",
+        second,
+        cdr.PoseEncoder("world", "vehicle").message(
+            second + 7, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
+        ),
+    )
+    for topic in ("/pose", "/reference"):
+        pose = cdr.PoseEncoder("world").message(second, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
+        writer.message(topic, second, pose)
+    writer.close()
+    return folder / "flight.mcap"
+
+
+def test_what_is_written_is_read_again_by_both_readers(tmp_path):
+    path = write(tmp_path)
+    record = read_flight(tmp_path)
+    assert record.complete
+    assert record.damage is None
+    for channel in CHANNELS:
+        rows = record.rows(channel.name)
+        assert len(rows) == ROWS
+        for number, field in enumerate(channel.numbers):
+            assert (rows[field.name] == np.arange(ROWS) + 0.125 * number).all()
+        for code in channel.codes:
+            assert (rows[code.name] == np.arange(ROWS) % 2).all()
+    (phase,), (event,), (alarm,) = record.phases, record.events, record.alarms
+    assert phase == (0.5, "connect", "a heartbeat é")
+    assert event == (2.0, "armed", 3, "autopilot")
+    assert alarm == (2.0, True, "fence", "too far", "land")
+    assert record.maneuvers == ((2.0, 3.0, "hover"), (4.0, 5.0, None))
+
+    official = {}
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for schema, channel, _, message in reader.iter_decoded_messages():
+            official.setdefault(channel.topic, []).append((schema.name, message))
+    assert set(official) == {*(channel.topic for channel in CHANNELS), *WORDS}
+    for channel in CHANNELS:
+        newest = official[channel.topic][-1][1]
+        for name in channel.dtype.names:
+            assert getattr(newest, name) == record.rows(channel.name)[name][-1]
+        assert official[channel.topic][0][0] == channel.schema_name
+    assert official["/log"][0][1].message == "armed"
+    assert official["/tf"][0][1].child_frame_id == "vehicle"
+    assert official["/tf"][0][1].translation.z == 3.0
+    assert official["/pose"][0][1].pose.orientation.w == 1.0
+    assert official["/phase"][0][1].waits_for == "a heartbeat é"
+
+
+def test_a_file_cut_off_anywhere_gives_all_chunks_before(tmp_path):
+    path = write(tmp_path)
+    data = path.read_bytes()
+    found = []
+    for end in np.linspace(0, len(data) - 1, 60).astype(int):
+        path.write_bytes(data[:end])
+        try:
+            record = read_flight(tmp_path)
+        except RecordError:
+            found.append(-1)
+        else:
+            assert not record.complete
+            found.append(len(record.rows("sample")))
+    assert found == sorted(found)
+    assert set(found) == {-1, 0, ROWS // 2 + 1, ROWS}
+
+
+@pytest.mark.parametrize("content", [b"", b"no mcap at all", b"\x89MCAP0\r\n"])
+def test_another_file_is_refused_with_its_name(tmp_path, content):
+    (tmp_path / "flight.mcap").write_bytes(content)
+    with pytest.raises(RecordError, match=r"flight\.mcap: not the record of a flight"):
+        read_flight(tmp_path)
+
+
+def test_a_folder_without_record_is_refused(tmp_path):
+    with pytest.raises(RecordError, match=r"No such file .* is this the folder of a flight\?"):
+        read_flight(tmp_path)
