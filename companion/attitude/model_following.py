@@ -196,7 +196,8 @@ class ModelFollowingPlanner:
     ) -> tuple[float, float, float]:
         """Feedback towards the plan: speed of north and east (1/s) and of the heading (rad/s).
 
-        It is 0 in the first dead time after a start, when no plan has taken effect yet."""
+        It is 0 in the first dead time after a start, when no plan has taken effect yet.
+        """
         speed_north = speed_east = turn = 0.0
         if self._plans.time >= self._dead_time:
             speed_north = self._gain * (by_tilt.north - north)

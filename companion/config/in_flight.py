@@ -49,7 +49,7 @@ def shown(value: Any) -> str:
 def changeable() -> dict[tuple[str, str], str]:
     """The keys that may change in flight, by section and key → how far, in words."""
     return {
-        (section, key): extra[IN_FLIGHT]
+        (section, key): str(extra[IN_FLIGHT])
         for section, model in sections().items()
         for key, field in model.model_fields.items()
         if isinstance(extra := field.json_schema_extra, dict) and IN_FLIGHT in extra

@@ -16,13 +16,11 @@ class LimitsConfig(Section):
 
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0, json_schema_extra=LOWERED)] = 35.0
     """Largest tilt of a target. A larger target keeps its direction and is shortened."""
-    max_tilt_rate_deg_s: Annotated[
-        float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)
-    ] = 90.0
+    max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = (
+        90.0
+    )
     """Largest combined roll and pitch rate: √(roll² + pitch²)."""
-    max_yaw_rate_deg_s: Annotated[
-        float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)
-    ] = 60.0
+    max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERED)] = 60.0
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
     """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""

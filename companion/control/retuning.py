@@ -1,9 +1,11 @@
 """Changes gains, weights and limits of the loops while they fly."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from math import exp, log
-from typing import Any
+from typing import Any, NamedTuple
 
-from companion.attitude import PLANNER_NAMES
+from companion.attitude import PLANNER_NAMES, Constants, Limits
 from companion.config import Config
 from companion.config.guidance import LINEAR
 from companion.config.in_flight import Difference, differences
@@ -16,7 +18,40 @@ from companion.control.outer_loop import (
     linear_settings,
     observer_settings,
 )
-from companion.guidance import LinearGuidance
+from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
+
+
+class Tuning(NamedTuple):
+    """What the loops take from a configuration, of that which may change in flight.
+
+    Attributes:
+        guidance: settings of linear guidance.
+        observer: settings of the motion observer.
+        constants: gains and limits of the planner.
+        limits: limits of body rates that guidance commands.
+        max_tilt: largest tilt in open loop, rad.
+    """
+
+    guidance: LinearSettings
+    observer: ObserverSettings
+    constants: Constants
+    limits: Limits
+    max_tilt: float
+
+
+def tuning(config: Config) -> Tuning:
+    """The values of a configuration that may change in flight, as the loops take them.
+
+    Raises:
+        ValueError: gains cannot be computed from them.
+    """
+    return Tuning(
+        linear_settings(config),
+        observer_settings(config),
+        law_constants(config),
+        rate_limits(config),
+        config.limits.max_tilt,
+    )
 
 
 class Retuning:
@@ -32,8 +67,17 @@ class Retuning:
     def __init__(self, loop: ControlLoop, guidance_loop: GuidanceLoop) -> None:
         self._loop, self._guidance_loop = loop, guidance_loop
 
-    def apply(self, config: Config) -> None:
-        """Use the values of `config` from the next sample and the next step on.
+    @contextmanager
+    def stepped_by(self, step: Callable[[float], None]) -> Iterator[None]:
+        """Call `step` at the beginning of each guidance step while the block runs."""
+        self._guidance_loop.before_step = step
+        try:
+            yield
+        finally:
+            self._guidance_loop.before_step = lambda _: None
+
+    def apply(self, values: Tuning) -> None:
+        """Use these values from the next sample and the next step on.
 
         Raises:
             TypeError: planner or guidance is of another package and cannot change.
@@ -41,13 +85,10 @@ class Retuning:
         guidance_loop = self._guidance_loop
         if not isinstance(guidance_loop.guidance, LinearGuidance):
             raise TypeError(f"{type(guidance_loop.guidance).__name__} cannot be retuned")
-        # All values are computed before the first one is used.
-        guidance, observer = linear_settings(config), observer_settings(config)
-        constants, limits = law_constants(config), rate_limits(config)
-        self._loop.retune(constants, limits)
-        guidance_loop.guidance.retune(guidance)
-        guidance_loop.estimate.retune(observer)
-        guidance_loop.max_tilt = config.limits.max_tilt
+        self._loop.retune(values.constants, values.limits)
+        guidance_loop.guidance.retune(values.guidance)
+        guidance_loop.estimate.retune(values.observer)
+        guidance_loop.max_tilt = values.max_tilt
 
 
 def fixed_because(config: Config) -> str | None:

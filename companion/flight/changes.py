@@ -1,4 +1,4 @@
-"""Changes of gains, weights and limits while a flight goes on: checked, slewed, undone, recorded."""
+"""Changes of gains, weights and limits in flight: checked, slewed, undone, recorded."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -12,8 +12,9 @@ from companion.config.in_flight import (
     changed_in_flight,
     differences,
 )
-from companion.control.retuning import Retuning, between, fixed_because
+from companion.control.retuning import Retuning, between, fixed_because, tuning
 from companion.files.yaml_file import ConfigError
+from companion.safety.actions import internal
 
 SLEW = 0.7
 """Time over which a change takes effect, s."""
@@ -43,10 +44,10 @@ class Change(NamedTuple):
     def __str__(self) -> str:
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON; the time counts from the beginning of the flight."""
+    def as_dict(self, began: float) -> dict[str, Any]:
+        """For JSON; its time counts from `began`, s on our clock."""
         keys = {each.name: [each.before, each.after] for each in self.keys}
-        return {"time_s": round(self.time, 3), "by": self.by, "keys": keys}
+        return {"time_s": round(self.time - began, 3), "by": self.by, "keys": keys}
 
 
 class Changes:
@@ -58,7 +59,7 @@ class Changes:
     Attributes:
         wanted: the configuration after the newest change.
         made: all changes, in order.
-        note: records and shows a change; set by the flight.
+        note: shows a change while no flight goes on.
         on_change: called with `wanted` after each change.
 
     Args:
@@ -115,17 +116,24 @@ class Changes:
         return told
 
     @contextmanager
-    def applied_by(self, retuning: Retuning) -> Iterator[None]:
-        """Let changes take effect in these loops while the block runs, those before it at once."""
+    def applied_by(self, retuning: Retuning, note: Callable[[str], None]) -> Iterator[None]:
+        """Let changes take effect in these loops while the block runs, those before it at once.
+
+        Args:
+            retuning: of the loops.
+            note: records and shows a change.
+        """
         if self.wanted is not self._start:
             self._now = self.wanted
-            retuning.apply(self._now)
+            retuning.apply(tuning(self._now))
         self._retuning = retuning
+        outside, self.note = self.note, note
         try:
-            yield
+            with retuning.stepped_by(self.step):
+                yield
         finally:
             self._retuning = self._began = None
-            self._now = self.wanted
+            self._now, self.note = self.wanted, outside
 
     def step(self, now: float) -> None:
         """Go on with a change that is under way; the guidance loop calls this at each step."""
@@ -133,8 +141,12 @@ class Changes:
             return
         self._stepped = now
         share = (now - self._began) / SLEW
-        self._now = between(self._from, self.wanted, share)
-        self._retuning.apply(self._now)
+        try:
+            self._now = between(self._from, self.wanted, share)
+            self._retuning.apply(tuning(self._now))
+        except Exception as error:  # the flight goes on with the values it has
+            self._began = None
+            self.note(internal(error))
         if share >= 1.0:
             self._began = None
 
@@ -150,6 +162,10 @@ class Changes:
         keys = tuple(differences(self.wanted, wanted))
         if not keys:
             raise ChangeRefusedError(f"{by}: the values are so already; nothing has changed")
+        try:
+            tuning(wanted)
+        except ValueError as error:
+            raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         now = asyncio.get_running_loop().time()
         self._from, self.wanted, self._began = self._now, wanted, now
         if self._retuning is None:
