@@ -59,6 +59,11 @@ class MotionEstimate:
         self._position: LocalPosition | None = None
         self._turn = 0.0
 
+    @property
+    def disturbance(self) -> Horizontal:
+        """Acceleration by wind and bias, m/s², NED."""
+        return self._observer.disturbance
+
     def retune(self, settings: ObserverSettings) -> None:
         """Use other settings of the observer from the next position on."""
         self._observer.retune(settings)

@@ -20,7 +20,7 @@ class Observer(Protocol):
         ...
 
     def status(self, status: FlightStatus) -> None:
-        """Five times a second: the state of the flight."""
+        """Ten times a second: the state of the flight."""
         ...
 
     def event(self, time: float, text: str) -> None:
