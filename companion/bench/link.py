@@ -6,20 +6,18 @@ program, a simple loop on pymavlink, this program with MAVSDK as its link, and a
 with MAVSDK alone.
 """
 
-import gc
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from math import ceil
 from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
-from companion.bench.process import Contestant, ContestantError
+from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
+from companion.bench.process import Contestant
 from companion.bench.sender import Sender, Stamp, stamp_by_time, stamp_by_yaw_rate
 from companion.extras import require
 
-_ROUND_S = 1.0
 _NO_WRAP = 2**32
 _YAW_RATE_WRAP = 8192
 _OWN_LOOP = "companion.bench.pymavlink_program"
@@ -66,8 +64,8 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         ContestantError: A program failed.
     """
     require("mavsdk", "mavsdk", "this benchmark")
-    rounds = ceil(seconds / _ROUND_S)
-    with ExitStack() as stack, _no_garbage_collection():
+    rounds = ceil(seconds / ROUND_S)
+    with ExitStack() as stack, no_garbage_collection():
         senders = {entry.key: _start(stack, entry) for entry in _ENTRIES}
         for sender in senders.values():
             sender.wait_ready()
@@ -76,7 +74,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
                 playing.play(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
-        figures = {key: _figures(sender) for key, sender in senders.items()}
+        figures = {key: figures_of(sender) for key, sender in senders.items()}
     figures["ratio"] = {
         f"companion_to_{other}": round(figures["companion"]["p50_us"] / figures[other]["p50_us"], 3)
         for other in ("echo", "pymavlink", "mavsdk")
@@ -92,37 +90,6 @@ def _start(stack: ExitStack, entry: _Entry) -> Sender:
     sender = Sender(contestant, entry.stamp, entry.modulus)
     stack.callback(sender.close)
     return sender
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Switch the garbage collector off, so that the sender does not pause while it measures."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-def _figures(sender: Sender) -> dict[str, Any]:
-    ordered = sorted(sender.round_trips_ns)
-    if not ordered:
-        raise ContestantError(f"{sender.name} answered none of {sender.sent} samples in time")
-    return {
-        "p50_us": _us(ordered, 0.50),
-        "p99_us": _us(ordered, 0.99),
-        "max_us": _us(ordered, 1.0),
-        "cpu_percent": round(100.0 * sender.cpu_ns / sender.wall_ns, 2),
-        "samples": sender.sent,
-        "unanswered": sender.sent - len(ordered),
-    }
-
-
-def _us(ordered: list[int], quantile: float) -> float:
-    index = min(len(ordered) - 1, int(quantile * len(ordered)))
-    return round(ordered[index] / 1000.0, 1)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

@@ -25,7 +25,7 @@ def free_port() -> int:
         return int(opened.getsockname()[1])
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Have the kernel kill this process when its parent ends (Linux only).
 
     The programs run until they are killed, and a benchmark that was killed cannot do that.
@@ -34,23 +34,24 @@ def _end_with_parent() -> None:
 
 
 class Contestant:
-    """One program to measure: starts `python -m MODULE PORT`, and reads its processor time.
+    """One program to measure: starts `python -m MODULE PORT …`, and reads its processor time.
 
     Args:
         name: Name to show to users.
         module: A module that listens on the UDP port given to it.
+        arguments: Further arguments of the module.
     """
 
-    def __init__(self, name: str, module: str) -> None:
+    def __init__(self, name: str, module: str, *arguments: str) -> None:
         self.name = name
         self.port = free_port()
         # A file instead of a pipe: nobody reads it meanwhile, and a full pipe would block.
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
         self._process = subprocess.Popen(
-            [sys.executable, "-m", module, str(self.port)],
+            [sys.executable, "-m", module, str(self.port), *arguments],
             stdout=subprocess.DEVNULL,
             stderr=self._output,
-            preexec_fn=_end_with_parent,  # noqa: PLW1509  the benchmark has one thread
+            preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
         )
 
     def check_running(self) -> None:

@@ -5,7 +5,7 @@ import select
 import socket
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import degrees
 from typing import Any
 
@@ -43,6 +43,7 @@ class Sender:
         contestant: The program that answers.
         stamp: Finds the time stamp in a setpoint.
         modulus: Value at which these stamps wrap, ms.
+        beside: Messages that follow each sample, each in a datagram of its own.
 
     Attributes:
         round_trips_ns: Times from sample to setpoint, ns.
@@ -51,7 +52,10 @@ class Sender:
         wall_ns: Duration of these rounds, ns.
     """
 
-    def __init__(self, contestant: Contestant, stamp: Stamp, modulus: int) -> None:
+    def __init__(
+        self, contestant: Contestant, stamp: Stamp, modulus: int, beside: Sequence[Any] = ()
+    ) -> None:
+        self._beside = beside
         self._contestant, self._stamp, self._modulus = contestant, stamp, modulus
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -127,6 +131,11 @@ class Sender:
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 
+    def forget(self) -> None:
+        """Forget what was measured so far."""
+        self.round_trips_ns.clear()
+        self.sent = self.cpu_ns = self.wall_ns = 0
+
     def _send_samples(self, count: int, rate_hz: float, due: int) -> int:
         period_ns = round(1e9 / rate_hz)
         for _ in range(count):
@@ -143,6 +152,8 @@ class Sender:
         )
         self._under_way[self._time_ms % self._modulus] = time.perf_counter_ns()
         self._send(frame)
+        for message in self._beside:
+            self._send_message(message)
 
     def _listen_until(self, due: int) -> bool:
         """Take answers until the time `due`, ns; return whether one belonged to a sample."""

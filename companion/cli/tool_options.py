@@ -45,19 +45,24 @@ def add_serve(commands: Commands) -> None:
 
 
 def add_benches(commands: Commands) -> None:
-    """Add `bench link`, `bench planner` and `bench flight`."""
+    """Add `bench link`, `bench serve`, `bench planner` and `bench flight`."""
     bench = commands.add_parser("bench", help="measure this program's speed")
     benches = bench.add_subparsers(required=True, metavar="WHAT")
     link = benches.add_parser(
         "link", help="sample in → setpoint out: ours, echo, pymavlink, MAVSDK"
     )
-    link.add_argument(
-        "--seconds", type=number(0.1, 3600.0), default=20.0, help="for each program (20)"
-    )
-    link.add_argument(
-        "--rate", type=number(1.0, 2000.0), default=250.0, help="samples a second (250)"
-    )
     link.set_defaults(run="tools.bench_link")
+    serve = benches.add_parser(
+        "serve", help="sample in → setpoint out, with three clients on the link and without"
+    )
+    serve.set_defaults(run="tools.bench_serve")
+    for each in (link, serve):
+        each.add_argument(
+            "--seconds", type=number(0.1, 3600.0), default=20.0, help="for each program (20)"
+        )
+        each.add_argument(
+            "--rate", type=number(1.0, 2000.0), default=250.0, help="samples a second (250)"
+        )
     step = benches.add_parser("planner", help="a step of each planner, in a flight and in batches")
     step.add_argument("--seconds", type=number(0.001, 3600.0), default=5.0, help="of measuring (5)")
     step.set_defaults(run="tools.bench_planner")
@@ -68,7 +73,7 @@ def add_benches(commands: Commands) -> None:
         "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
     )
     flight.set_defaults(run="tools.bench_flight")
-    for each in (link, step, flight):
+    for each in (link, serve, step, flight):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
 
 

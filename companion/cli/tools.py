@@ -21,6 +21,16 @@ def bench_link(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
+def bench_serve(options: argparse.Namespace) -> int:
+    """Measure our latency with other programs on the link and without."""
+    from companion.bench import serve  # noqa: PLC0415  no other command needs it
+
+    figures = serve.run(options.seconds, options.rate, options.json)
+    if options.json:
+        print(json.dumps(figures))
+    return EXIT_OK
+
+
 def bench_planner(options: argparse.Namespace) -> int:
     """Measure a step of each planner."""
     from companion.bench import planner  # noqa: PLC0415  no other command needs it

@@ -11,14 +11,40 @@ import pytest
 
 from tests.serve.serving import free_ports, mock, serving
 
-OFFBOARD = Path(__file__).with_name("mavsdk_offboard.py")
 MAVSDK = Path(__file__).with_name("mavsdk_program.py")
+HOVER_AND_PARAMETER = {
+    "px4": ("0.49", "MPC_THR_HOVER"),
+    "ardupilot": ("0.364", "MOT_THST_HOVER"),
+}
 PARAMETERS = 90
 PLAN = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t47.3977418\t8.5455939\t488.0\t1
 1\t0\t3\t22\t0\t0\t0\t0\t47.3977418\t8.5455939\t10.0\t1
 2\t0\t3\t16\t0\t0\t0\t0\t47.3978000\t8.5456000\t10.0\t1
 """
+
+
+def run_program(name, endpoint, hover, parameter):
+    """Run an offboard program of MAVSDK; returns its report."""
+    run = subprocess.run(
+        [sys.executable, Path(__file__).with_name(name), endpoint, hover, parameter],
+        capture_output=True, text=True, timeout=200, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout + run.stderr
+    return json.loads(run.stdout.split("REPORT ")[1].splitlines()[0])
+
+
+def check_report(report, said):
+    """What a program has seen, which flew through us."""
+    for flag in ("armable", "active", "still_active", "disarmed"):
+        assert report[flag], (flag, said)
+    assert 0.0 < report["parameter"] < 1.0
+    assert report["start_s"] < 5.0
+    assert report["position"] < 0.2
+    assert report["back"] < 0.3
+    assert report["velocity"] == pytest.approx(-1.5, abs=0.2)
+    assert report["position_velocity"] < 0.3
+    assert report["acceleration"] == pytest.approx(1.0, abs=0.3)
 
 
 @pytest.mark.timeout(180)
@@ -86,29 +112,20 @@ def read_until(process, words):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(180)
-@pytest.mark.parametrize(("autopilot", "hover"), [("px4", 0.49), ("ardupilot", 0.364)])
-def test_a_mavsdk_offboard_program_flies_through_us(autopilot, hover):
-    """Position, velocity, acceleration, attitude, and a circle of 5 m at 5 m/s; real time."""
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("program", ["mavsdk_native.py", "mavsdk_grpc_program.py"])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_mavsdk_offboard_program_flies_through_us(autopilot, program, tmp_path):
+    """Every kind of setpoint, and a circle of 5 m at 5 m/s, from the ground and back; real time."""
     config = f"configs/mock-{autopilot}.yaml"
-    vehicle, program = free_ports(2)
-    endpoints = f"udpin://127.0.0.1:{program}", f"udpout://127.0.0.1:{program}"
+    vehicle, port = free_ports(2)
+    settings = ["limits.max_tilt_deg=45", f"recording.directory={tmp_path}"]
     with (
         mock(vehicle, "--config", config),
-        serving(
-            vehicle, endpoints[0], config=config, settings=["limits.max_tilt_deg=45"]
-        ) as served,
+        serving(vehicle, f"udpin://127.0.0.1:{port}", config=config, settings=settings) as served,
     ):
-        run = subprocess.run(
-            [sys.executable, OFFBOARD, endpoints[1], str(hover)],
-            capture_output=True, text=True, timeout=150, check=False,
-        )  # fmt: skip
-    assert run.returncode == 0, run.stdout + run.stderr + served.said
-    report = json.loads(run.stdout.split("REPORT ")[1].splitlines()[0])
-    assert report["active"]
-    assert report["still_active"]
-    assert report["disarmed"]
-    assert report["position"] < 0.2
-    assert report["velocity"] == pytest.approx(-1.5, abs=0.2)
-    assert report["acceleration"] == pytest.approx(1.0, abs=0.3)
+        report = run_program(program, f"udpout://127.0.0.1:{port}", *HOVER_AND_PARAMETER[autopilot])
+    check_report(report, served.said)
     assert report["circle_rms_m"] < 0.15, "as MAVSDK's telemetry tells it, late by itself"
+    (folder,) = tmp_path.iterdir()
+    assert json.loads((folder / "summary.json").read_text())["tracking"]["position_rms_m"] < 0.15

@@ -8,6 +8,7 @@ and body rates and thrust. With other masks they differ, or fall back to somethi
 from math import isfinite
 
 from companion.attitude import AttitudeError, BodyRates
+from companion.attitude.kinematics import cos_tilt
 from companion.attitude.representation import normalised
 from companion.mavlink.messages import Message
 from companion.serve.setpoints.request import AttitudeRequest, RatesRequest, RefusedSetpoint
@@ -63,6 +64,10 @@ def _rate(rate: float) -> float:
 
 def _attitude(message: Message) -> tuple[float, float, float, float]:
     try:
-        return normalised(tuple(message.q))
+        q = normalised(tuple(message.q))
     except AttitudeError as error:
         raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error
+    # Beyond it two attitudes have the same horizontal acceleration per specific thrust.
+    if cos_tilt(q[1], q[2]) <= 0.0:
+        raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not flown")
+    return q

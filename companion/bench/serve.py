@@ -1,0 +1,130 @@
+"""`companion bench serve`: what other programs on the link cost the time from sample to setpoint.
+
+Two processes answer the same samples and telemetry in turn, in short rounds: one forwards them to
+nobody, one to three clients that read everything and to a fourth that is stopped (SIGSTOP).
+"""
+
+import json
+import signal
+import subprocess
+import sys
+from contextlib import ExitStack
+from math import ceil
+from typing import Any
+
+from pymavlink.dialects.v20 import common as dialect
+from rich.console import Console
+from rich.table import Table
+
+from companion.bench.figures import ROUND_S, figures_of, no_garbage_collection
+from companion.bench.process import Contestant, ContestantError, end_with_parent, free_port
+from companion.bench.sender import Sender, stamp_by_time
+
+_CLIENTS = 3
+_NO_WRAP = 2**32
+_ZEROS = [0.0] * 21
+_TELEMETRY = (
+    dialect.MAVLink_attitude_message(1, 0.1, 0.1, 0.1, 0.01, 0.02, 0.03),
+    dialect.MAVLink_local_position_ned_message(1, 1.0, 2.0, -3.0, 0.1, 0.2, 0.3),
+    dialect.MAVLink_highres_imu_message(1, *[0.1] * 13, 0xFFFF),
+    dialect.MAVLink_odometry_message(
+        1, 1, 8, 1.0, 2.0, -3.0, [1.0, 0.1, 0.1, 0.1], *[0.1] * 6, _ZEROS, _ZEROS
+    ),
+    dialect.MAVLink_servo_output_raw_message(1, 0, *[1500] * 8),
+)
+"""What a vehicle sends beside each sample."""
+_KEYS = {"alone": "no client", "with_clients": f"{_CLIENTS} clients, one stopped"}
+
+
+def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
+    """Measure with and without clients, in interleaved rounds of about 1 s.
+
+    Args:
+        seconds: Time for which each is measured, s.
+        rate_hz: Rate of samples, and of each of five telemetry messages, Hz.
+        as_json: Print nothing; the caller prints the result.
+
+    Returns:
+        For `alone` and `with_clients` the figures of `companion bench link`; `ratio`: p50 and p99
+        with clients divided by those without; `clients`: frames received and lost by each.
+
+    Raises:
+        ContestantError: A program failed.
+    """
+    rounds = ceil(seconds / ROUND_S)
+    with ExitStack() as stack, no_garbage_collection():
+        ports = {key: free_port() for key in _KEYS}
+        senders = {key: _start(stack, key, port) for key, port in ports.items()}
+        for sender in senders.values():
+            sender.wait_ready()
+        reading = _clients(stack, ports["with_clients"], _CLIENTS)
+        stopped = _clients(stack, ports["with_clients"], 1)
+        senders["with_clients"].play(rate_hz, ROUND_S)  # all four connect, and receive
+        stopped.send_signal(signal.SIGSTOP)
+        senders["with_clients"].forget()
+        for _ in range(rounds):
+            for playing in senders.values():
+                playing.play(rate_hz, seconds / rounds)
+                for sender in senders.values():
+                    sender.heartbeat()
+        figures: dict[str, Any] = {key: figures_of(sender) for key, sender in senders.items()}
+        figures["clients"] = _counts(reading)
+    alone, beside = figures["alone"], figures["with_clients"]
+    figures["ratio"] = {
+        name: round(beside[f"{name}_us"] / alone[f"{name}_us"], 3) for name in ("p50", "p99")
+    }
+    if not as_json:
+        _show(figures, rate_hz)
+    return figures
+
+
+def _start(stack: ExitStack, key: str, client_port: int) -> Sender:
+    contestant = Contestant(_KEYS[key], "companion.bench.serve_program", str(client_port))
+    stack.callback(contestant.stop)
+    sender = Sender(contestant, stamp_by_time, _NO_WRAP, _TELEMETRY)
+    stack.callback(sender.close)
+    return sender
+
+
+def _clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "companion.bench.client_program", str(port), str(count)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
+    )
+    stack.callback(process.communicate)
+    stack.callback(process.kill)
+    return process
+
+
+def _counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
+    out, _ = process.communicate()
+    if process.returncode != 0:
+        raise ContestantError(f"the clients of the benchmark ended with {process.returncode}")
+    counts: list[dict[str, int]] = json.loads(out)
+    return counts
+
+
+def _show(figures: dict[str, Any], rate_hz: float) -> None:
+    table = Table(title=f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry")
+    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
+        table.add_column(heading, justify="right" if heading else "left")
+    for key, title in _KEYS.items():
+        row = figures[key]
+        table.add_row(
+            title,
+            *(f"{row[name]:.0f}" for name in ("p50_us", "p99_us", "max_us")),
+            f"{row['cpu_percent']:.1f}",
+            f"{row['unanswered']} of {row['samples']}",
+        )
+    ratio, lost = figures["ratio"], sum(each["lost"] for each in figures["clients"])
+    received = sum(each["received"] for each in figures["clients"])
+    console = Console()
+    console.print(table)
+    console.print(
+        f"with clients: p50 {ratio['p50']:.2f} ×, p99 {ratio['p99']:.2f} ×; "
+        f"lost {lost} of {received + lost} forwarded frames",
+        highlight=False,
+    )
