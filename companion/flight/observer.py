@@ -44,6 +44,37 @@ class Silent:
         """Ignore it."""
 
 
+class Several:
+    """Passes all on to several observers, in order.
+
+    Args:
+        observers: who is told.
+    """
+
+    def __init__(self, *observers: Observer) -> None:
+        self._observers = observers
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.phase(name, waits_for)
+
+    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.waiting(name, detail, elapsed, timeout)
+
+    def status(self, status: FlightStatus) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.status(status)
+
+    def event(self, time: float, text: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.event(time, text)
+
+
 async def decline_landing() -> bool:
     """Answer no when asked whether to land: where nobody can be asked, the vehicle holds on."""
     return False

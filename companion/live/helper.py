@@ -68,7 +68,7 @@ class Helper:
         """Messages that the process did not take in time."""
         return self._channel.dropped
 
-    async def beside(self, work: Coroutine[Any, Any, T]) -> T:
+    async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
         """Run `work`, and serve the process meanwhile."""
         loop = asyncio.get_running_loop()
         self.changes.on_change = self._tell_change
@@ -128,9 +128,7 @@ class Helper:
 
     def _tell_change(self, config: Config) -> None:
         made = str(self.changes.made[-1])
-        self._send(
-            "config", config=_plain(config), can_undo=self.changes.can_undo, text=made
-        )
+        self._send("config", config=_plain(config), can_undo=self.changes.can_undo, text=made)
 
     def _on_readable(self) -> None:
         """Handle what the process asks for."""

@@ -5,6 +5,7 @@ import gc
 from typing import NamedTuple
 
 from companion.config import Config
+from companion.flight.changes import Changes
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
@@ -49,6 +50,7 @@ class ServedControl:
         observer: is told of phases and events of each flight.
         environment: of the flights.
         records: makes their records.
+        changes: of the values that may change in flight.
     """
 
     def __init__(
@@ -60,8 +62,9 @@ class ServedControl:
         observer: Observer,
         environment: Environment,
         records: FlightRecords,
+        changes: Changes,
     ) -> None:
-        self._records = records
+        self._records, self._changes = records, changes
         self._config, self._link, self._component = config, link, component
         self._keeper, self._observer, self._environment = keeper, observer, environment
         self._clock = asyncio.get_running_loop().time
@@ -213,6 +216,7 @@ class ServedControl:
             self._observer,
             self._environment,
             self._records,
+            self._changes,
         )
         flight.give(self._newest[owner])
         self._task = task = asyncio.create_task(self._fly(flight, asked))
