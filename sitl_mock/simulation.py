@@ -17,6 +17,7 @@ from sitl_mock.link.signing import link_signing
 from sitl_mock.personalities import PERSONALITIES
 from sitl_mock.physics.geodesy import Origin
 from sitl_mock.physics.vehicle import Vehicle
+from sitl_mock.physics.vehicle_step import MakePlant, PythonPlant
 from sitl_mock.settings import MockSettings
 
 _SYSTEM_TIME = dialect.MAVLink_system_time_message
@@ -31,9 +32,12 @@ class Simulation:
     Args:
         settings: of this vehicle.
         system_id: MAVLink system id.
+        plant: computes the physics, see `Vehicle`.
     """
 
-    def __init__(self, settings: MockSettings, system_id: int = 1) -> None:
+    def __init__(
+        self, settings: MockSettings, system_id: int = 1, plant: MakePlant = PythonPlant
+    ) -> None:
         personality = PERSONALITIES[settings.autopilot]
         overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}
         self.parameters = ParameterTable(personality.parameters, overrides)
@@ -46,6 +50,7 @@ class Simulation:
             settings.sensors,
             seed=settings.seed,
             heading=radians(home.heading_deg),
+            plant=plant,
         )
         self.state = State(self.vehicle.estimate())
         self.state.mode = self.state.intended_mode = personality.boot_mode
@@ -121,9 +126,7 @@ class Simulation:
             return
         command = self._rules.control.command((next_us - state.time_us) / 1e6)
         vehicle = self.vehicle
-        step = vehicle.step
-        for _ in range(next_us * self._rate_hz // 1_000_000 - vehicle.steps):
-            step(command)
+        vehicle.step(command, next_us * self._rate_hz // 1_000_000 - vehicle.steps)
         state.time_us = next_us
         if not self.effects.clock_frozen:
             state.shown_us = next_us

@@ -11,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from companion.batch import can_compile
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
@@ -62,7 +63,9 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float
     """Figures of one flight."""
     path = shipped(FILES[autopilot])
     config = _hovering(load(path), seconds)
-    vehicle = MockVehicle(config=path, lockstep=lockstep, delay_s=_WIRE_S, prearm_delay_s=0.2)
+    vehicle = MockVehicle(
+        config=path, lockstep=lockstep, delay_s=_WIRE_S, compiled=can_compile(), prearm_delay_s=0.2
+    )
     began = process_time()
     summary = fly(config, vehicle)
     cpu = process_time() - began

@@ -1,11 +1,11 @@
 """What a flight looks like at one time: for the live page, in the columns of `flight.mcap`."""
 
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Any
 
 from companion.attitude import coefficients
 from companion.flight.context import FlightContext
-from companion.guidance.reference import Reference
+from companion.guidance.reference import GRAVITY, Reference
 
 _AXES = ("north", "east", "down")
 _RATES = ("roll", "pitch", "yaw")
@@ -34,6 +34,12 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         reference = _reference(context, now)
         if reference is not None:
             shown.update(_named("reference", reference.position_ned, "m"))
+            north, east, down = reference.acceleration_ned
+            thrust = sqrt(north * north + east * east + (GRAVITY - down) ** 2)
+            shown.update(reference_north=north / thrust, reference_east=east / thrust)
+            if state.height is not None:
+                above = motion.position_ned[2] - reference.position_ned[2]
+                shown.update(reference_height_m=state.height + above)
     origin = context.snapshot_builder.origin_ned
     if origin is not None:
         shown.update(_named("fence", origin, "m"))

@@ -19,7 +19,7 @@ _LOOK_PERIOD = 0.06
 """The watched file is looked at this often, s; three looks make an edit."""
 _ANSWER = 3.0
 """Time allowed for the flight to answer, s."""
-_NICE = 10
+_NICE = 5
 """The process gives way to the flight."""
 
 

@@ -2,6 +2,7 @@
 
 from math import cos, exp, radians, sin, sqrt
 from random import Random
+from typing import NamedTuple
 
 from sitl_mock.config.airframe import AirframeConfig, WindConfig
 from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
@@ -48,23 +49,31 @@ class Wind:
         self.velocity = self._blend()
 
 
-class Ground:
-    """Contact with the ground: no penetration, no sliding, and the vehicle levels."""
+class GroundLaw(NamedTuple):
+    """Constants of the contact with the ground: no penetration, no sliding, the vehicle levels."""
 
-    __slots__ = ("_crash_cosine", "_crash_speed", "_levelling")
+    crash_cosine: float  # of the tilt
+    crash_speed: float  # m/s
+    levelling: float  # factor on the tilt in one step
 
-    def __init__(self, airframe: AirframeConfig, dt: float) -> None:
-        self._crash_cosine = cos(radians(airframe.crash_tilt_deg))
-        self._crash_speed = airframe.crash_speed_m_s
-        self._levelling = exp(-dt * 1e3 / airframe.ground_levelling_ms)
 
-    def survives(self, q: Quaternion, sink_speed: float) -> bool:
-        """Whether a touchdown at this attitude and sink speed (m/s) is no crash."""
-        _, x, y, _ = q
-        upright = 1.0 - 2.0 * (x * x + y * y) >= self._crash_cosine
-        return upright and sink_speed <= self._crash_speed
+def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
+    """Return the contact with the ground for steps of `dt` seconds."""
+    return GroundLaw(
+        cos(radians(airframe.crash_tilt_deg)),
+        airframe.crash_speed_m_s,
+        exp(-dt * 1e3 / airframe.ground_levelling_ms),
+    )
 
-    def level(self, q: Quaternion) -> Quaternion:
-        """Level the vehicle on the ground for one step; the heading stays."""
-        w, x, y, z = q
-        return normalise((w, x * self._levelling, y * self._levelling, z))
+
+def survives(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
+    """Whether a touchdown at this attitude and sink speed (m/s) is no crash."""
+    _, x, y, _ = q
+    upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
+    return upright and sink_speed <= law.crash_speed
+
+
+def levelled(law: GroundLaw, q: Quaternion) -> Quaternion:
+    """Return the attitude on the ground after one step of levelling; the heading stays."""
+    w, x, y, z = q
+    return normalise((w, x * law.levelling, y * law.levelling, z))

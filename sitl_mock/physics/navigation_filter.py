@@ -30,6 +30,15 @@ class Snapshot(NamedTuple):
     acceleration: Vector  # NED, m/s^2, mean over the step
 
 
+TrailRow = tuple[*Motion, *Vector, *Vector]
+"""A snapshot as one row of numbers: motion, position, acceleration."""
+
+
+def snapshot(row: TrailRow) -> Snapshot:
+    """Return the true motion of a row."""
+    return Snapshot(row[0:10], row[10:13], row[13:16])
+
+
 class NavigationError(NamedTuple):
     """Error of the estimate: m, m/s, and a small rotation of the attitude, rad, NED."""
 
@@ -99,16 +108,18 @@ class NavigationFilter:
         )
         return _FilterState((*noise, 0j), (0j, 0j), noise)
 
+    def is_due(self, at: float) -> bool:
+        """Whether a fix is due at a fusion time, s."""
+        return at - self._at >= self._period - 1e-9
+
     def advance(self, delayed: Snapshot, at: float, now: float) -> None:
-        """Correct the errors if a fix is due.
+        """Correct the errors by a fix.
 
         Args:
             delayed: the true motion at the fusion time.
             at: the fusion time, s.
             now: the present time, s.
         """
-        if at - self._at < self._period - 1e-9:
-            return
         elapsed = at - self._at
         config, late = self._config, 1e-3
         speed, pull = _horizontal(delayed.motion), _horizontal(delayed.acceleration)

@@ -1,6 +1,5 @@
-"""The autopilot's body-rate controller: PI with feed-forward and damping on each axis."""
+"""The autopilot's body-rate controller: PI with feed-forward and damping on each axis (pure)."""
 
-from collections import deque
 from math import exp, isfinite
 from typing import NamedTuple
 
@@ -9,7 +8,13 @@ from sitl_mock.physics.quaternion import Vector
 
 AxisState = tuple[float, float]
 """State of one axis, N m: its integral, and its filtered torque, which is the output."""
-AT_REST: AxisState = (0.0, 0.0)
+Axes = tuple[AxisState, AxisState, AxisState]
+"""States of roll, pitch and yaw."""
+IDLE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+Delays = tuple[int, int, int]
+"""Delays of roll, pitch and yaw, steps."""
+Ring = list[Vector]
+"""The latest setpoints, written in a circle; an array if the steps are compiled."""
 
 
 class AxisLaw(NamedTuple):
@@ -66,71 +71,84 @@ def axis_step(
     return integral, wanted + memory * (filtered - wanted)
 
 
-class RateLoop:
-    """The rate controller of the three axes, with the transport delay of their setpoints.
+class RateLaw(NamedTuple):
+    """Constants of the rate controller."""
+
+    roll: AxisLaw
+    pitch: AxisLaw
+    yaw: AxisLaw
+    delays: Delays
+    dt: float  # step, s
+
+
+def rate_law(config: RateLoopConfig, dt: float) -> RateLaw:
+    """Return the rate controller for steps of `dt` seconds."""
+    roll, pitch, yaw = config.roll, config.pitch, config.yaw
+    delays_ms = (roll.setpoint_delay_ms, pitch.setpoint_delay_ms, yaw.setpoint_delay_ms)
+    return RateLaw(
+        axis_law(roll, dt),
+        axis_law(pitch, dt),
+        axis_law(yaw, dt),
+        delay_steps(delays_ms, dt),
+        dt,
+    )
+
+
+def rate_step(
+    law: RateLaw,
+    axes: Axes,
+    setpoint: Vector,
+    rates: Vector,
+    accelerations: Vector,
+    tilt_saturated: bool,
+    yaw_saturated: bool,
+) -> Axes:
+    """Return the state of the three axes after a step; the torques are their outputs (pure).
 
     A NaN or infinite setpoint holds the present rate, as measured on PX4: the error is zero, and a
     rolling vehicle continues to roll. Setpoints are not limited.
-    """
-
-    __slots__ = ("_axes", "_delay", "_dt", "_laws")
-
-    def __init__(self, config: RateLoopConfig, dt: float) -> None:
-        self._dt = dt
-        gains = (config.roll, config.pitch, config.yaw)
-        self._laws = tuple(axis_law(axis, dt) for axis in gains)
-        roll, pitch, yaw = (axis.setpoint_delay_ms for axis in gains)
-        self._delay = SetpointDelay((roll, pitch, yaw), dt)
-        self._axes = (AT_REST, AT_REST, AT_REST)
-
-    def step(
-        self,
-        setpoint: Vector,
-        rates: Vector,
-        accelerations: Vector,
-        *,
-        tilt_saturated: bool,
-        yaw_saturated: bool,
-    ) -> Vector:
-        """Return the torques about body x, y, z in N m for this step."""
-        roll, pitch, yaw = self._delay.step(setpoint)
-        p, q, r = rates
-        p_dot, q_dot, r_dot = accelerations
-        x_law, y_law, z_law = self._laws
-        x, y, z = self._axes
-        dt = self._dt
-        x = axis_step(x_law, x, roll if isfinite(roll) else p, p, p_dot, tilt_saturated, dt)
-        y = axis_step(y_law, y, pitch if isfinite(pitch) else q, q, q_dot, tilt_saturated, dt)
-        z = axis_step(z_law, z, yaw if isfinite(yaw) else r, r, r_dot, yaw_saturated, dt)
-        self._axes = (x, y, z)
-        return x[1], y[1], z[1]
-
-    def idle(self, setpoint: Vector) -> None:
-        """Run a step without control (disarmed, or on the ground): reset, but delay setpoints."""
-        self._delay.step(setpoint)
-        self._axes = (AT_REST, AT_REST, AT_REST)
-
-
-class SetpointDelay:
-    """Delays setpoints by a whole number of steps; before the first one it returns zero.
 
     Args:
-        delays_ms: of roll, pitch and yaw; rounded to whole steps.
-        dt: step, s.
+        law: constants.
+        axes: before the step.
+        setpoint: body rates, rad/s, FRD, already delayed.
+        rates: present body rates, rad/s.
+        accelerations: present angular accelerations, rad/s^2.
+        tilt_saturated: the rotors could not give the last torque about x and y.
+        yaw_saturated: the rotors could not give the last torque about z.
     """
+    roll, pitch, yaw = setpoint
+    p, q, r = rates
+    p_dot, q_dot, r_dot = accelerations
+    x, y, z = axes
+    x_law, y_law, z_law, _, dt = law
+    return (
+        axis_step(x_law, x, roll if isfinite(roll) else p, p, p_dot, tilt_saturated, dt),
+        axis_step(y_law, y, pitch if isfinite(pitch) else q, q, q_dot, tilt_saturated, dt),
+        axis_step(z_law, z, yaw if isfinite(yaw) else r, r, r_dot, yaw_saturated, dt),
+    )
 
-    __slots__ = ("_given", "_pitch", "_roll", "_yaw")
 
-    def __init__(self, delays_ms: Vector, dt: float) -> None:
-        # Counted from the newest setpoint, which is at -1.
-        self._roll, self._pitch, self._yaw = (
-            -1 - round(delay_ms * 1e-3 / dt) for delay_ms in delays_ms
-        )
-        length = -min(self._roll, self._pitch, self._yaw)
-        self._given: deque[Vector] = deque([(0.0, 0.0, 0.0)] * length, maxlen=length)
+def delay_steps(delays_ms: Vector, dt: float) -> Delays:
+    """Return the delays of roll, pitch and yaw setpoints, rounded to whole steps of `dt` s."""
+    roll, pitch, yaw = (round(delay_ms * 1e-3 / dt) for delay_ms in delays_ms)
+    return roll, pitch, yaw
 
-    def step(self, setpoint: Vector) -> Vector:
-        """Accept the setpoint of this step; return the delayed one."""
-        given = self._given
-        given.append(setpoint)
-        return given[self._roll][0], given[self._pitch][1], given[self._yaw][2]
+
+def delayed(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
+    """Note the setpoint of a step; return the delayed one.
+
+    Args:
+        ring: the latest setpoints, longer than any delay. It is changed.
+        delays: of roll, pitch and yaw, steps.
+        step: number of the step; each call has the next one.
+        setpoint: body rates, rad/s.
+    """
+    length = len(ring)
+    ring[step % length] = setpoint
+    roll, pitch, yaw = delays
+    return (
+        ring[(step - roll) % length][0],
+        ring[(step - pitch) % length][1],
+        ring[(step - yaw) % length][2],
+    )

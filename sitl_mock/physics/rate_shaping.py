@@ -9,18 +9,24 @@ from typing import NamedTuple
 
 from sitl_mock.config.rate_loop import AxisShaping
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise, to_body
-from sitl_mock.physics.rate_loop import SetpointDelay
+from sitl_mock.physics.rate_loop import Delays, delay_steps
 
-AT_REST: Vector = (0.0, 0.0, 0.0)
+Closing = tuple[float, float]
+"""Body rate per angle, 1/s, and the acceleration that stops the rotation in time, rad/s^2."""
 
 
 class Shaped(NamedTuple):
     """State of the shaping."""
 
+    active: bool
+    """Whether rates are shaped now: not without control, and not in a loop without shaping."""
     rates: Vector
     """Shaped rates along the axes of the attitude target, rad/s."""
     target: Quaternion
     """Attitude target, body to world."""
+
+
+NOT_SHAPED = Shaped(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def slew(goal: float, rate: float, most: float) -> float:
@@ -65,60 +71,71 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear)), angle)
 
 
-class RateShaping:
-    """Shapes the rates of the three axes, which share one attitude target.
+class ShapingLaw(NamedTuple):
+    """Constants of the shaping."""
+
+    most: Vector
+    """Largest change of each rate in one step, rad/s."""
+    closing: tuple[Closing, Closing, Closing]
+    """How roll, pitch and yaw close an angle."""
+    delays: Delays
+    dt: float  # step, s
+
+
+def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float) -> ShapingLaw:
+    """Return the shaping of roll, pitch and yaw for steps of `dt` seconds.
+
+    Without axes it is a law of the same type that is never used, for the compiler's sake.
+    """
+    if axes is None:
+        return ShapingLaw((0.0, 0.0, 0.0), ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), (0, 0, 0), dt)
+    roll, pitch, yaw = axes
+    limits = (
+        roll.acceleration_limit_rad_s2,
+        pitch.acceleration_limit_rad_s2,
+        yaw.acceleration_limit_rad_s2,
+    )
+    return ShapingLaw(
+        (limits[0] * dt, limits[1] * dt, limits[2] * dt),
+        (
+            (roll.attitude_gain_1_s, 0.5 * limits[0]),
+            (pitch.attitude_gain_1_s, 0.5 * limits[1]),
+            (yaw.attitude_gain_1_s, 0.5 * limits[2]),
+        ),
+        delay_steps((roll.delay_ms, pitch.delay_ms, yaw.delay_ms), dt),
+        dt,
+    )
+
+
+def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tuple[Vector, Shaped]:
+    """Shape the rates of the three axes, which share one attitude target, for one step (pure).
 
     Args:
-        axes: settings of roll, pitch and yaw.
-        dt: step, s.
+        law: constants.
+        shaped: before the step; if it is not active, the attitude target starts at `q`.
+        goals: body rates, rad/s, already delayed; NaN holds the shaped rate, infinity grows
+            without limit.
+        q: present attitude.
+
+    Returns:
+        The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
-
-    __slots__ = ("_closing", "_delay", "_dt", "_most", "_shaped")
-
-    def __init__(self, axes: tuple[AxisShaping, AxisShaping, AxisShaping], dt: float) -> None:
-        self._dt = dt
-        self._most = tuple(axis.acceleration_limit_rad_s2 * dt for axis in axes)
-        self._closing = tuple(
-            (axis.attitude_gain_1_s, 0.5 * axis.acceleration_limit_rad_s2) for axis in axes
-        )
-        roll, pitch, yaw = axes
-        self._delay = SetpointDelay((roll.delay_ms, pitch.delay_ms, yaw.delay_ms), dt)
-        self._shaped: Shaped | None = None
-
-    @property
-    def shaped(self) -> Shaped | None:
-        """The attitude target after the latest step; None while the rate loop idles."""
-        return self._shaped
-
-    def step(self, setpoint: Vector, q: Quaternion) -> Vector:
-        """Return the setpoint of the rate loop, rad/s, FRD.
-
-        Args:
-            setpoint: body rates, rad/s; NaN holds the shaped rate, infinity grows without limit.
-            q: present attitude; the attitude target starts there.
-        """
-        goals = self._delay.step(setpoint)
-        rates, target = self._shaped or Shaped(AT_REST, q)
-        most = self._most
-        rates = (
-            slew(goals[0], rates[0], most[0]),
-            slew(goals[1], rates[1], most[1]),
-            slew(goals[2], rates[2], most[2]),
-        )
-        target = rotated(target, rates, self._dt)
-        self._shaped = Shaped(rates, target)
-        w, x, y, z = target
-        ahead = multiply((w, -x, -y, -z), q)  # the body in the frame of the attitude target
-        turn_x, turn_y, turn_z = rotation_vector(ahead)
-        roll, pitch, yaw = to_body(ahead, rates)
-        for_roll, for_pitch, for_yaw = self._closing
-        return (
-            roll - sqrt_controller(turn_x, *for_roll),
-            pitch - sqrt_controller(turn_y, *for_pitch),
-            yaw - sqrt_controller(turn_z, *for_yaw),
-        )
-
-    def idle(self, setpoint: Vector) -> None:
-        """Run a step without control: clear the attitude target, but delay setpoints."""
-        self._delay.step(setpoint)
-        self._shaped = None
+    most = law.most
+    before = shaped.rates
+    rates = (
+        slew(goals[0], before[0], most[0]),
+        slew(goals[1], before[1], most[1]),
+        slew(goals[2], before[2], most[2]),
+    )
+    target = rotated(shaped.target if shaped.active else q, rates, law.dt)
+    w, x, y, z = target
+    ahead = multiply((w, -x, -y, -z), q)  # the body in the frame of the attitude target
+    turn_x, turn_y, turn_z = rotation_vector(ahead)
+    roll, pitch, yaw = to_body(ahead, rates)
+    for_roll, for_pitch, for_yaw = law.closing
+    setpoint = (
+        roll - sqrt_controller(turn_x, for_roll[0], for_roll[1]),
+        pitch - sqrt_controller(turn_y, for_pitch[0], for_pitch[1]),
+        yaw - sqrt_controller(turn_z, for_yaw[0], for_yaw[1]),
+    )
+    return setpoint, Shaped(True, rates, target)

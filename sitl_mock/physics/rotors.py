@@ -1,4 +1,4 @@
-"""Four rotors in an X: allocation of thrust and torque, thrust curve, lag.
+"""Four rotors in an X: allocation of thrust and torque, thrust curve, lag (pure).
 
 Rotor order and spin are PX4's: front right and rear left counter-clockwise, front left and rear
 right clockwise.
@@ -67,69 +67,83 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
     )
 
 
-class Rotors:
-    """Thrust of the four rotors, each a first-order lag behind its throttle.
+class RotorLaw(NamedTuple):
+    """Constants of the rotors. Each is a first-order lag behind its throttle."""
 
-    The discretisation is exact for a throttle that is constant over the step. `step` returns the
-    mean of the thrusts before and after it, which is accurate to second order.
+    slope: float  # N of one rotor per throttle, from `linear_from` on
+    offset: float  # N, of this line at throttle 0
+    low_slope: float  # N per throttle, below `linear_from`
+    linear_from: float  # throttle
+    decay: float  # of the lag in one step
+    arm: float  # m
+    drag_ratio: float  # m
+
+
+def rotor_law(airframe: AirframeConfig, dt: float) -> RotorLaw:
+    """Return the rotors of an airframe for steps of `dt` seconds."""
+    per_rotor = airframe.mass_kg / 4.0
+    slope = airframe.thrust_slope_m_s2 * per_rotor
+    offset = airframe.thrust_offset_m_s2 * per_rotor
+    return RotorLaw(
+        slope,
+        offset,
+        slope + offset / airframe.thrust_linear_from,
+        airframe.thrust_linear_from,
+        exp(-dt / (airframe.rotor_lag_ms * 1e-3)),
+        airframe.rotor_arm_m,
+        airframe.rotor_drag_ratio_m,
+    )
+
+
+def steady_thrust(law: RotorLaw, throttle: float) -> float:
+    """Return the steady thrust of one rotor in N, with a full battery."""
+    if throttle >= law.linear_from:
+        return law.slope * throttle + law.offset
+    return law.low_slope * throttle
+
+
+def throttle_of(law: RotorLaw, thrust: float) -> float:
+    """Return the throttle for a steady thrust (N) of one rotor, at most 1."""
+    if thrust >= steady_thrust(law, law.linear_from):
+        return min((thrust - law.offset) / law.slope, 1.0)
+    return thrust / law.low_slope
+
+
+def rotor_step(law: RotorLaw, thrusts: Four, throttles: Four, sag: float) -> tuple[Four, Four]:
+    """Advance the rotors by one step towards the throttles.
+
+    The discretisation is exact for a throttle that is constant over the step. The mean of the
+    thrusts before and after the step is accurate to second order.
+
+    Args:
+        law: the rotors.
+        thrusts: of each rotor before the step, N.
+        throttles: 0..1 each.
+        sag: thrust factor of the battery voltage.
+
+    Returns:
+        The thrusts after the step. Total thrust (N) and torques about body x, y, z (N m), means
+        over the step.
     """
-
-    __slots__ = ("_arm", "_decay", "_drag_ratio", "_linear", "_low", "_offset", "_slope", "thrusts")
-
-    def __init__(self, airframe: AirframeConfig, dt: float) -> None:
-        per_rotor = airframe.mass_kg / 4.0
-        self._slope = airframe.thrust_slope_m_s2 * per_rotor
-        self._offset = airframe.thrust_offset_m_s2 * per_rotor
-        self._linear = airframe.thrust_linear_from
-        self._low = self._slope + self._offset / self._linear
-        self._decay = exp(-dt / (airframe.rotor_lag_ms * 1e-3))
-        self._arm = airframe.rotor_arm_m
-        self._drag_ratio = airframe.rotor_drag_ratio_m
-        self.thrusts: Four = (0.0, 0.0, 0.0, 0.0)
-        """Present thrust of each rotor, N."""
-
-    def steady(self, throttle: float) -> float:
-        """Return the steady thrust of one rotor in N, with a full battery."""
-        if throttle >= self._linear:
-            return self._slope * throttle + self._offset
-        return self._low * throttle
-
-    def throttle(self, thrust: float) -> float:
-        """Return the throttle for a steady thrust (N) of one rotor, at most 1."""
-        if thrust >= self.steady(self._linear):
-            return min((thrust - self._offset) / self._slope, 1.0)
-        return thrust / self._low
-
-    def step(self, throttles: Four, sag: float) -> Four:
-        """Advance one step towards the throttles.
-
-        Args:
-            throttles: 0..1 each.
-            sag: thrust factor of the battery voltage.
-
-        Returns:
-            Total thrust (N) and torques about body x, y, z (N m), means over the step.
-        """
-        t0, t1, t2, t3 = throttles
-        old0, old1, old2, old3 = self.thrusts
-        decay = self._decay
-        steady = self.steady
-        goal = sag * steady(t0)
-        new0 = goal + decay * (old0 - goal)
-        goal = sag * steady(t1)
-        new1 = goal + decay * (old1 - goal)
-        goal = sag * steady(t2)
-        new2 = goal + decay * (old2 - goal)
-        goal = sag * steady(t3)
-        new3 = goal + decay * (old3 - goal)
-        self.thrusts = (new0, new1, new2, new3)
-        f0 = 0.5 * (old0 + new0)
-        f1 = 0.5 * (old1 + new1)
-        f2 = 0.5 * (old2 + new2)
-        f3 = 0.5 * (old3 + new3)
-        return (
-            f0 + f1 + f2 + f3,
-            self._arm * (f1 + f2 - f0 - f3),
-            self._arm * (f0 + f2 - f1 - f3),
-            self._drag_ratio * (f0 + f1 - f2 - f3),
-        )
+    t0, t1, t2, t3 = throttles
+    old0, old1, old2, old3 = thrusts
+    decay = law.decay
+    goal = sag * steady_thrust(law, t0)
+    new0 = goal + decay * (old0 - goal)
+    goal = sag * steady_thrust(law, t1)
+    new1 = goal + decay * (old1 - goal)
+    goal = sag * steady_thrust(law, t2)
+    new2 = goal + decay * (old2 - goal)
+    goal = sag * steady_thrust(law, t3)
+    new3 = goal + decay * (old3 - goal)
+    f0 = 0.5 * (old0 + new0)
+    f1 = 0.5 * (old1 + new1)
+    f2 = 0.5 * (old2 + new2)
+    f3 = 0.5 * (old3 + new3)
+    wrench = (
+        f0 + f1 + f2 + f3,
+        law.arm * (f1 + f2 - f0 - f3),
+        law.arm * (f0 + f2 - f1 - f3),
+        law.drag_ratio * (f0 + f1 - f2 - f3),
+    )
+    return (new0, new1, new2, new3), wrench

@@ -1,13 +1,18 @@
 """The autopilot's estimate: the true motion with delay, noise, filter error, estimator resets."""
 
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import cos, log, pi, radians, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
 from sitl_mock.config.sensors import SensorConfig
-from sitl_mock.physics.navigation_filter import NavigationError, NavigationFilter, Snapshot
+from sitl_mock.physics.navigation_filter import (
+    NavigationError,
+    NavigationFilter,
+    Snapshot,
+    TrailRow,
+    snapshot,
+)
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
 
 _NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -62,7 +67,6 @@ class Estimator:
         "_dt",
         "_filter",
         "_gravity",
-        "_history",
         "_horizon",
         "_noise",
         "_offset",
@@ -70,6 +74,7 @@ class Estimator:
         "_rotation",
         "_yaw",
         "reset_counter",
+        "trail_length",
     )
 
     def __init__(
@@ -91,8 +96,8 @@ class Estimator:
         self._position_delay = round(config.position_delay_ms * 1e-3 / dt)
         self._filter = None if config.ekf is None else NavigationFilter(config.ekf, start, seed)
         self._horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
-        length = 1 + max(self._attitude_delay, self._position_delay, self._horizon)
-        self._history = deque([start] * length, maxlen=length)
+        self.trail_length = 1 + max(self._attitude_delay, self._position_delay, self._horizon)
+        """Steps whose motion an estimate needs, the present one included."""
         self._dt = dt
         self._noise = WhiteNoise(f"{seed}/sensors")
         self._yaw: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -100,10 +105,6 @@ class Estimator:
         self._offset: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
         """Estimator resets since boot."""
-
-    def record(self, snapshot: Snapshot) -> None:
-        """Record the true motion after a physics step."""
-        self._history.append(snapshot)
 
     def shift(self, yaw: float, position_ned: Vector) -> None:
         """Reset the estimator: rotate (rad) and shift (m) the estimate from now on."""
@@ -118,14 +119,17 @@ class Estimator:
         tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q)
         return multiply(self._yaw, tilted)
 
-    def estimate(self, time: float) -> Estimate:
-        """Return the estimate at ``time`` (s), which is now, with fresh noise."""
-        error = self._error(time)
+    def estimate(self, time: float, before: Callable[[int], TrailRow]) -> Estimate:
+        """Return the estimate at ``time`` (s), which is now, with fresh noise.
+
+        Args:
+            time: now, s.
+            before: returns the true motion that many steps ago, fewer than `trail_length`.
+        """
+        attitude, place = before(self._attitude_delay), before(self._position_delay)
+        error = self._error(time, place, before)
         self._rotation = error.rotation
-        history = self._history
-        attitude, place = history[-1 - self._attitude_delay], history[-1 - self._position_delay]
-        _, _, _, w, x, y, z, p, q, r = attitude.motion
-        n, e, d = attitude.acceleration
+        _, _, _, w, x, y, z, p, q, r, _, _, _, n, e, d = attitude
         force = to_body((w, x, y, z), (n, e, d - self._gravity))
         noise = [0.0 + z * s for z, s in zip(self._noise.draw(15), self._deviations, strict=True)]
         turn_x, turn_y, turn_z, p_noise, q_noise, r_noise, *rest = noise
@@ -134,20 +138,23 @@ class Estimator:
         return Estimate(
             normalise(turned),
             gyro,
-            _sum(place.position, error.position, self._offset, rest[0:3]),
-            _sum(place.motion, error.velocity, rest[3:6]),
+            _sum(place[10:13], error.position, self._offset, rest[0:3]),
+            _sum(place, error.velocity, rest[3:6]),
             _sum(force, rest[6:9]),
             gyro,
         )
 
-    def _error(self, time: float) -> NavigationError:
+    def _error(
+        self, time: float, place: TrailRow, before: Callable[[int], TrailRow]
+    ) -> NavigationError:
         """Return the error of the navigation filter at the age of position and velocity."""
         if self._filter is None:
             return _NO_ERROR
         behind = max(self._horizon, self._position_delay)
-        self._filter.advance(self._history[-1 - behind], time - behind * self._dt, time)
-        age = self._position_delay * self._dt
-        return self._filter.error(self._history[-1 - self._position_delay], time - age)
+        fused = time - behind * self._dt
+        if self._filter.is_due(fused):
+            self._filter.advance(snapshot(before(behind)), fused, time)
+        return self._filter.error(snapshot(place), time - self._position_delay * self._dt)
 
 
 def _sum(first: Sequence[float], *others: Sequence[float]) -> Vector:

@@ -7,34 +7,31 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.battery import Battery, BatteryState
-from sitl_mock.physics.environment import Ground, Wind
-from sitl_mock.physics.multirotor import ZERO, Multirotor
+from sitl_mock.physics.environment import Wind, ground_law
+from sitl_mock.physics.multirotor_step import (
+    ZERO,
+    at_rest,
+    multirotor_law,
+    started,
+)
 from sitl_mock.physics.navigation_filter import Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw
 from sitl_mock.physics.rate_shaping import Shaped
-from sitl_mock.physics.rigid_body import Load
-from sitl_mock.physics.rotors import Four
+from sitl_mock.physics.rotors import Four, throttle_of
 from sitl_mock.physics.sensors import Estimate, Estimator
+from sitl_mock.physics.vehicle_step import (
+    ActuatorCommand,
+    Air,
+    MakePlant,
+    PythonPlant,
+    VehicleLaw,
+    VehicleState,
+)
 
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
 
 SLOW_STEP_S = 0.01
 """Step of wind and battery, which change slowly."""
-
-
-class ActuatorCommand(NamedTuple):
-    """Setpoint of the rate loop and the rotors.
-
-    Rates in rad/s, body FRD, without limit; NaN = hold the present rate. Infinity also holds it in
-    PX4's rate loop; in ArduPilot's the rate grows without limit. Thrust 0..1; NaN or <= 0 = none,
-    above 1 = full.
-    """
-
-    armed: bool
-    roll_rate: float
-    pitch_rate: float
-    yaw_rate: float
-    thrust: float
 
 
 class TruthState(NamedTuple):
@@ -65,6 +62,7 @@ class Vehicle:
         sensors: errors of the estimate.
         seed: of all noise.
         heading: at the start, rad clockwise from north.
+        plant: computes the steps: `PythonPlant`, or `compiled.CompiledPlant`.
     """
 
     def __init__(
@@ -77,33 +75,37 @@ class Vehicle:
         *,
         seed: int,
         heading: float = 0.0,
+        plant: MakePlant = PythonPlant,
     ) -> None:
         airframe = airframe or AirframeConfig()
         self.steps = 0
+        """Physics steps since boot."""
+        self.on_ground = True
+        """Whether the vehicle stands."""
+        self.crashed = False
+        """Whether a touchdown was a crash."""
+        self._thrust = 0.0  # of all rotors, N
         self._rate_hz = airframe.physics_rate_hz
-        self._multirotor = Multirotor(airframe, rate_loop or RateLoopConfig(), from_yaw(heading))
-        dt = self._multirotor.dt
+        self._multirotor = multirotor_law(airframe, rate_loop or RateLoopConfig())
+        self.step_s = dt = self._multirotor.rates.dt
+        """Length of one physics step, s."""
         self._slow_steps = round(SLOW_STEP_S * self._rate_hz)
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
         self._battery = Battery(battery or BatteryConfig(), airframe)
-        self._ground = Ground(airframe, dt)
-        self._position: Vector = ZERO
-        self._touchdown_speed = nan
-        self.on_ground = True
-        self.crashed = False
+        body, stopped = at_rest(from_yaw(heading)), started(self._multirotor, 0.0)
         self._estimator = Estimator(
             sensors or SensorConfig(),
-            self._snapshot(),
+            Snapshot(body[0], ZERO, ZERO),
             gravity=airframe.gravity_m_s2,
             dt=dt,
             seed=seed,
         )
-
-    @property
-    def step_s(self) -> float:
-        """Length of one physics step, s."""
-        return self._multirotor.dt
+        self._plant = plant(
+            VehicleLaw(self._multirotor, ground_law(airframe, dt)),
+            VehicleState(0, body, stopped, ZERO, True, False, nan),
+            self._estimator.trail_length,
+        )
 
     @property
     def time(self) -> float:
@@ -113,20 +115,22 @@ class Vehicle:
     @property
     def truth(self) -> TruthState:
         """The true state after the latest step."""
-        multirotor = self._multirotor
-        vn, ve, vd, w, x, y, z, p, q, r = multirotor.motion
+        _, body, actuation, position, on_ground, crashed, touchdown_speed = self._plant.state
+        motion, acceleration, _ = body
+        mixed, thrusts, _, _ = actuation
+        vn, ve, vd, w, x, y, z, p, q, r = motion
         return TruthState(
             self.time,
-            self._position,
+            position,
             (vn, ve, vd),
-            multirotor.acceleration,
+            acceleration,
             (w, x, y, z),
             (p, q, r),
-            self.on_ground,
-            self.crashed,
-            self._touchdown_speed,
-            multirotor.rotors.thrusts,
-            multirotor.mix.throttles,
+            on_ground,
+            crashed,
+            touchdown_speed,
+            thrusts,
+            mixed.throttles,
             self._wind.velocity,
         )
 
@@ -141,7 +145,7 @@ class Vehicle:
 
     def throttle(self, specific_thrust: float) -> float:
         """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
-        return self._multirotor.throttle(specific_thrust)
+        return throttle_of(self._multirotor.rotors, 0.25 * self._multirotor.mass * specific_thrust)
 
     @property
     def reset_counter(self) -> int:
@@ -150,13 +154,13 @@ class Vehicle:
 
     def estimate(self) -> Estimate:
         """Return the autopilot's estimate now; every call draws fresh noise."""
-        return self._estimator.estimate(self.time)
+        return self._estimator.estimate(self.time, self._plant.before)
 
     @property
     def attitude_target(self) -> Shaped | None:
         """The shaped attitude target, with the error of the estimate; None if not shaped."""
-        shaped = self._multirotor.shaped
-        if shaped is None:
+        *_, shaped = self._plant.state.actuation
+        if not shaped.active:
             return None
         return shaped._replace(target=self._estimator.as_estimated(shaped.target))
 
@@ -164,46 +168,15 @@ class Vehicle:
         """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
         self._estimator.shift(yaw, position_ned)
 
-    def step(self, command: ActuatorCommand) -> None:
-        """Advance by one physics step of `step_s` seconds."""
-        multirotor = self._multirotor
-        if self.steps % self._slow_steps == 0:
-            self._wind.step()
-            self._battery.step(sum(multirotor.rotors.thrusts), self._slow_dt)
-        armed, roll, pitch, yaw, thrust = command
-        load = multirotor.drive(
-            (roll, pitch, yaw),
-            thrust if armed and not self.crashed else 0.0,
-            controlled=armed and not self.on_ground,
-            thrust_factor=self._battery.thrust_factor,
-            wind=self._wind.velocity,
-        )
-        self.steps += 1
-        if self.crashed:
-            multirotor.rest(multirotor.q)
-        elif self.on_ground and multirotor.sinks(load):
-            multirotor.rest(self._ground.level(multirotor.q))
-        else:
-            self.on_ground = False
-            self._fly(load)
-        self._estimator.record(self._snapshot())
-
-    def _fly(self, load: Load) -> None:
-        multirotor, position = self._multirotor, self._position
-        moved = multirotor.move(load)
-        self._position = (position[0] + moved[0], position[1] + moved[1], position[2] + moved[2])
-        if self._position[2] >= 0.0 and multirotor.motion[2] > 0.0:
-            self._touch_down()
-
-    def _touch_down(self) -> None:
-        multirotor = self._multirotor
-        sink_speed = multirotor.motion[2]
-        self._touchdown_speed = sink_speed
-        self.on_ground = True
-        self.crashed = not self._ground.survives(multirotor.q, sink_speed)
-        self._position = (self._position[0], self._position[1], 0.0)
-        multirotor.rest(multirotor.q)
-
-    def _snapshot(self) -> Snapshot:
-        multirotor = self._multirotor
-        return Snapshot(multirotor.motion, self._position, multirotor.acceleration)
+    def step(self, command: ActuatorCommand, count: int = 1) -> None:
+        """Advance by `count` physics steps of `step_s` seconds under one command."""
+        while count > 0:
+            since = self.steps % self._slow_steps
+            if since == 0:
+                self._wind.step()
+                self._battery.step(self._thrust, self._slow_dt)
+            steps = min(count, self._slow_steps - since)
+            air = Air(self._battery.thrust_factor, self._wind.velocity)
+            self.on_ground, self.crashed, self._thrust = self._plant.advance(command, air, steps)
+            self.steps += steps
+            count -= steps

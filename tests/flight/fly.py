@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from companion import testing
+from companion.batch import can_compile
 from companion.config import Config
 from companion.files import bounded_yaml
 from companion.files.yaml_file import parse
@@ -81,7 +82,8 @@ def mock_vehicle(folder=None, *, in_lockstep=False, autopilot="px4", delay_s=WIR
     """
     known = quick_vehicle(autopilot, settings)
     stepping = {"enabled": in_lockstep, **known.pop("lockstep", {})}
-    yield testing.MockVehicle(delay_s=delay_s, lockstep=stepping, **known)
+    compiled = can_compile()
+    yield testing.MockVehicle(delay_s=delay_s, lockstep=stepping, compiled=compiled, **known)
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):

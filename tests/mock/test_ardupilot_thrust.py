@@ -15,7 +15,7 @@ from sitl_mock.ardupilot.thrust import (
     thrust_of_setpoint,
 )
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rotors import Rotors
+from sitl_mock.physics.rotors import rotor_law, throttle_of
 
 MEASURED = {
     0.0: 0.045, 0.1: 0.29, 0.2: 0.57, 0.3: 0.82, 0.36: 0.99, 0.4: 1.09, 0.5: 1.33, 0.6: 1.58,
@@ -36,10 +36,10 @@ def test_more_thrust_always_gives_more_and_0_364_hovers():
 
 
 def test_the_airframe_can_give_all_of_it():
-    rotors = Rotors(AirframeConfig(**AIRFRAME), 1e-3)
-    share = rotors.throttle(0.25 * specific_thrust(1.0))
+    rotors = rotor_law(AirframeConfig(**AIRFRAME), 1e-3)
+    share = throttle_of(rotors, 0.25 * specific_thrust(1.0))
     assert share == pytest.approx(1.0)
-    assert rotors.throttle(0.25 * specific_thrust(0.8)) < 0.95
+    assert throttle_of(rotors, 0.25 * specific_thrust(0.8)) < 0.95
 
 
 @pytest.mark.parametrize(

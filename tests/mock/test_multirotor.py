@@ -19,19 +19,19 @@ def multirotor(specific_thrust=0.0):
 
 def test_it_begins_with_its_rotors_turning_steadily():
     hovering = multirotor(AIRFRAME.gravity_m_s2)
-    assert sum(hovering.rotors.thrusts) == pytest.approx(AIRFRAME.mass_kg * AIRFRAME.gravity_m_s2)
+    assert sum(hovering.actuation[1]) == pytest.approx(AIRFRAME.mass_kg * AIRFRAME.gravity_m_s2)
     throttle = hovering.throttle(AIRFRAME.gravity_m_s2)
     assert hovering.mix.throttles == (throttle,) * 4
     for _ in range(1000):
         hovering.move(hovering.drive(REST, throttle))
-    assert hovering.motion == pytest.approx((*REST, *LEVEL, *REST), abs=1e-12)
+    assert hovering.body[0] == pytest.approx((*REST, *LEVEL, *REST), abs=1e-12)
 
 
 def test_without_thrust_it_falls():
     falling = multirotor()
     fallen = sum(falling.move(falling.drive(REST, 0.0))[2] for _ in range(1000))
     assert fallen == pytest.approx(AIRFRAME.gravity_m_s2 / 2)
-    assert falling.acceleration == pytest.approx((0.0, 0.0, AIRFRAME.gravity_m_s2))
+    assert falling.body[1] == pytest.approx((0.0, 0.0, AIRFRAME.gravity_m_s2))
 
 
 def test_more_thrust_than_there_is_is_full_throttle():

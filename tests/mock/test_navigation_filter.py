@@ -53,7 +53,7 @@ def errors(config, way, seconds, seed=1):
     rows = []
     for step in range(round((SETTLED_S + seconds) / DT)):
         now = step * DT
-        if step >= late:
+        if step >= late and navigation.is_due(now - late * DT):
             navigation.advance(way(now - late * DT), now - late * DT, now)
         error = navigation.error(way(now), now)
         rows.append((now, *error.position, *error.velocity, *error.rotation))

@@ -15,7 +15,7 @@ from sitl_mock.__main__ import main
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisShaping, RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
-from sitl_mock.physics.rate_shaping import RateShaping, sqrt_controller
+from sitl_mock.physics.rate_shaping import NOT_SHAPED, shape, shaping_law, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
 
@@ -125,12 +125,14 @@ def test_a_step_back_answers_as_the_step_did():
 @pytest.mark.parametrize("axis", [ROLL, PITCH, YAW])
 def test_the_shaped_rate_never_changes_faster_than_the_limit(axis):
     axes = RateLoopConfig.ardupilot().shaping
-    shaping = RateShaping(tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT)
+    law = shaping_law(tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT)
     rng = np.random.default_rng(4)
-    shaped = [0.0]
+    shaped, state = [0.0], NOT_SHAPED
     for _ in range(100):
-        setpoint = vector(axis, rng.uniform(-4.0, 4.0))
-        shaped += [shaping.step(setpoint, LEVEL)[axis] for _ in range(rng.integers(1, 300))]
+        goals = vector(axis, rng.uniform(-4.0, 4.0))
+        for _ in range(rng.integers(1, 300)):
+            setpoint, state = shape(law, state, goals, LEVEL)
+            shaped.append(setpoint[axis])
     fastest = max(abs(np.diff(shaped))) / DT
     assert fastest == pytest.approx(radians(YAW_LIMIT if axis == YAW else TILT_LIMIT), rel=1e-6)
 
@@ -148,13 +150,13 @@ def test_the_angle_reached_is_the_integral_of_the_command(axis, rate):
 def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
     """Against SciPy: the setpoints integrated, and seen from a body that does not move."""
     axis = AxisShaping(acceleration_limit_rad_s2=1e6)  # so that angles are closed in proportion
-    shaping = RateShaping((axis, axis, axis), DT)
+    law, state = shaping_law((axis, axis, axis), DT), NOT_SHAPED
     body = Rotation.from_euler("ZYX", [0.7, -0.3, 0.2])
     x, y, z, w = body.as_quat()
     target = body
     for setpoint in np.random.default_rng(7).uniform(-2.0, 2.0, (20, 3)):
         for _ in range(50):
-            rates = shaping.step(tuple(setpoint), (w, x, y, z))
+            rates, state = shape(law, state, tuple(setpoint), (w, x, y, z))
             target = target * Rotation.from_rotvec(setpoint * DT)
         ahead = body.inv() * target
         expected = ahead.apply(setpoint) + axis.attitude_gain_1_s * ahead.as_rotvec()
@@ -204,7 +206,7 @@ def test_the_body_lags_its_attitude_target_as_recorded():
         for share in (np.arange(10) + 0.5) / 10:
             setpoint = before[5:8] + share * (after[5:8] - before[5:8])
             fly(multirotor, tuple(map(float, setpoint)), DT)
-        rows.append((*multirotor.shaped.target, *multirotor.q))
+        rows.append((*multirotor.actuation[3].target, *multirotor.q))
     rows = np.array(rows)
     mock_lead = lead(rows[:, :4], rows[:, 4:])
     left = np.sqrt(np.mean((mock_lead - recorded_lead[1:]) ** 2, axis=0))
@@ -279,7 +281,7 @@ def test_it_stays_upright_in_gusty_commands_about_all_axes():
         fly(multirotor, tuple(-setpoint), 0.2)
         assert max(map(abs, multirotor.body_rates)) < 3.0
     fly(multirotor, REST, 2.0)
-    assert all(map(isfinite, multirotor.motion))
+    assert all(map(isfinite, multirotor.body[0]))
     assert multirotor.body_rates == pytest.approx(REST, abs=1e-3)
 
 

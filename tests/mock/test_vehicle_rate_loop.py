@@ -9,7 +9,8 @@ from scipy.optimize import curve_fit
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
-from sitl_mock.physics.rate_loop import AT_REST, RateLoop, axis_law, axis_step
+from sitl_mock.physics.multirotor import Multirotor
+from sitl_mock.physics.rate_loop import axis_law, axis_step
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 NOISELESS = SensorConfig(
@@ -157,16 +158,20 @@ def test_a_setpoint_acts_only_after_its_delay():
 
 def test_idling_forgets_the_integral_and_the_filtered_torque():
     """The vehicle idles its loop whenever it is disarmed or stands."""
-    loop = RateLoop(RateLoopConfig(), 1e-3)
+    level = (1.0, 0.0, 0.0, 0.0)
+    hovering = Multirotor(AirframeConfig(), RateLoopConfig(), level, 9.80665)
 
-    def torques(rates):
-        return loop.step(REST, rates, REST, tilt_saturated=False, yaw_saturated=False)
+    def torques():
+        return [torque for _, torque in hovering.actuation[2]]
 
-    for _ in range(500):
-        torques((-1.0, -1.0, -1.0))
-    assert min(torques(REST)) > 1e-3  # wound up: torque without error
-    loop.idle(REST)
-    assert torques(REST) == REST
+    for _ in range(500):  # a body that is held still while it should turn
+        hovering.drive((1.0, 1.0, 1.0), HOVER)
+    for _ in range(10):  # longer than the delay
+        hovering.drive(REST, HOVER)
+    assert min(map(abs, torques())) > 1e-3  # wound up: torque without error
+    hovering.drive(REST, HOVER, controlled=False)
+    hovering.drive(REST, HOVER)
+    assert torques() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("armed", [True, False])
@@ -183,7 +188,7 @@ def test_no_torque_is_stored_up_while_standing_or_disarmed(armed):
 
 def test_the_integral_shrinks_but_does_not_grow_while_saturated():
     law = axis_law(AxisGains(proportional_n_m_s=0.1, integral_n_m=1.0), 1e-3)
-    wound = axis_step(law, AT_REST, 1.0, 0.0, 0.0, False, 1e-3)
+    wound = axis_step(law, (0.0, 0.0), 1.0, 0.0, 0.0, False, 1e-3)
     assert wound[0] == pytest.approx(1e-3)
     assert axis_step(law, wound, 1.0, 0.0, 0.0, True, 1e-3)[0] == wound[0]
     assert axis_step(law, wound, -1.0, 0.0, 0.0, True, 1e-3)[0] < wound[0]
@@ -208,7 +213,7 @@ def test_the_integral_has_a_limit():
         AxisGains(proportional_n_m_s=0.0, integral_n_m=10.0, integral_limit_n_m=0.2), 1e-3
     )
     for sign in (1.0, -1.0):
-        state = AT_REST
+        state = (0.0, 0.0)
         for _ in range(1000):
             state = axis_step(law, state, sign, 0.0, 0.0, False, 1e-3)
         assert state[0] == sign * 0.2

@@ -1,0 +1,181 @@
+"""One step of a multirotor in the air: rate loop, allocation, rotors and rigid body.
+
+A step is `drive`, then `move` or `at_rest`. Pure, except for the rings of delayed setpoints.
+"""
+
+from typing import NamedTuple
+
+from sitl_mock.config.airframe import AirframeConfig
+from sitl_mock.config.rate_loop import RateLoopConfig
+from sitl_mock.physics.quaternion import Quaternion, Vector
+from sitl_mock.physics.rate_loop import (
+    IDLE,
+    Axes,
+    RateLaw,
+    Ring,
+    delayed,
+    rate_law,
+    rate_step,
+)
+from sitl_mock.physics.rate_shaping import NOT_SHAPED, Shaped, ShapingLaw, shape, shaping_law
+from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
+from sitl_mock.physics.rotors import (
+    STOPPED,
+    Four,
+    Mix,
+    RotorLaw,
+    mix,
+    rotor_law,
+    rotor_step,
+    steady_thrust,
+)
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class MultirotorLaw(NamedTuple):
+    """Constants of a multirotor under rate control."""
+
+    rate_hz: float  # steps per second
+    mass: float  # kg
+    tilt_torque: float  # N m per throttle difference, about x and y
+    yaw_torque: float  # N m per throttle difference, about z
+    body: Body
+    rotors: RotorLaw
+    rates: RateLaw
+    shapes: bool  # whether setpoints are shaped, by the law that follows
+    shaping: ShapingLaw
+
+
+Kinematics = tuple[Motion, Vector, Vector]
+"""Motion after a step, and the means over the step: acceleration (NED, m/s^2), and angular
+acceleration (FRD, rad/s^2)."""
+Actuation = tuple[Mix, Four, Axes, Shaped]
+"""State of controller and rotors after a step: throttles, thrust of each rotor (N), rate loop,
+shaping."""
+
+
+class Rings(NamedTuple):
+    """The latest setpoints, for the delays: as they arrive, and as the rate loop gets them."""
+
+    arrived: Ring
+    shaped: Ring
+
+
+def multirotor_law(airframe: AirframeConfig, rate_loop: RateLoopConfig) -> MultirotorLaw:
+    """Return the constants of an airframe with its rate controller."""
+    dt = 1.0 / airframe.physics_rate_hz
+    per_throttle = airframe.mass_kg * airframe.thrust_slope_m_s2
+    return MultirotorLaw(
+        float(airframe.physics_rate_hz),
+        airframe.mass_kg,
+        airframe.rotor_arm_m * per_throttle,
+        airframe.rotor_drag_ratio_m * per_throttle,
+        body_of(airframe),
+        rotor_law(airframe, dt),
+        rate_law(rate_loop, dt),
+        rate_loop.shaping is not None,
+        shaping_law(rate_loop.shaping, dt),
+    )
+
+
+def started(law: MultirotorLaw, throttle: float) -> Actuation:
+    """Return the state of controller and rotors at the start, with rotors at a steady speed."""
+    thrust = steady_thrust(law.rotors, throttle)
+    mixed = mix(throttle, 0.0, 0.0, 0.0)
+    return mixed, (thrust, thrust, thrust, thrust), IDLE, NOT_SHAPED
+
+
+def empty_rings(law: MultirotorLaw) -> Rings:
+    """Return rings of zero setpoints, longer than the delays."""
+    return Rings([ZERO] * (1 + max(law.shaping.delays)), [ZERO] * (1 + max(law.rates.delays)))
+
+
+def at_rest(q: Quaternion) -> Kinematics:
+    """Return a body at rest with this attitude."""
+    w, x, y, z = q
+    return (0.0, 0.0, 0.0, w, x, y, z, 0.0, 0.0, 0.0), ZERO, ZERO
+
+
+def drive(
+    law: MultirotorLaw,
+    rings: Rings,
+    actuation: Actuation,
+    body: Kinematics,
+    step: int,
+    setpoint: Vector,
+    throttle: float,
+    controlled: bool,
+    thrust_factor: float,
+    wind: Vector,
+) -> tuple[Load, Actuation]:
+    """Run controller, allocation and rotors for one step; return the load on the body.
+
+    Args:
+        law: constants.
+        rings: the latest setpoints; they are changed.
+        actuation: before the step.
+        body: before the step.
+        step: its number.
+        setpoint: body rates, rad/s, FRD; NaN holds the present rate. Infinity holds it too, but
+            if the rate loop shapes its setpoints, the rate then grows without limit.
+        throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
+        controlled: whether the rate loop runs; otherwise it idles.
+        thrust_factor: factor of the battery voltage on the thrust of every rotor.
+        wind: velocity of the air, NED, m/s.
+    """
+    mixed, thrusts, axes, shaped = actuation
+    motion, _, angular_acceleration = body
+    _, _, _, w, x, y, z, p, q, r = motion
+    if law.shapes:
+        goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
+        if controlled:
+            setpoint, shaped = shape(law.shaping, shaped, goals, (w, x, y, z))
+        else:
+            shaped = NOT_SHAPED
+    setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
+    if controlled:
+        _, tilt_saturated, yaw_saturated = mixed
+        axes = rate_step(
+            law.rates,
+            axes,
+            setpoint,
+            (p, q, r),
+            angular_acceleration,
+            tilt_saturated,
+            yaw_saturated,
+        )
+    else:
+        axes = IDLE
+    # A NaN throttle fails this comparison, which stops the rotors.
+    if throttle > 0.0:
+        roll, pitch, yaw = axes
+        tilt_torque = law.tilt_torque
+        mixed = mix(
+            throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / law.yaw_torque
+        )
+    else:
+        mixed = STOPPED
+    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], thrust_factor)
+    thrust, torque_x, torque_y, torque_z = wrench
+    wind_n, wind_e, wind_d = wind
+    load = (thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d)
+    return load, (mixed, thrusts, axes, shaped)
+
+
+def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, Vector]:
+    """Integrate one step under this load; return also the displacement, NED, m."""
+    rate_hz = law.rate_hz
+    before = body[0]
+    vn, ve, vd, _, _, _, _, p, q, r = before
+    motion, moved = advance(before, load, law.body, law.rates.dt)
+    new_vn, new_ve, new_vd, _, _, _, _, new_p, new_q, new_r = motion
+    acceleration = ((new_vn - vn) * rate_hz, (new_ve - ve) * rate_hz, (new_vd - vd) * rate_hz)
+    angular_acceleration = ((new_p - p) * rate_hz, (new_q - q) * rate_hz, (new_r - r) * rate_hz)
+    return (motion, acceleration, angular_acceleration), moved
+
+
+def sinks(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
+    """Whether the vertical acceleration under this load is not upward."""
+    vn, ve, vd, w, x, y, z, p, q, r = body[0]
+    return derivative(vn, ve, vd, w, x, y, z, p, q, r, load, law.body)[2] >= 0.0

@@ -1,0 +1,190 @@
+"""Steps of the vehicle with the ground, as arithmetic on floats and tuples.
+
+`advance` is written so that numba can compile it unchanged: see `compiled.py`.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from sitl_mock.physics.environment import GroundLaw, levelled, survives
+from sitl_mock.physics.multirotor_step import (
+    Actuation,
+    Kinematics,
+    MultirotorLaw,
+    Rings,
+    at_rest,
+    drive,
+    empty_rings,
+    move,
+    sinks,
+)
+from sitl_mock.physics.navigation_filter import TrailRow
+from sitl_mock.physics.quaternion import Vector
+
+
+class ActuatorCommand(NamedTuple):
+    """Setpoint of the rate loop and the rotors.
+
+    Rates in rad/s, body FRD, without limit; NaN = hold the present rate. Infinity also holds it in
+    PX4's rate loop; in ArduPilot's the rate grows without limit. Thrust 0..1; NaN or <= 0 = none,
+    above 1 = full.
+    """
+
+    armed: bool
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    thrust: float
+
+
+class VehicleState(NamedTuple):
+    """State of the vehicle after a step."""
+
+    steps: int
+    body: Kinematics
+    actuation: Actuation
+    position: Vector  # NED, m
+    on_ground: bool
+    crashed: bool
+    touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
+
+
+class Air(NamedTuple):
+    """What changes slowly; it is constant during the steps of one call."""
+
+    thrust_factor: float
+    """Factor of the battery voltage on the thrust of every rotor."""
+    wind: Vector
+    """Velocity of the air, NED, m/s."""
+
+
+class VehicleLaw(NamedTuple):
+    """Constants of the vehicle."""
+
+    multirotor: MultirotorLaw
+    ground: GroundLaw
+
+
+Trail = list[TrailRow]
+"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
+
+
+def trail_row(body: Kinematics, position: Vector) -> TrailRow:
+    """Return what the estimator needs of a step."""
+    motion, acceleration, _ = body
+    return motion + position + acceleration
+
+
+def advance(
+    law: VehicleLaw,
+    rings: Rings,
+    trail: Trail,
+    state: VehicleState,
+    command: ActuatorCommand,
+    air: Air,
+    count: int,
+) -> VehicleState:
+    """Advance by `count` steps under one command.
+
+    Args:
+        law: constants.
+        rings: the latest setpoints; they are changed.
+        trail: the latest rows of `trail_row`, one for each step. It is changed.
+        state: before the steps.
+        command: for all of them.
+        air: for all of them.
+        count: how many.
+    """
+    steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
+    multirotor, ground = law
+    armed, roll, pitch, yaw, thrust = command
+    length = len(trail)
+    for _ in range(count):
+        load, actuation = drive(
+            multirotor,
+            rings,
+            actuation,
+            body,
+            steps,
+            (roll, pitch, yaw),
+            thrust if armed and not crashed else 0.0,
+            armed and not on_ground,
+            air.thrust_factor,
+            air.wind,
+        )
+        steps += 1
+        _, _, _, w, x, y, z, _, _, _ = body[0]
+        if crashed:
+            body = at_rest((w, x, y, z))
+        elif on_ground and sinks(multirotor, body, load):
+            body = at_rest(levelled(ground, (w, x, y, z)))
+        else:
+            on_ground = False
+            body, moved = move(multirotor, body, load)
+            north, east, down = position
+            position = (north + moved[0], east + moved[1], down + moved[2])
+            _, _, sink_speed, w, x, y, z, _, _, _ = body[0]
+            if position[2] >= 0.0 and sink_speed > 0.0:
+                touchdown_speed = sink_speed
+                on_ground = True
+                crashed = not survives(ground, (w, x, y, z), sink_speed)
+                position = (position[0], position[1], 0.0)
+                body = at_rest((w, x, y, z))
+        trail[steps % length] = trail_row(body, position)
+    return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
+
+
+Outcome = tuple[bool, bool, float]
+"""What is asked for after all steps: on the ground, crashed, total thrust of the rotors (N)."""
+
+
+def outcome(state: VehicleState) -> Outcome:
+    """Return what is asked for after all steps."""
+    _, (first, second, third, fourth), _, _ = state.actuation
+    return state.on_ground, state.crashed, first + second + third + fourth
+
+
+class Plant(Protocol):
+    """A vehicle whose steps are computed in Python, or compiled."""
+
+    @property
+    def state(self) -> VehicleState:
+        """State after the latest step."""
+        ...
+
+    def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
+        """Advance by `count` steps under one command."""
+        ...
+
+    def before(self, steps: int) -> TrailRow:
+        """Row of the trail that many steps ago."""
+        ...
+
+
+class PythonPlant:
+    """A vehicle whose steps are computed in Python.
+
+    Args:
+        law: constants.
+        state: at the start.
+        trail_length: steps whose motion is kept.
+    """
+
+    def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None:
+        self.state = state
+        self._law = law
+        self._rings = empty_rings(law.multirotor)
+        self._trail = [trail_row(state.body, state.position)] * trail_length
+
+    def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
+        """Advance by `count` steps under one command."""
+        self.state = advance(self._law, self._rings, self._trail, self.state, command, air, count)
+        return outcome(self.state)
+
+    def before(self, steps: int) -> TrailRow:
+        """Row of the trail that many steps ago."""
+        return self._trail[(self.state.steps - steps) % len(self._trail)]
+
+
+MakePlant = Callable[[VehicleLaw, VehicleState, int], Plant]
+"""Makes a vehicle from its constants, its state at the start, and the steps to remember."""
