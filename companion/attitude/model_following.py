@@ -194,7 +194,7 @@ class ModelFollowingPlanner:
     def _feedback(
         self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
     ) -> tuple[float, float, float]:
-        """Feedback towards the plan: speed of north and east (1/s) and of the heading (rad/s).
+        """Feedback towards the plan: speed of north, east (1/s) and heading (rad/s).
 
         It is 0 in the first dead time after a start, when no plan has taken effect yet.
         """
@@ -238,8 +238,7 @@ class ModelFollowingPlanner:
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
         """Append the plan of `dt` seconds later.
 
-        `x` and `y` are the planned roll and pitch rates at heading 0, rad/s. `still_turn` is the
-        yaw in these `dt` seconds that keeps the heading still, rad.
+        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw meanwhile, rad.
         """
         model, body = self._model, self._body
         still = self._plans.tilt.newest.still + still_turn

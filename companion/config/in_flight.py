@@ -34,7 +34,7 @@ class Difference(NamedTuple):
     @property
     def name(self) -> str:
         """The key with its section."""
-        return f"{self.section}.{self.key}"
+        return f"{self.section}.{self.key}".rstrip(".")
 
     def __str__(self) -> str:
         return f"{self.name} from {shown(self.before)} to {shown(self.after)}"
@@ -83,12 +83,13 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
     """
     for section, keys in values.items():
         for key in keys:
-            if section not in Config.model_fields or key not in sections()[section].model_fields:
-                raise ConfigError(f"{name}: there is no key `{section}.{key}`")
+            full, model = f"{section}.{key}".rstrip("."), sections().get(section)
+            known = section in Config.model_fields if model is None else key in model.model_fields
+            if not known:
+                raise ConfigError(f"{name}: there is no key `{full}`")
             if (section, key) not in changeable():
                 raise ConfigError(
-                    f"{name}: {section}.{key} must not change in flight; it counts from the next "
-                    "flight on"
+                    f"{name}: {full} must not change in flight; it counts from the next flight on"
                 )
     wanted = changed(now, values, name)
     for section, keys in values.items():
