@@ -113,6 +113,7 @@ async def watch(relay: Relay, path: Path) -> None:
     except ConfigError as error:
         relay.note(f"{path.name} is not watched: {error}")
         return
+    relay.note(f"edits of {path.name} are applied from now on")
     while not relay.over.is_set():
         edit = await asyncio.to_thread(watched.look)
         if edit is not None and edit.refusal is not None:

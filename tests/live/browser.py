@@ -32,6 +32,7 @@ class Tab:
     def run(self, code):
         """The value of a JavaScript expression."""
         told = self.ask("Runtime.evaluate", expression=code, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in told, told["exceptionDetails"]
         return told.get("result", {}).get("value")
 
     def wait(self, code, seconds=20.0):
@@ -48,14 +49,14 @@ class Tab:
     def open(self, url):
         self.ask("Page.navigate", url=url)
 
-    def type(self, name, text):
-        """Replace the text of the input `live-NAME`."""
+    def type(self, label, text):
+        """Replace the text of the input with this label."""
         self.run(
-            f"""(() => {{ const node = document.getElementById('live-{name}');
-            const field = node.matches('input') ? node : node.querySelector('input');
-            field.focus(); field.select(); }})()"""
+            f"""(() => {{ const field = document.querySelector('input[aria-label^="{label}"]');
+            Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value')
+                .set.call(field, {json.dumps(text)});
+            field.dispatchEvent(new Event('input', {{bubbles: true}})); }})()"""
         )
-        self.ask("Input.insertText", text=text)
 
     def click(self, name):
         self.run(f"document.getElementById('live-{name}').click()")
@@ -80,7 +81,7 @@ class Tab:
 def chromium():
     """Yields a function that opens a new tab."""
     sockets = []
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         process = subprocess.Popen(
             [
                 CHROMIUM,

@@ -84,6 +84,7 @@ def _drawings() -> None:
             ("map", "plan: ● vehicle, + reference, dashed: fence"),
         ):
             _canvas(name, label, "live-square")
+    with ui.element("div").classes("live-grid"):
         for name, label in _PLOTS:
             _canvas(name, label, "live-plot")
     ui.html('<ol id="live-events"></ol>', sanitize=False).classes("live-wide")

@@ -40,12 +40,10 @@ class Panel:
             with ui.element("div").classes("live-values"):
                 for key in store.values():
                     name = key.section, key.name
-                    self._shown[name] = _shown(key.value)
-                    self._inputs[name] = (
-                        ui.input(f"{key.section}.{key.name}", value=self._shown[name])
-                        .props(f'dense suffix="{key.unit}" hint="{key.allowed}"')
-                        .props(f'id="live-{key.name}"')
-                    )
+                    self._shown[name] = shown(key.value)
+                    self._inputs[name] = ui.input(
+                        f"{key.section}.{key.name}", value=self._shown[name]
+                    ).props(f'dense suffix="{key.unit}" hint="{_range(key.allowed)}"')
             with ui.row():
                 ui.button("Apply", on_click=self._apply).props("id=live-apply")
                 self._undo = ui.button("Undo", on_click=self._undo_last).props("id=live-undo")
@@ -55,7 +53,7 @@ class Panel:
 
     def _lock(self) -> None:
         with ui.row().bind_visibility_from(self, "_unlocked", value=False):
-            token = ui.input("token, as shown at the start").props("dense id=live-token")
+            token = ui.input("token, as shown at the start").props("dense")
 
             async def unlock() -> None:
                 if self._guard.knows(str(token.value or "").strip()):
@@ -110,7 +108,7 @@ class Panel:
     def _follow(self) -> None:
         """Show values that somebody has changed, unless the user is typing another one."""
         for key in self._store.values():
-            name, value = (key.section, key.name), _shown(key.value)
+            name, value = (key.section, key.name), shown(key.value)
             field = self._inputs[name]
             if value != self._shown[name]:
                 if str(field.value or "").strip() == self._shown[name] or field.value is None:
@@ -122,8 +120,13 @@ class Panel:
         self._said.set_text(text)
 
 
-def _shown(value: Any) -> str:
-    return shown(value)
+def _range(allowed: str) -> str:
+    """The range of a key, without the words that hold for all of them."""
+    return (
+        allowed.replace("changeable in flight within its range", "")
+        .strip(", ")
+        .replace("changeable in flight ", "")
+    )
 
 
 def _typed(text: str) -> Any:
