@@ -101,6 +101,7 @@ class Changes:
         before = self.wanted
         told = self._begin(wanted, by)
         self._earlier = [*self._earlier, before][-_MOST:]
+        self.on_change(wanted)
         return told
 
     def undo(self, by: str) -> str:
@@ -113,6 +114,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
         told = self._begin(self._earlier[-1], by)
         self._earlier.pop()
+        self.on_change(self.wanted)
         return told
 
     @contextmanager
@@ -173,5 +175,4 @@ class Changes:
         change = Change(now, by, keys)
         self.made.append(change)
         self.note(str(change))
-        self.on_change(wanted)
         return str(change)

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.request import Request, urlopen
 
@@ -80,8 +80,7 @@ class Tab:
 @contextmanager
 def chromium():
     """Yields a function that opens a new tab."""
-    sockets = []
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+    with ExitStack() as sockets, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         process = subprocess.Popen(
             [
                 CHROMIUM,
@@ -110,15 +109,12 @@ def chromium():
                 asked = Request(f"http://127.0.0.1:{port}/json/new?about:blank", method="PUT")
                 with urlopen(asked, timeout=10) as answer:
                     url = json.load(answer)["webSocketDebuggerUrl"]
-                socket = connect(url, max_size=None)
-                sockets.append(socket)
-                tab = Tab(socket)
+                tab = Tab(sockets.enter_context(connect(url, max_size=None)))
                 tab.ask("Page.enable")
                 return tab
 
             yield new_tab
         finally:
-            for socket in sockets:
-                socket.close()
+            sockets.close()
             process.terminate()
             process.wait(20)
