@@ -60,6 +60,7 @@ class ServedFlight:
         environment: of the flight.
         records: makes the record of the flight.
         changes: of the values that may change in flight.
+        from_ground: whether the vehicle stands armed, and takes off first.
     """
 
     def __init__(
@@ -73,6 +74,8 @@ class ServedFlight:
         environment: Environment,
         records: FlightRecords,
         changes: Changes,
+        *,
+        from_ground: bool = False,
     ) -> None:
         self.let_go = False
         self._records, self._record = records, records.new()
@@ -90,7 +93,7 @@ class ServedFlight:
             self._recorder,
             decline_landing,
             self._record.folder,
-            TakeoverPlan(self._source),
+            TakeoverPlan(self._source, from_ground=from_ground),
             environment,
             changes,
         )

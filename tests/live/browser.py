@@ -36,9 +36,9 @@ class Tab:
         return told.get("result", {}).get("value")
 
     def wait(self, code, seconds=20.0):
-        """Wait until an expression is true; returns its value."""
+        """Wait until an expression is true; a page that is loading may lack what it names."""
         deadline = time.monotonic() + seconds
-        while not (value := self.run(code)):
+        while not (value := self.run(f"(() => {{ try {{ return {code} }} catch {{}} }})()")):
             assert time.monotonic() < deadline, f"{code}; page: {self.text()[-600:]}"
             time.sleep(0.1)
         return value
