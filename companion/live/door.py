@@ -9,7 +9,7 @@ from typing import NamedTuple
 from companion.files.yaml_file import ConfigError
 
 PORT = 8090
-_GIVES_WAY = 3.0
+_GIVES_WAY = 5.0
 """Time allowed for the page of an ended flight to leave its port, s."""
 
 
@@ -95,12 +95,13 @@ def _bind(listening: socket.socket, host: str, port: int) -> None:
     Raises:
         OSError: the port is in use by something else.
     """
-    deadline = time.monotonic() + _GIVES_WAY
+    deadline, leaving = time.monotonic() + _GIVES_WAY, False
     while True:
         try:
             listening.bind((host, port))
         except OSError:
-            if not ask_to_leave(port) or time.monotonic() > deadline:
+            leaving = leaving or ask_to_leave(port)
+            if not leaving or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
         else:

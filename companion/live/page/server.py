@@ -41,7 +41,7 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
     guard = Guard(app, str(relay.first["token"]))
     add_page(relay, store, guard)
     ui.run_with(
-        app, title="companion live", dark=None, message_history_length=100, reconnect_timeout=5.0
+        app, title="companion live", dark=None, message_history_length=300, reconnect_timeout=30.0
     )
     config = uvicorn.Config(guard, log_level="warning", timeout_graceful_shutdown=1)
     server = uvicorn.Server(config)
