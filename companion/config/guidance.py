@@ -73,7 +73,7 @@ class GuidanceConfig(Section):
         default=None, json_schema_extra=ANY
     )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T."""
+    null: 1.5/T; with a quick rate loop and smooth positions up to 2.4/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
     that is set wrong. Measure it against an independent position."""

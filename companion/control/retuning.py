@@ -11,13 +11,13 @@ from companion.config.guidance import LINEAR
 from companion.config.in_flight import Difference, differences
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
-from companion.control.inner_loop import law_constants, rate_limits
-from companion.control.outer_loop import (
+from companion.control.hold_settings import (
     disturbance_bandwidth,
     hold_weights,
-    linear_settings,
     observer_settings,
 )
+from companion.control.inner_loop import law_constants, rate_limits
+from companion.control.outer_loop import linear_settings
 from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
 
 
