@@ -9,7 +9,7 @@ from typing import NamedTuple
 from companion.files.yaml_file import ConfigError
 
 PORT = 8090
-_GIVES_WAY = 5.0
+_GIVES_WAY = 8.0
 """Time allowed for the page of an ended flight to leave its port, s."""
 
 

@@ -68,6 +68,7 @@ def _watch_and_change(new_tab, page, folder):
     return tab
 
 
+@pytest.mark.slow  # a browser takes more processor time than all other tests of this room
 @pytest.mark.timeout(240)
 def test_the_page(tmp_path):
     page = Page(tmp_path)

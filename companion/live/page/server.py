@@ -63,6 +63,8 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
             await asyncio.wait({done}, timeout=1.0)
             done.cancel()
     server.should_exit = True
+    for each in server.servers:
+        each.close()  # the next flight's page waits for the port
     await asyncio.wait({serving, ended}, timeout=3.0)
 
 
