@@ -4,11 +4,9 @@ import signal
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
-
-import companion
-import sitl_mock
 
 EVERY_S = 0.001
 """Processor time between two samples, s."""
@@ -40,7 +38,11 @@ PARTS = {
 }
 """Parts, and the files of each; the first part that names a file has it."""
 _REST = "rest"
-_ROOTS = tuple(f"{Path(package.__file__ or '').parents[1]}/" for package in (companion, sitl_mock))
+_ROOTS = tuple(
+    f"{Path(spec.origin).parents[1]}/"
+    for spec in map(find_spec, ("companion", "sitl_mock"))
+    if spec is not None and spec.origin is not None
+)
 
 
 @contextmanager
