@@ -242,7 +242,7 @@ class ModelFollowingPlanner:
         """
         model, body = self._model, self._body
         still = self._plans.tilt.newest.still + still_turn
-        slopes = model.rate_slopes()
+        slopes = model.rate_slopes(x, y)
         self._plans.add(
             dt,
             PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still),

@@ -125,9 +125,13 @@ class ReferenceModel:
         """Body rates of the reference now, at heading 0, rad/s."""
         return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
-    def rate_slopes(self) -> tuple[float, float]:
-        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences."""
-        roll, pitch, _ = self.rates()
+    def rate_slopes(self, roll: float, pitch: float) -> tuple[float, float]:
+        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences.
+
+        Args:
+            roll: the first of `rates` now, rad/s.
+            pitch: the second, rad/s.
+        """
         later_roll, later_pitch, _ = rates_along(
             self.north + _DIFFERENCE_STEP * self.speed_north,
             self.east + _DIFFERENCE_STEP * self.speed_east,

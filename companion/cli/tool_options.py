@@ -90,6 +90,9 @@ def add_benches(commands: Commands) -> None:
     flight.add_argument(
         "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
     )
+    flight.add_argument(
+        "--profile", action="store_true", help="also which part uses how much processor time"
+    )
     flight.set_defaults(run="tools.bench_flight")
     for each in (link, serve, step, flight):
         each.add_argument("--json", action="store_true", help="print the figures as one JSON line")
