@@ -11,6 +11,7 @@ from time import perf_counter_ns
 from companion.attitude import (
     AttitudeError,
     BodyRates,
+    Constants,
     InvalidQuaternionError,
     Limits,
     Planner,
@@ -96,6 +97,15 @@ class ControlLoop:
         self._clock_ns = clock_ns
         self._deadlines = deadlines
         self._trace = trace
+        self._limits = limits
+
+    def retune(self, constants: Constants, limits: Limits) -> None:
+        """Use other gains and limits from the next sample on.
+
+        Raises:
+            TypeError: the planner is of another package and cannot change them.
+        """
+        self.planner.retune(constants)
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:

@@ -44,6 +44,9 @@ class GuidanceLoop:
             None.
         estimate: estimates the motion.
         learning: learns the hover thrust.
+        guidance: makes targets of references.
+        max_tilt: largest tilt in open loop, rad.
+        before_step: called at the beginning of each step with the time, s.
         record: records how the reference is tracked.
     """
 
@@ -72,13 +75,14 @@ class GuidanceLoop:
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self._loop = loop
-        self._guidance = guidance
+        self.guidance = guidance
         self._state = state
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
-        self._max_tilt = max_tilt
+        self.max_tilt = max_tilt
         self._period = period
         self._position_stale = position_stale
+        self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._vehicle_clock = vehicle_clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -163,6 +167,7 @@ class GuidanceLoop:
     def step(self) -> None:
         """Make one command, unless the position is stale."""
         now = self._clock()
+        self.before_step(now)
         position = self.fresh_position()
         if position is None:
             self.learning.pause()
@@ -199,7 +204,7 @@ class GuidanceLoop:
         """Write the command for `now`; return the reference from which it was made."""
         reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
-        linear = self._guidance.command(reference_at, now, inputs)
+        linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
             turn = self._loop.resets.turn
             vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
@@ -228,7 +233,7 @@ class GuidanceLoop:
 
     def _guidance_input(self, now: float) -> GuidanceInput:
         return self.estimate.guidance_input(
-            now, self._guidance.acts_after, self.learning.thrust_limits
+            now, self.guidance.acts_after, self.learning.thrust_limits
         )
 
     def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
@@ -237,9 +242,9 @@ class GuidanceLoop:
         if name is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
-        most = min(self._max_tilt, self.learning.largest_tilt())
+        most = min(self.max_tilt, self.learning.largest_tilt())
         if tilt <= most:
             return
-        limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
+        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self.hold_here()

@@ -11,6 +11,7 @@ from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.outer_loop import make_guidance, motion_estimate, predictive
+from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -102,6 +103,7 @@ class Assembled:
     memory: VehicleMemory
     ladder: SafetyLadder
     reporter: StatusReporter
+    changes: Changes
 
     def close(self) -> None:
         """End the process of predictive control."""
@@ -139,6 +141,7 @@ def assemble(
     folder: Path | None,
     plan: Plan,
     environment: Environment = THIS_COMPUTER,
+    changes: Changes | None = None,
 ) -> Assembled:
     """Assemble a flight by `plan` over an open link.
 
@@ -198,7 +201,8 @@ def assemble(
         clock,
         real_time=environment.realtime and not config.link.lockstep,
     )
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter)
+    changes = changes or Changes(config)
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)
 
 
 def _control(
