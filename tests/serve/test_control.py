@@ -200,7 +200,7 @@ def test_on_the_ground_control_is_refused_in_words(autopilot):
     async def whole():
         async with serving(vehicle, autopilot) as session:
             script = MemoryClient().connect(session)
-            await asyncio.sleep(60.0 if autopilot == "ardupilot" else 12.0)
+            await asyncio.sleep(6.0)
             if autopilot == "ardupilot":
                 script.command(176, 1, 4)
             await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
