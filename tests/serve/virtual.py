@@ -10,22 +10,18 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config.files import changed, load
-from companion.files import bounded_yaml
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from tests.flight.fly import QUICK_MOCK, QUICK_PARAMETERS, merged
+from tests.flight.fly import QuickVehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
 
 
 def mock(autopilot, **settings):
-    """The vehicle of the shipped configuration, which boots, climbs and lands quickly."""
-    shipped = bounded_yaml.parse((CONFIGS / f"mock-{autopilot}.yaml").read_text())["mock"]
-    quick = {**QUICK_MOCK, "parameters": {**QUICK_PARAMETERS[autopilot], **shipped["parameters"]}}
-    return testing.MockVehicle(lockstep=False, **merged(merged(shipped, quick), settings))
+    return QuickVehicle(lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
 
 
 class MemoryClient(Client):
