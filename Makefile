@@ -43,8 +43,10 @@ lint: $(VENV)/.test
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# TIMES=3 for medians, SETS=straight,near for a part of it, FIFO=--fifo on a busy computer; docs/real-autopilots.md.
-REALLY := $(if $(AUTOPILOT),--autopilot $(AUTOPILOT)) $(if $(TIMES),--times $(TIMES)) $(if $(SETS),--sets $(SETS)) $(FIFO)
+# TIMES=3 for medians, SETS=straight,near for a part of it, MINUTES=35 for a limit, OUT=folder,
+# FIFO=--fifo on a busy computer; docs/real-autopilots.md.
+REALLY := $(if $(AUTOPILOT),--autopilot $(AUTOPILOT)) $(if $(TIMES),--times $(TIMES)) $(if $(SETS),--sets $(SETS)) \
+	$(if $(MINUTES),--minutes $(MINUTES)) $(if $(OUT),--out $(OUT)) $(FIFO)
 
 real: $(VENV)/.test  ## real autopilots in their simulations, against truth: REAL=folder or YAML file, AUTOPILOT=px4
 	REAL="$(REAL)" $(BIN)/python -m tests.real.campaign $(REALLY)

@@ -17,7 +17,7 @@ from sitl_mock.link.signing import link_signing
 from sitl_mock.personalities import PERSONALITIES
 from sitl_mock.physics.geodesy import Origin
 from sitl_mock.physics.vehicle import Vehicle
-from sitl_mock.physics.vehicle_step import MakePlant, PythonPlant
+from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import MockSettings
 
 _SYSTEM_TIME = dialect.MAVLink_system_time_message
@@ -36,7 +36,7 @@ class Simulation:
     """
 
     def __init__(
-        self, settings: MockSettings, system_id: int = 1, plant: MakePlant = PythonPlant
+        self, settings: MockSettings, system_id: int = 1, plant: type[Plant] = PythonPlant
     ) -> None:
         personality = PERSONALITIES[settings.autopilot]
         overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}

@@ -127,7 +127,7 @@ class PlanHistory:
         yaw: the plan of the heading.
     """
 
-    __slots__ = ("_dead_time", "_yaw_dead_time", "tilt", "time", "yaw")
+    __slots__ = ("_dead_time", "_turn", "_turning", "_yaw_dead_time", "tilt", "time", "yaw")
 
     def __init__(self, dead_time: float, yaw_dead_time: float, longest_sample: float) -> None:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
@@ -135,6 +135,8 @@ class PlanHistory:
         self.time = 0.0
         self.tilt: History[PlannedTilt] = History(span)
         self.yaw: History[PlannedYaw] = History(span)
+        self._turning: PlannedTilt | None = None
+        self._turn = Turn(0.0, 0.0)  # when `_turning` takes effect
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
         """Add a plan for a time `dt` seconds later than that of the newest plan."""
@@ -152,9 +154,12 @@ class PlanHistory:
 
         It turns by the yaw rate, less the part of the yaw rate that keeps the heading still.
         """
-        acts = planned_for + self._dead_time
-        body = self.yaw.at(acts - self._yaw_dead_time)
-        return Turn(body.turned - plan.still, body.turning - plan.z)
+        if plan is not self._turning:  # both axes and the attitude target ask for the newest plan
+            acts = planned_for + self._dead_time
+            body = self.yaw.at(acts - self._yaw_dead_time)
+            self._turn = Turn(body.turned - plan.still, body.turning - plan.z)
+            self._turning = plan
+        return self._turn
 
     def turn_within(self, lead: float) -> float:
         """Turn of the body, rad, in the `lead` seconds after the newest tilt plan takes effect."""

@@ -83,6 +83,13 @@ def turned(q: Quaternion, rates: tuple[float, float, float], dt: float) -> Quate
     return w * scale, x * scale, y * scale, z * scale
 
 
+def turned_about_vertical(q: Quaternion, angle: float) -> Quaternion:
+    """The attitude turned about the world's down axis by `angle` in rad: clockwise from above."""
+    c, s = cos(0.5 * angle), sin(0.5 * angle)
+    w, x, y, z = q
+    return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+
+
 def euler_angles(q: Quaternion) -> tuple[float, float, float]:
     """Roll, pitch, yaw in rad of the sequence Z-Y-X, as autopilots report them."""
     w, x, y, z = q

@@ -180,7 +180,8 @@ class ControlLoop:
         """The body rates of the planner, or those of guidance within the same limits."""
         if command.body_rates is None:
             target = command.target_at(sample.received - sample.age)
-            return self.planner.rates(sample, self.resets.target(target, command.turn), period)
+            target = self.resets.target(target, command.turn)
+            return self.planner.rates(sample, target, period, is_step=command.is_step)
         limits = self._limits
         return BodyRates(*limit_rates(*command.body_rates, limits.tilt_rate, limits.yaw_rate))
 
@@ -208,7 +209,8 @@ class ControlLoop:
                 sample.age if sample.age_known else nan,
             )
         if command.is_step:
-            self._trace.add_response(sample.vehicle_time, sample.q, command.target)
+            q = self.planner.attitude(sample.q)
+            self._trace.add_response(sample.vehicle_time, q, command.target)
 
     def resume(self) -> None:
         """Answer again after a gap, because the autopilot has confirmed offboard."""

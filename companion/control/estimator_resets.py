@@ -14,15 +14,17 @@ corrected heading improves them at once.
 """
 
 from collections import deque
-from math import asin, atan2, cos, hypot, radians, sin, sqrt
+from math import asin, atan2, hypot, radians, sqrt
 
 from companion.attitude import Quaternion, Target, is_unit
-from companion.attitude.rotation import short_way, turned
+from companion.attitude.rotation import short_way, turned, turned_about_vertical
 from companion.guidance.reference import Vector, rotated
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST = 0.1
 """Attitudes further apart than this are not compared, s: the rates between them are unknown."""
+_LONGEST_STEP = 0.025
+"""Between attitudes further apart than this, the rates are too uncertain for a correction, s."""
 _ANGLE = radians(4.0)
 """Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _DISTANCE = 0.2
@@ -41,6 +43,8 @@ class EstimatorResets:
     Attributes:
         turn: sum of the heading jumps, rad.
         shift: sum of the position jumps, m NED.
+        corrections: sum of the heading changes that body rates do not explain and that are no
+            jumps, rad; see `StepFrame`.
         largest_tilt: largest jump of the thrust axis, rad; no reference frame compensates it.
         newest: the newest attitude, or None.
         times: when the latest resets were found, s of event-loop time.
@@ -49,6 +53,7 @@ class EstimatorResets:
     def __init__(self) -> None:
         self.turn = 0.0
         self.shift: Vector = (0.0, 0.0, 0.0)
+        self.corrections = 0.0
         self.largest_tilt = 0.0
         self.times: deque[float] = deque(maxlen=32)
         self.newest: AttitudeSample | None = None
@@ -70,6 +75,8 @@ class EstimatorResets:
         if abs(yaw) > threshold:
             self.turn = short_way(self.turn + yaw)
         elif not jumped:
+            if dt <= _LONGEST_STEP:
+                self.corrections += yaw
             return False
         self._count_reset(sample.received)
         self.largest_tilt = max(self.largest_tilt, tilt if jumped else 0.0)
@@ -94,11 +101,7 @@ class EstimatorResets:
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """The attitude without the heading jumps."""
-        if self.turn == 0.0:
-            return q
-        c, s = cos(0.5 * self.turn), -sin(0.5 * self.turn)
-        w, x, y, z = q
-        return c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+        return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
 
     def target(self, target: Target, turn: float) -> Target:
         """A target in the frame without jumps; `turn` is `self.turn` when it was made, rad."""

@@ -1,10 +1,11 @@
-"""Runs the planner on each sample: periods, restarts, and the frame without estimator resets."""
+"""Runs the planner on each sample: periods, restarts, and the frame that the planner sees."""
 
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import BodyRates, Planner, Target
+from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_STEP = 0.1
@@ -12,7 +13,9 @@ _LONGEST_STEP = 0.1
 
 
 class PlannerRunner:
-    """Asks the planner for body rates, in the frame without estimator resets.
+    """Asks the planner for body rates, in a frame without estimator resets.
+
+    During open-loop steps that is the `StepFrame`.
 
     Args:
         planner: the planner.
@@ -27,6 +30,7 @@ class PlannerRunner:
         self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
         self._planner = planner
         self._resets = resets
+        self._frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
         self._noted: AttitudeTarget | None = None
@@ -36,19 +40,31 @@ class PlannerRunner:
         """Reset the planner at the next sample, because its state is not valid any more."""
         self._planned_at = -inf
 
-    def rates(self, sample: AttitudeSample, target: Target, arrival_period: float) -> BodyRates:
+    def attitude(self, q: Quaternion) -> Quaternion:
+        """An attitude of the autopilot in the frame that the planner sees."""
+        return self._frame.attitude(self._resets.attitude(q))
+
+    def rates(
+        self, sample: AttitudeSample, target: Target, arrival_period: float, *, is_step: bool
+    ) -> BodyRates:
         """Body rates for a sample, rad/s; resets the planner first after a gap or a restart.
 
         Args:
             sample: the sample to answer.
             target: target in the frame without resets.
             arrival_period: vehicle time since the sample before, s.
+            is_step: whether the target is an open-loop step.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.
         """
-        q = self._resets.attitude(sample.q)
         period = sample.vehicle_time - self._planned_at
+        # Over a gap the body rates are not known, so the frame does not follow the estimator.
+        stepping = is_step and period <= _LONGEST_STEP
+        self._frame.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
+        q = self.attitude(sample.q)
+        if not is_step:
+            target = self._frame.target(target)
         if period > _LONGEST_STEP:
             self._planner.reset(q, sample.body_rates)
             # A gap is not the period of the samples, so an earlier period is used.
@@ -71,4 +87,4 @@ class PlannerRunner:
         if self._turned_ms < target.time_boot_ms <= sample.time_boot_ms:
             self._noted = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
-            self._planner.note_attitude_target(self._resets.attitude(target.q), age)
+            self._planner.note_attitude_target(self.attitude(target.q), age)

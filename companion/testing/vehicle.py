@@ -10,7 +10,7 @@ from companion.extras import require
 from sitl_mock.control_channel import Truth, add_fault, truth
 from sitl_mock.exchange import Arrived, Exchange
 from sitl_mock.link.framing import decode
-from sitl_mock.physics.vehicle_step import MakePlant, PythonPlant
+from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import load_settings
 from sitl_mock.simulation import Simulation
 
@@ -22,7 +22,7 @@ _STATION = 255, 190
 _COMMAND_PARAMETERS = 7
 
 
-def _plant(compiled: bool) -> MakePlant:
+def _plant(compiled: bool) -> type[Plant]:
     """Return what computes the physics."""
     if not compiled:
         return PythonPlant

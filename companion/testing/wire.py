@@ -129,19 +129,23 @@ class FreeWire(Wire):
 
     def advance(self, until: float) -> None:
         """Go on until something reaches the application, at most to `until`."""
-        clock, vehicle = self._clock, self._vehicle
+        clock, under_way = self._clock, self._under_way
+        step_at = self._next_step_at()
         while True:
-            step_at = in_burst(vehicle.next_step_at, self._burst) + self._slipped
-            arrival = self._under_way[0][0] if self._under_way else step_at
+            arrival = under_way[0][0] if under_way else step_at
             clock.now = max(clock.now, min(until, arrival, step_at))
-            reached = self._reached_application()
+            reached = clock.now >= arrival and self._reached_application()
             if clock.now >= step_at:
-                self._send(vehicle.begin())
-                self._send(vehicle.step())
-                self._slipped += vehicle.take_slip()
+                self._send(self._vehicle.begin())
+                self._send(self._vehicle.step())
+                self._slipped += self._vehicle.take_slip()
+                step_at = self._next_step_at()
                 reached = self._reached_application() or reached
             if reached or clock.now >= until:
                 return
+
+    def _next_step_at(self) -> float:
+        return in_burst(self._vehicle.next_step_at, self._burst) + self._slipped
 
     def _reached_application(self) -> bool:
         """Deliver what is due; returns whether some of it went to the application."""

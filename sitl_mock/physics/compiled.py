@@ -6,28 +6,21 @@ in Python.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 from numba.extending import intrinsic, register_jitable
 
-from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.config.rate_loop import RateLoopConfig
-from sitl_mock.physics.environment import ground_law
-from sitl_mock.physics.multirotor_step import (
-    ZERO,
-    Rings,
-    at_rest,
-    empty_rings,
-    multirotor_law,
-    started,
-)
+from sitl_mock.physics.multirotor_step import Rings, empty_rings
 from sitl_mock.physics.navigation_filter import TrailRow
+from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
+from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
     Air,
@@ -49,7 +42,8 @@ def _called_by(function: Any) -> set[FunctionType]:
     return called.union(*(_called_by(each) for each in called))
 
 
-_CALLED: set[Any] = {advance, outcome, *_called_by(advance)}
+_CALLED: set[Any] = {advance, outcome, estimate, white_noise}
+_CALLED |= _called_by(advance) | _called_by(estimate)
 for _function in _CALLED:
     register_jitable(_function)
 
@@ -102,17 +96,11 @@ def _in_memory(kind: Any) -> tuple[Any, Any]:
     return intrinsic(load), intrinsic(store)
 
 
-def _example() -> tuple[VehicleLaw, VehicleState]:
-    """Return a law and a state, for their types."""
-    multirotor = multirotor_law(AirframeConfig(), RateLoopConfig())
-    law = VehicleLaw(multirotor, ground_law(AirframeConfig(), multirotor.rates.dt))
-    body = at_rest((1.0, 0.0, 0.0, 0.0))
-    return law, VehicleState(0, body, started(multirotor, 0.0), ZERO, True, False, 0.0)
-
-
-_law_type, _state_type = map(numba.typeof, _example())
-_load_law, _store_law = _in_memory(_law_type)
-_load_state, _store_state = _in_memory(_state_type)
+_EXAMPLE = Vehicle(seed=0)  # for the types
+_SENSORS = _EXAMPLE.estimator.law, _EXAMPLE.estimator.state
+_load_law, _store_law = _in_memory(numba.typeof(_EXAMPLE.plant.law))
+_load_state, _store_state = _in_memory(numba.typeof(_EXAMPLE.plant.state))
+_load_sensors, _store_sensors = _in_memory(numba.typeof(_SENSORS))
 
 
 @_compiled
@@ -155,16 +143,32 @@ def _advance(
     return outcome(state)
 
 
+@_compiled
+def _keep_sensors(memory: Any, sensors: tuple[SensorLaw, SensorState]) -> None:
+    _store_sensors(memory, sensors)
+
+
+@_compiled
+def _estimate(memory: Any, trail: Any, steps: int, time: float, noise: Any) -> Any:
+    law, state = _load_sensors(memory)
+    return estimate(law, state, trail, steps, time, noise)
+
+
+_white_noise = _compiled(white_noise)
+
+
 class CompiledPlant:
-    """A vehicle whose steps are compiled; the arguments are those of `PythonPlant`."""
+    """A vehicle whose steps and estimates are compiled; its arguments: see `Plant`."""
 
     def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None:
-        self._law, self._memory = _memory_for(law), _memory_for(state)
+        self.law, self._law, self._memory = law, _memory_for(law), _memory_for(state)
         _start(self._law, law, self._memory, state)
         self._arrived, self._shaped = (np.array(ring) for ring in empty_rings(law.multirotor))
         self._trail = np.array([trail_row(state.body, state.position)] * trail_length)
         self._state: VehicleState | None = state
         self._steps = state.steps
+        self._sensors = _memory_for(_SENSORS)
+        self._sensor_state: SensorState | None = None
 
     @property
     def state(self) -> VehicleState:
@@ -193,11 +197,32 @@ class CompiledPlant:
         row: TrailRow = tuple(self._trail[(self._steps - steps) % len(self._trail)].tolist())
         return row
 
+    def estimate(
+        self, law: SensorLaw, state: SensorState, time: float, noise: Any
+    ) -> tuple[Estimate, Vector]:
+        """The autopilot's estimate now: see `sensors.estimate`."""
+        if state is not self._sensor_state:
+            self._sensor_state = state
+            _keep_sensors(self._sensors, (law, state))
+        estimated: tuple[Estimate, Vector] = _estimate(
+            self._sensors, self._trail, self._steps, time, noise
+        )
+        return estimated
+
+    @staticmethod
+    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        numbers: Any = np.array(uniform)
+        _white_noise(numbers, deviations)
+        return cast("Sequence[float]", numbers)
+
 
 def _memory_for(numbers: tuple[Any, ...]) -> Any:
     """Return an array of bytes with room for tuples of numbers."""
 
     def count(value: Any) -> int:
-        return sum(map(count, value)) if isinstance(value, tuple) else 1
+        if isinstance(value, tuple):
+            return sum(map(count, value))
+        return 2 if isinstance(value, complex) else 1
 
     return np.zeros(8 * count(numbers), np.uint8)

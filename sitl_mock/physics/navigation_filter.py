@@ -18,25 +18,16 @@ _SAG_S = 2.0
 """Time constant with which the height error follows the acceleration, s."""
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
+_COMPASS_S = 20.0
+"""Time constant with which the heading follows the compass in a calm, s."""
+_SHOWN = 0.15
+"""Rate at which an acceleration of 1 m/s^2 shows the true heading, 1/s; it grows as the square."""
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
-
-
-class Snapshot(NamedTuple):
-    """The true motion after one physics step."""
-
-    motion: Motion
-    position: Vector
-    acceleration: Vector  # NED, m/s^2, mean over the step
-
-
 TrailRow = tuple[*Motion, *Vector, *Vector]
-"""A snapshot as one row of numbers: motion, position, acceleration."""
-
-
-def snapshot(row: TrailRow) -> Snapshot:
-    """Return the true motion of a row."""
-    return Snapshot(row[0:10], row[10:13], row[13:16])
+"""The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
+Trail = list[TrailRow]
+"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
 
 
 class NavigationError(NamedTuple):
@@ -47,7 +38,7 @@ class NavigationError(NamedTuple):
     rotation: Vector
 
 
-class _FilterState(NamedTuple):
+class TrackState(NamedTuple):
     """Errors after a fix, horizontal or vertical."""
 
     errors: Errors
@@ -57,6 +48,76 @@ class _FilterState(NamedTuple):
     """Noise of the latest fix: position and velocity."""
 
 
+class FilterState(NamedTuple):
+    """All errors after a fix, and the true motion at its fusion time."""
+
+    level: TrackState
+    upright: TrackState
+    yaw: float  # heading error, rad
+    yaw_pending: float  # its change that the output does not yet contain, rad
+    compass: float  # part of the heading error that comes from the compass, rad
+    sag: float  # of the height, m
+    at: float  # fusion time of the fix, s
+    corrected: float  # time of the fix, s
+    way: complex  # true position, m
+    speed: complex  # true velocity, m/s
+
+
+class ErrorLaw(NamedTuple):
+    """Constants of the errors between two fixes."""
+
+    lead: float  # s, by which errors grow with the acceleration
+    scale: float  # of the acceleration
+    height_offset: float  # m
+    predictor_ms: float
+
+
+def extrapolated(errors: Errors, elapsed: float) -> Errors:
+    """Return the errors ``elapsed`` s later, without new disturbances."""
+    place, speed, tilt = errors
+    return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
+
+
+def settled_share(law: ErrorLaw, state: FilterState, now: float) -> float:
+    """Return the share of the latest corrections that the output does not contain at ``now``."""
+    return exp((state.corrected - now) * 1e3 / law.predictor_ms)
+
+
+def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float) -> Errors:
+    """Return the horizontal errors ``elapsed`` s after the fix.
+
+    The filter integrated an acceleration that was rotated and scaled.
+    """
+    place, speed, tilt = extrapolated(state.level.errors, elapsed)
+    wrong = complex(law.scale, state.yaw)
+    before = state.speed
+    way = complex(truth[10], truth[11]) - state.way
+    return (
+        place + wrong * (way - elapsed * before),
+        speed + wrong * (complex(truth[0], truth[1]) - before),
+        tilt,
+    )
+
+
+def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
+    """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
+    elapsed = now - state.at
+    settled = settled_share(law, state, now)
+    place, speed, tilt = propagated(law, state, truth, elapsed)
+    pending = state.level.pending
+    place += law.lead * complex(truth[0], truth[1]) - settled * pending[0]
+    speed += law.lead * complex(truth[13], truth[14]) - settled * pending[1]
+    down, sink, _ = extrapolated(state.upright.errors, elapsed)
+    pending = state.upright.pending
+    down += law.height_offset + state.sag - settled * pending[0]
+    return NavigationError(
+        (place.real, place.imag, down.real),
+        (speed.real, speed.imag, (sink - settled * pending[1]).real),
+        # A wrong attitude rotates the thrust, which makes the acceleration wrong.
+        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - settled * state.yaw_pending),
+    )
+
+
 class NavigationFilter:
     """Computes the errors from fix to fix.
 
@@ -64,41 +125,31 @@ class NavigationFilter:
         config: noise, delays and gains.
         start: the true motion at time 0.
         seed: of the noise.
+
+    Attributes:
+        law: constants between two fixes.
+        state: errors after the latest fix.
     """
 
-    __slots__ = (
-        "_at",
-        "_config",
-        "_corrected",
-        "_decay",
-        "_fixed_speed",
-        "_fixed_way",
-        "_gains",
-        "_lead",
-        "_level",
-        "_period",
-        "_random",
-        "_sag",
-        "_upright",
-        "_yaw",
-        "_yaw_decay",
-    )
-
-    def __init__(self, config: EkfConfig, start: Snapshot, seed: int) -> None:
+    def __init__(self, config: EkfConfig, start: TrailRow, seed: int) -> None:
         self._config = config
         self._period = config.fix_period_ms * 1e-3
         self._gains = (config.position_gains, config.velocity_gains, config.acceleration_gains)
         self._decay = exp(-self._period / config.noise_time_s)
         self._yaw_decay = exp(-self._period / config.yaw_time_s)
-        self._lead = config.acceleration_lead_ms * 1e-3
+        self.law = ErrorLaw(
+            config.acceleration_lead_ms * 1e-3,
+            config.acceleration_scale,
+            config.height_offset_m,
+            config.predictor_ms,
+        )
         self._random = Random(f"{seed}/navigation")
-        self._yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
-        self._at = 0.0
-        self._fixed_way, self._fixed_speed = _horizontal(start.position), _horizontal(start.motion)
-        self._corrected = self._sag = 0.0
-        self._level, self._upright = self._initial(1.0), self._initial(config.vertical_share)
+        yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
+        level, upright = self._initial(1.0), self._initial(config.vertical_share)
+        way, speed = complex(start[10], start[11]), complex(start[0], start[1])
+        self.state = FilterState(level, upright, yaw, 0.0, 0.0, 0.0, 0.0, 0.0, way, speed)
 
-    def _initial(self, share: float) -> _FilterState:
+    def _initial(self, share: float) -> TrackState:
         """Return the state after the first fix, whose noise becomes the error."""
         config, gauss = self._config, self._random.gauss
         place, speed = share * config.position_noise_m, share * config.velocity_noise_m_s
@@ -106,13 +157,13 @@ class NavigationFilter:
             complex(gauss(0.0, place), gauss(0.0, place)),
             complex(gauss(0.0, speed), gauss(0.0, speed)),
         )
-        return _FilterState((*noise, 0j), (0j, 0j), noise)
+        return TrackState((*noise, 0j), (0j, 0j), noise)
 
     def is_due(self, at: float) -> bool:
         """Whether a fix is due at a fusion time, s."""
-        return at - self._at >= self._period - 1e-9
+        return at - self.state.at >= self._period - 1e-9
 
-    def advance(self, delayed: Snapshot, at: float, now: float) -> None:
+    def advance(self, delayed: TrailRow, at: float, now: float) -> None:
         """Correct the errors by a fix.
 
         Args:
@@ -120,69 +171,56 @@ class NavigationFilter:
             at: the fusion time, s.
             now: the present time, s.
         """
-        elapsed = at - self._at
-        config, late = self._config, 1e-3
-        speed, pull = _horizontal(delayed.motion), _horizontal(delayed.acceleration)
-        moved = self._propagated(delayed, elapsed)
-        noise = self._next_noise(self._level.noise, 1.0)
+        config, law, state, late = self._config, self.law, self.state, 1e-3
+        elapsed = at - state.at
+        speed, pull = complex(delayed[0], delayed[1]), complex(delayed[13], delayed[14])
+        moved = propagated(law, state, delayed, elapsed)
+        noise = self._next_noise(state.level.noise, 1.0)
         seen = (
-            noise[0] - (config.position_late_ms * late + self._lead) * speed,
-            noise[1] - (config.velocity_late_ms * late + self._lead) * pull,
+            noise[0] - (config.position_late_ms * late + law.lead) * speed,
+            noise[1] - (config.velocity_late_ms * late + law.lead) * pull,
         )
-        settled = exp((self._corrected - now) * 1e3 / config.predictor_ms)
+        settled = settled_share(law, state, now)
         kick = _GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
-        level = self._corrected_state(self._level, moved, seen, noise, settled, kick)
+        level = self._corrected_state(state.level, moved, seen, noise, settled, kick)
         share = config.vertical_share
-        noise = self._next_noise(self._upright.noise, share)
-        still = _extrapolated(self._upright.errors, elapsed)
-        upright = self._corrected_state(self._upright, still, noise, noise, settled, share * kick)
-        self._turn(speed, pull)
+        noise = self._next_noise(state.upright.noise, share)
+        still = extrapolated(state.upright.errors, elapsed)
+        upright = self._corrected_state(state.upright, still, noise, noise, settled, share * kick)
+        compass = self._rested_on_compass(abs(pull), elapsed)
+        yaw = self._turned(speed, pull) + compass
+        turned = settled * state.yaw_pending + yaw - state.yaw
         sag = config.height_sag_s4_per_m * abs(pull) ** 2
-        self._sag += (1.0 - exp(-elapsed / _SAG_S)) * (sag - self._sag)
-        self._level, self._upright = level, upright
-        self._at, self._corrected = at, now
-        self._fixed_way, self._fixed_speed = _horizontal(delayed.position), speed
+        sag = state.sag + (1.0 - exp(-elapsed / _SAG_S)) * (sag - state.sag)
+        way = complex(delayed[10], delayed[11])
+        self.state = FilterState(level, upright, yaw, turned, compass, sag, at, now, way, speed)
 
-    def error(self, truth: Snapshot, now: float) -> NavigationError:
-        """Return the error at ``now`` (s), at which the true motion is ``truth``."""
-        elapsed = now - self._at
-        settled = exp((self._corrected - now) * 1e3 / self._config.predictor_ms)
-        place, speed, tilt = self._propagated(truth, elapsed)
-        pending = self._level.pending
-        place += self._lead * _horizontal(truth.motion) - settled * pending[0]
-        speed += self._lead * _horizontal(truth.acceleration) - settled * pending[1]
-        down, sink, _ = _extrapolated(self._upright.errors, elapsed)
-        pending = self._upright.pending
-        down += self._config.height_offset_m + self._sag - settled * pending[0]
-        return NavigationError(
-            (place.real, place.imag, down.real),
-            (speed.real, speed.imag, (sink - settled * pending[1]).real),
-            # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-            (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, self._yaw),
-        )
+    def _turned(self, speed: complex, pull: complex) -> float:
+        """Return the next heading error without that of the compass.
 
-    def _turn(self, speed: complex, pull: complex) -> None:
-        """Update the heading error: coloured noise about a mean that follows the turn rate."""
-        config, decay = self._config, self._yaw_decay
+        It is coloured noise about a mean that follows the turn rate.
+        """
+        config, decay, state = self._config, self._yaw_decay, self.state
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
         learned = -turn_rate * config.turn_yaw_ms * 1e-3
-        self._yaw = learned + decay * (self._yaw - learned) + self._random.gauss(0.0, spread)
+        before = state.yaw - state.compass
+        return learned + decay * (before - learned) + self._random.gauss(0.0, spread)
 
-    def _propagated(self, truth: Snapshot, elapsed: float) -> Errors:
-        """Return the horizontal errors ``elapsed`` s after the fix.
+    def _rested_on_compass(self, pull: float, elapsed: float) -> float:
+        """Return the next heading error that comes from the compass, rad.
 
-        The filter integrated an acceleration that was rotated and scaled.
+        Without acceleration only the compass tells the heading. An acceleration shows the true
+        heading, because the fixes measure its direction.
+
+        Args:
+            pull: horizontal acceleration, m/s^2.
+            elapsed: time since the last fix, s.
         """
-        place, speed, tilt = _extrapolated(self._level.errors, elapsed)
-        wrong = complex(self._config.acceleration_scale, self._yaw)
-        before = self._fixed_speed
-        way = _horizontal(truth.position) - self._fixed_way
-        return (
-            place + wrong * (way - elapsed * before),
-            speed + wrong * (_horizontal(truth.motion) - before),
-            tilt,
-        )
+        slow = 1.0 / _COMPASS_S
+        rate = slow + _SHOWN * pull**2
+        rest = radians(self._config.compass_error_deg) * slow / rate
+        return rest + (self.state.compass - rest) * exp(-rate * elapsed)
 
     def _next_noise(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
         """Return the noise of the next fix."""
@@ -196,13 +234,13 @@ class NavigationFilter:
 
     def _corrected_state(
         self,
-        track: _FilterState,
+        track: TrackState,
         errors: Errors,
         seen: tuple[complex, complex],
         noise: tuple[complex, complex],
         settled: float,
         kick: float,
-    ) -> _FilterState:
+    ) -> TrackState:
         """Return the errors corrected by a fix whose own errors are `seen`; add a random tilt."""
         place, speed, tilt = errors
         off, faster = seen[0] - place, seen[1] - speed
@@ -212,19 +250,8 @@ class NavigationFilter:
         gauss = self._random.gauss
         wander = complex(gauss(0.0, kick), gauss(0.0, kick))
         pending = track.pending
-        return _FilterState(
+        return TrackState(
             (place + first, speed + second, tilt + third + wander),
             (settled * pending[0] + first, settled * pending[1] + second),
             noise,
         )
-
-
-def _horizontal(vector: tuple[float, ...]) -> complex:
-    """Return north + j east of a vector that starts with these two."""
-    return complex(vector[0], vector[1])
-
-
-def _extrapolated(errors: Errors, elapsed: float) -> Errors:
-    """Return the errors ``elapsed`` s later, without new disturbances."""
-    place, speed, tilt = errors
-    return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt

@@ -7,15 +7,22 @@ from typing import NamedTuple
 
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_filter import (
+    ErrorLaw,
+    FilterState,
     NavigationError,
     NavigationFilter,
-    Snapshot,
+    TrackState,
+    Trail,
     TrailRow,
-    snapshot,
+    error_at,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
 
-_NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+_NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
+_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
+_DRAWN_TOGETHER = 16
+"""Estimates for which noise is drawn at a time; even, because normal numbers come in pairs."""
 
 
 class Estimate(NamedTuple):
@@ -26,59 +33,130 @@ class Estimate(NamedTuple):
     position_ned: Vector  # m
     velocity_ned: Vector  # m/s
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
-    gyro: Vector  # rad/s, what the (bias-free) gyro measures
+    gyro: Vector  # rad/s, what the gyro measures
 
 
-class WhiteNoise:
-    """Standard normal numbers: the sequence of `Random.gauss` (Box-Muller), many at a time.
+class SensorLaw(NamedTuple):
+    """Constants of the estimate."""
+
+    gravity: float  # m/s^2
+    attitude_delay: int  # steps
+    position_delay: int  # steps
+    dt: float  # length of a step, s
+    filtered: bool  # whether there is a navigation filter, with the law that follows
+    errors: ErrorLaw
+    yaw_rate_bias: float  # rad/s
+
+
+class SensorState(NamedTuple):
+    """What only fixes and estimator resets change."""
+
+    filter: FilterState
+    yaw: Quaternion  # rotation of the estimate by all resets
+    offset: Vector  # shift of the estimate by all resets, NED, m
+
+
+def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
+    """Turn uniform random numbers into normal ones, in place: as `Random.gauss`, Box-Muller.
 
     Args:
-        seed: of the sequence.
+        numbers: evenly many, 0 <= x < 1.
+        deviations: standard deviations of the normal numbers, which are used in turn.
     """
+    period = len(deviations)
+    for index in range(0, len(numbers), 2):
+        angle = numbers[index] * 2.0 * pi
+        radius = sqrt(-2.0 * log(1.0 - numbers[index + 1]))
+        numbers[index] = 0.0 + cos(angle) * radius * deviations[index % period]
+        numbers[index + 1] = 0.0 + sin(angle) * radius * deviations[(index + 1) % period]
 
-    __slots__ = ("_next", "_random")
 
-    def __init__(self, seed: str) -> None:
-        self._random = Random(seed)
-        self._next: list[float] = []
+def rotated_estimate(yaw: Quaternion, rotation: Vector, q: Quaternion) -> Quaternion:
+    """Return an attitude with a small rotation (rad, NED), then rotated by estimator resets."""
+    roll, pitch, heading = rotation
+    return multiply(yaw, multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q))
 
-    def draw(self, count: int) -> list[float]:
-        """Return the next `count` numbers."""
-        drawn, random = self._next, self._random.random
-        while len(drawn) < count:
-            angle = random() * 2.0 * pi
-            radius = sqrt(-2.0 * log(1.0 - random()))
-            drawn.append(cos(angle) * radius)
-            drawn.append(sin(angle) * radius)
-        self._next = drawn[count:]
-        return drawn[:count]
+
+def estimate(
+    law: SensorLaw,
+    state: SensorState,
+    trail: Trail,
+    steps: int,
+    time: float,
+    noise: Sequence[float],
+) -> tuple[Estimate, Vector]:
+    """Return the estimate now, and the rotation of its attitude by the filter's error (pure).
+
+    Args:
+        law: constants.
+        state: after the latest fix and reset.
+        trail: the true motion of the latest steps.
+        steps: since boot.
+        time: now, s.
+        noise: 15 numbers: of attitude, rates, position, velocity and force.
+    """
+    attitude = trail[(steps - law.attitude_delay) % len(trail)]
+    place = trail[(steps - law.position_delay) % len(trail)]
+    if law.filtered:
+        error = error_at(law.errors, state.filter, place, time - law.position_delay * law.dt)
+    else:
+        error = NO_ERROR
+    q = (attitude[3], attitude[4], attitude[5], attitude[6])
+    fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
+    tilted = rotated_estimate(state.yaw, error.rotation, q)
+    yaw_rate = attitude[9] + law.yaw_rate_bias + noise[5]
+    gyro = (attitude[7] + noise[3], attitude[8] + noise[4], yaw_rate)
+    position, velocity, offset = error.position, error.velocity, state.offset
+    estimated = Estimate(
+        normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
+        gyro,
+        (
+            place[10] + position[0] + offset[0] + noise[6],
+            place[11] + position[1] + offset[1] + noise[7],
+            place[12] + position[2] + offset[2] + noise[8],
+        ),
+        (
+            place[0] + velocity[0] + noise[9],
+            place[1] + velocity[1] + noise[10],
+            place[2] + velocity[2] + noise[11],
+        ),
+        (fx + noise[12], fy + noise[13], fz + noise[14]),
+        gyro,
+    )
+    return estimated, error.rotation
 
 
 class Estimator:
-    """Computes the estimate; one seeded generator draws its white noise.
+    """Keeps what the estimate needs; one seeded generator draws its white noise.
 
-    Only `estimate` draws white noise, and always the same number of draws. So the noise depends on
+    Only `draw` draws white noise, and always the same number of draws. So the noise depends on
     the seed and the number of calls; that of the navigation filter on the seed and the time.
+
+    Args:
+        config: noise, delays and filter.
+        start: the true motion at time 0.
+        gravity: m/s^2.
+        dt: length of a step, s.
+        seed: of all noise.
+        make_noise: as `white_noise`, but it may return the numbers in another container.
+
+    Attributes:
+        law: constants of `estimate`.
+        state: changed by fixes and resets.
+        rotation: small rotation of the attitude by the filter's error at the latest estimate, rad.
+        reset_counter: estimator resets since boot.
+        trail_length: steps whose motion an estimate needs, the present one included.
     """
 
-    __slots__ = (
-        "_attitude_delay",
-        "_deviations",
-        "_dt",
-        "_filter",
-        "_gravity",
-        "_horizon",
-        "_noise",
-        "_offset",
-        "_position_delay",
-        "_rotation",
-        "_yaw",
-        "reset_counter",
-        "trail_length",
-    )
-
     def __init__(
-        self, config: SensorConfig, start: Snapshot, *, gravity: float, dt: float, seed: int
+        self,
+        config: SensorConfig,
+        start: TrailRow,
+        *,
+        gravity: float,
+        dt: float,
+        seed: int,
+        make_noise: Callable[[list[float], tuple[float, ...]], Sequence[float]],
     ) -> None:
         self._deviations = tuple(
             deviation
@@ -91,75 +169,61 @@ class Estimator:
             )
             for _ in range(3)
         )
-        self._gravity = gravity
-        self._attitude_delay = round(config.attitude_delay_ms * 1e-3 / dt)
-        self._position_delay = round(config.position_delay_ms * 1e-3 / dt)
-        self._filter = None if config.ekf is None else NavigationFilter(config.ekf, start, seed)
-        self._horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
-        self.trail_length = 1 + max(self._attitude_delay, self._position_delay, self._horizon)
-        """Steps whose motion an estimate needs, the present one included."""
-        self._dt = dt
-        self._noise = WhiteNoise(f"{seed}/sensors")
-        self._yaw: Quaternion = (1.0, 0.0, 0.0, 0.0)
-        self._rotation: Vector = (0.0, 0.0, 0.0)
-        self._offset: Vector = (0.0, 0.0, 0.0)
+        filter_ = None if config.ekf is None else NavigationFilter(config.ekf, start, seed)
+        self.law = SensorLaw(
+            gravity,
+            round(config.attitude_delay_ms * 1e-3 / dt),
+            round(config.position_delay_ms * 1e-3 / dt),
+            dt,
+            filter_ is not None,
+            ErrorLaw(0.0, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
+            0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
+        )
+        horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
+        self._behind = max(horizon, self.law.position_delay)
+        self.trail_length = 1 + max(self.law.attitude_delay, self._behind)
+        self._filter = filter_
+        first = _NO_FILTER if filter_ is None else filter_.state
+        self.state = SensorState(first, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._random = Random(f"{seed}/sensors")
+        self._make_noise = make_noise
+        self._numbers: Sequence[float] = ()
+        self._drawn = 0
+        self.rotation: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
-        """Estimator resets since boot."""
 
     def shift(self, yaw: float, position_ned: Vector) -> None:
         """Reset the estimator: rotate (rad) and shift (m) the estimate from now on."""
-        self._yaw = multiply(from_yaw(yaw), self._yaw)
-        n, e, d = self._offset
-        self._offset = (n + position_ned[0], e + position_ned[1], d + position_ned[2])
+        n, e, d = self.state.offset
+        self.state = self.state._replace(
+            yaw=multiply(from_yaw(yaw), self.state.yaw),
+            offset=(n + position_ned[0], e + position_ned[1], d + position_ned[2]),
+        )
         self.reset_counter += 1
 
     def as_estimated(self, q: Quaternion) -> Quaternion:
         """Return a true attitude with the attitude error of the latest estimate."""
-        roll, pitch, heading = self._rotation
-        tilted = multiply((1.0, 0.5 * roll, 0.5 * pitch, 0.5 * heading), q)
-        return multiply(self._yaw, tilted)
+        return rotated_estimate(self.state.yaw, self.rotation, q)
 
-    def estimate(self, time: float, before: Callable[[int], TrailRow]) -> Estimate:
-        """Return the estimate at ``time`` (s), which is now, with fresh noise.
+    def correct(self, time: float, before: Callable[[int], TrailRow]) -> None:
+        """Correct the errors if a fix of the navigation filter is due.
 
         Args:
             time: now, s.
             before: returns the true motion that many steps ago, fewer than `trail_length`.
         """
-        attitude, place = before(self._attitude_delay), before(self._position_delay)
-        error = self._error(time, place, before)
-        self._rotation = error.rotation
-        _, _, _, w, x, y, z, p, q, r, _, _, _, n, e, d = attitude
-        force = to_body((w, x, y, z), (n, e, d - self._gravity))
-        noise = [0.0 + z * s for z, s in zip(self._noise.draw(15), self._deviations, strict=True)]
-        turn_x, turn_y, turn_z, p_noise, q_noise, r_noise, *rest = noise
-        turned = multiply(self.as_estimated((w, x, y, z)), (1.0, turn_x, turn_y, turn_z))
-        gyro = (p + p_noise, q + q_noise, r + r_noise)
-        return Estimate(
-            normalise(turned),
-            gyro,
-            _sum(place[10:13], error.position, self._offset, rest[0:3]),
-            _sum(place, error.velocity, rest[3:6]),
-            _sum(force, rest[6:9]),
-            gyro,
-        )
+        fused = time - self._behind * self.law.dt
+        if self._filter is not None and self._filter.is_due(fused):
+            self._filter.advance(before(self._behind), fused, time)
+            self.state = self.state._replace(filter=self._filter.state)
 
-    def _error(
-        self, time: float, place: TrailRow, before: Callable[[int], TrailRow]
-    ) -> NavigationError:
-        """Return the error of the navigation filter at the age of position and velocity."""
-        if self._filter is None:
-            return _NO_ERROR
-        behind = max(self._horizon, self._position_delay)
-        fused = time - behind * self._dt
-        if self._filter.is_due(fused):
-            self._filter.advance(snapshot(before(behind)), fused, time)
-        return self._filter.error(snapshot(place), time - self._position_delay * self._dt)
-
-
-def _sum(first: Sequence[float], *others: Sequence[float]) -> Vector:
-    """Return the sum of the first three components of vectors, added from left to right."""
-    x, y, z = first[0], first[1], first[2]
-    for other in others:
-        x, y, z = x + other[0], y + other[1], z + other[2]
-    return x, y, z
+    def draw(self) -> Sequence[float]:
+        """Return fresh noise for one estimate, 15 numbers."""
+        count, begin = len(self._deviations), self._drawn
+        if begin == len(self._numbers):
+            random = self._random.random
+            uniform = [random() for _ in range(count * _DRAWN_TOGETHER)]
+            self._numbers = self._make_noise(uniform, self._deviations)
+            begin = 0
+        self._drawn = begin + count
+        return self._numbers[begin : begin + count]

@@ -14,7 +14,6 @@ from sitl_mock.physics.multirotor_step import (
     multirotor_law,
     started,
 )
-from sitl_mock.physics.navigation_filter import Snapshot
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw
 from sitl_mock.physics.rate_shaping import Shaped
 from sitl_mock.physics.rotors import Four, throttle_of
@@ -22,10 +21,11 @@ from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
     Air,
-    MakePlant,
+    Plant,
     PythonPlant,
     VehicleLaw,
     VehicleState,
+    trail_row,
 )
 
 __all__ = ["ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
@@ -62,7 +62,15 @@ class Vehicle:
         sensors: errors of the estimate.
         seed: of all noise.
         heading: at the start, rad clockwise from north.
-        plant: computes the steps: `PythonPlant`, or `compiled.CompiledPlant`.
+        plant: computes steps and estimates: `PythonPlant`, or `compiled.CompiledPlant`.
+
+    Attributes:
+        steps: physics steps since boot.
+        step_s: length of one physics step, s.
+        on_ground: whether the vehicle stands.
+        crashed: whether a touchdown was a crash.
+        estimator: errors of the estimate.
+        plant: as the argument.
     """
 
     def __init__(
@@ -75,36 +83,32 @@ class Vehicle:
         *,
         seed: int,
         heading: float = 0.0,
-        plant: MakePlant = PythonPlant,
+        plant: type[Plant] = PythonPlant,
     ) -> None:
         airframe = airframe or AirframeConfig()
         self.steps = 0
-        """Physics steps since boot."""
-        self.on_ground = True
-        """Whether the vehicle stands."""
-        self.crashed = False
-        """Whether a touchdown was a crash."""
+        self.on_ground, self.crashed = True, False
         self._thrust = 0.0  # of all rotors, N
         self._rate_hz = airframe.physics_rate_hz
         self._multirotor = multirotor_law(airframe, rate_loop or RateLoopConfig())
         self.step_s = dt = self._multirotor.rates.dt
-        """Length of one physics step, s."""
         self._slow_steps = round(SLOW_STEP_S * self._rate_hz)
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
         self._battery = Battery(battery or BatteryConfig(), airframe)
         body, stopped = at_rest(from_yaw(heading)), started(self._multirotor, 0.0)
-        self._estimator = Estimator(
+        self.estimator = Estimator(
             sensors or SensorConfig(),
-            Snapshot(body[0], ZERO, ZERO),
+            trail_row(body, ZERO),
             gravity=airframe.gravity_m_s2,
             dt=dt,
             seed=seed,
+            make_noise=plant.make_noise,
         )
-        self._plant = plant(
+        self.plant = plant(
             VehicleLaw(self._multirotor, ground_law(airframe, dt)),
             VehicleState(0, body, stopped, ZERO, True, False, nan),
-            self._estimator.trail_length,
+            self.estimator.trail_length,
         )
 
     @property
@@ -115,7 +119,7 @@ class Vehicle:
     @property
     def truth(self) -> TruthState:
         """The true state after the latest step."""
-        _, body, actuation, position, on_ground, crashed, touchdown_speed = self._plant.state
+        _, body, actuation, position, on_ground, crashed, touchdown_speed = self.plant.state
         motion, acceleration, _ = body
         mixed, thrusts, _, _ = actuation
         vn, ve, vd, w, x, y, z, p, q, r = motion
@@ -150,23 +154,28 @@ class Vehicle:
     @property
     def reset_counter(self) -> int:
         """Estimator resets since boot."""
-        return self._estimator.reset_counter
+        return self.estimator.reset_counter
 
     def estimate(self) -> Estimate:
         """Return the autopilot's estimate now; every call draws fresh noise."""
-        return self._estimator.estimate(self.time, self._plant.before)
+        estimator, time = self.estimator, self.time
+        estimator.correct(time, self.plant.before)
+        estimate, estimator.rotation = self.plant.estimate(
+            estimator.law, estimator.state, time, estimator.draw()
+        )
+        return estimate
 
     @property
     def attitude_target(self) -> Shaped | None:
         """The shaped attitude target, with the error of the estimate; None if not shaped."""
-        *_, shaped = self._plant.state.actuation
+        *_, shaped = self.plant.state.actuation
         if not shaped.active:
             return None
-        return shaped._replace(target=self._estimator.as_estimated(shaped.target))
+        return shaped._replace(target=self.estimator.as_estimated(shaped.target))
 
     def shift_estimate(self, *, yaw: float = 0.0, position_ned: Vector = ZERO) -> None:
         """Reset the estimator: the estimate jumps by this yaw (rad) and position (m)."""
-        self._estimator.shift(yaw, position_ned)
+        self.estimator.shift(yaw, position_ned)
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps of `step_s` seconds under one command."""
@@ -177,6 +186,6 @@ class Vehicle:
                 self._battery.step(self._thrust, self._slow_dt)
             steps = min(count, self._slow_steps - since)
             air = Air(self._battery.thrust_factor, self._wind.velocity)
-            self.on_ground, self.crashed, self._thrust = self._plant.advance(command, air, steps)
+            self.on_ground, self.crashed, self._thrust = self.plant.advance(command, air, steps)
             self.steps += steps
             count -= steps

@@ -3,7 +3,7 @@
 `advance` is written so that numba can compile it unchanged: see `compiled.py`.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from sitl_mock.physics.environment import GroundLaw, levelled, survives
@@ -18,8 +18,9 @@ from sitl_mock.physics.multirotor_step import (
     move,
     sinks,
 )
-from sitl_mock.physics.navigation_filter import TrailRow
+from sitl_mock.physics.navigation_filter import Trail, TrailRow
 from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 
 
 class ActuatorCommand(NamedTuple):
@@ -63,10 +64,6 @@ class VehicleLaw(NamedTuple):
 
     multirotor: MultirotorLaw
     ground: GroundLaw
-
-
-Trail = list[TrailRow]
-"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
 
 
 def trail_row(body: Kinematics, position: Vector) -> TrailRow:
@@ -145,7 +142,20 @@ def outcome(state: VehicleState) -> Outcome:
 
 
 class Plant(Protocol):
-    """A vehicle whose steps are computed in Python, or compiled."""
+    """A vehicle whose steps and estimates are computed in Python, or compiled.
+
+    Args:
+        law: constants.
+        state: at the start.
+        trail_length: steps whose motion is kept.
+
+    Attributes:
+        law: as the argument.
+    """
+
+    law: VehicleLaw
+
+    def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None: ...
 
     @property
     def state(self) -> VehicleState:
@@ -160,31 +170,44 @@ class Plant(Protocol):
         """Row of the trail that many steps ago."""
         ...
 
+    def estimate(
+        self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
+    ) -> tuple[Estimate, Vector]:
+        """The autopilot's estimate now: see `sensors.estimate`."""
+        ...
+
+    @staticmethod
+    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        ...
+
 
 class PythonPlant:
-    """A vehicle whose steps are computed in Python.
-
-    Args:
-        law: constants.
-        state: at the start.
-        trail_length: steps whose motion is kept.
-    """
+    """A vehicle whose steps and estimates are computed in Python; its arguments: see `Plant`."""
 
     def __init__(self, law: VehicleLaw, state: VehicleState, trail_length: int) -> None:
         self.state = state
-        self._law = law
+        self.law = law
         self._rings = empty_rings(law.multirotor)
         self._trail = [trail_row(state.body, state.position)] * trail_length
 
     def advance(self, command: ActuatorCommand, air: Air, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
-        self.state = advance(self._law, self._rings, self._trail, self.state, command, air, count)
+        self.state = advance(self.law, self._rings, self._trail, self.state, command, air, count)
         return outcome(self.state)
 
     def before(self, steps: int) -> TrailRow:
         """Row of the trail that many steps ago."""
         return self._trail[(self.state.steps - steps) % len(self._trail)]
 
+    def estimate(
+        self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
+    ) -> tuple[Estimate, Vector]:
+        """The autopilot's estimate now: see `sensors.estimate`."""
+        return estimate(law, state, self._trail, self.state.steps, time, noise)
 
-MakePlant = Callable[[VehicleLaw, VehicleState, int], Plant]
-"""Makes a vehicle from its constants, its state at the start, and the steps to remember."""
+    @staticmethod
+    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+        """Normal numbers in place of uniform ones: see `sensors.white_noise`."""
+        white_noise(uniform, deviations)
+        return uniform

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sitl_mock.config.sensors import EKFS
-from sitl_mock.physics.navigation_filter import NavigationFilter, Snapshot
+from sitl_mock.physics.navigation_filter import NavigationFilter, error_at
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings
 
@@ -21,7 +21,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def standing(_):
-    return Snapshot((0.0, 0.0, 0.0, *LEVEL), (0.0, 0.0, -5.0), (0.0, 0.0, 0.0))
+    return (0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, -5.0, 0.0, 0.0, 0.0)
 
 
 def circle(speed, w):
@@ -31,7 +31,7 @@ def circle(speed, w):
         c, s = cos(w * t), sin(w * t)
         place = (speed / w * s, -speed / w * (1.0 - c), -5.0)
         velocity = (speed * c, -speed * s, 0.0, *LEVEL)
-        return Snapshot(velocity, place, (-speed * w * s, -speed * w * c, 0.0))
+        return (*velocity, *place, -speed * w * s, -speed * w * c, 0.0)
 
     return at
 
@@ -41,7 +41,7 @@ def eight(size, w):
         c, s, c2, s2 = cos(w * t), sin(w * t), cos(2 * w * t), sin(2 * w * t)
         place = (size * s, 0.5 * size * s2, -5.0)
         velocity = (size * w * c, size * w * c2, 0.0, *LEVEL)
-        return Snapshot(velocity, place, (-size * w * w * s, -2 * size * w * w * s2, 0.0))
+        return (*velocity, *place, -size * w * w * s, -2 * size * w * w * s2, 0.0)
 
     return at
 
@@ -55,7 +55,7 @@ def errors(config, way, seconds, seed=1):
         now = step * DT
         if step >= late and navigation.is_due(now - late * DT):
             navigation.advance(way(now - late * DT), now - late * DT, now)
-        error = navigation.error(way(now), now)
+        error = error_at(navigation.law, navigation.state, way(now), now)
         rows.append((now, *error.position, *error.velocity, *error.rotation))
     return np.array(rows)[round(SETTLED_S / DT) :]
 
@@ -63,7 +63,7 @@ def errors(config, way, seconds, seed=1):
 def share(rows, column, way, axis, w):
     """Complex amplitude at w of an error, per that of the true speed along an axis."""
     t = rows[:, 0]
-    speed = np.array([way(each).motion[axis] for each in t])
+    speed = np.array([way(each)[axis] for each in t])
     waves = np.array([np.ones_like(t), np.cos(w * t), np.sin(w * t)]).T
     (_, ec, es), (_, vc, vs) = (
         np.linalg.lstsq(waves, x, rcond=None)[0] for x in (rows[:, column], speed)
@@ -80,9 +80,10 @@ def without_noise(name, yaw_deg):
             "tilt_noise_deg": 0.0,
             "yaw_time_s": 1e12,
             "yaw_error_deg": 1.0,
+            "compass_error_deg": 0.0,
         }
     )
-    drawn = NavigationFilter(config, standing(0.0), 1).error(standing(0.0), 0.0).rotation[2]
+    drawn = NavigationFilter(config, standing(0.0), 1).state.yaw
     return config.model_copy(update={"yaw_error_deg": yaw_deg / np.degrees(drawn)})
 
 
@@ -118,6 +119,21 @@ def test_a_turn_teaches_a_wrong_heading():
     assert abs(share(rows, 1, way, 0, 1.0) - (-0.0155 + 0.0040j)) < 0.0055
     rows = errors(quiet("ardupilot"), eight(3.1, 1.179), 60.0)
     assert abs(np.degrees(rows[:, 9]).mean()) < 0.3
+
+
+def test_after_a_calm_an_acceleration_corrects_the_heading():
+    """Measured on ArduPilot: from 0.75 to -0.5 degrees within a second, after 20 s of hover."""
+
+    def start(t):
+        flown = max(0.0, t - SETTLED_S - 5.0)
+        motion = (6.0 * flown, 0.0, 0.0, *LEVEL)
+        return (*motion, 3.0 * flown**2, 0.0, -5.0, 6.0 * (flown > 0.0), 0.0, 0.0)
+
+    heading = np.degrees(errors(quiet("ardupilot"), start, 7.0)[:, 9])
+    calm, a_second_later = heading[round(5.0 / DT)], heading[round(6.0 / DT)]
+    assert calm == pytest.approx(1.3 * (1.0 - np.exp(-2.25)), abs=0.02)
+    assert a_second_later < 0.4
+    assert np.abs(np.diff(heading)).max() < 0.1
 
 
 @pytest.mark.parametrize(("speed", "lower"), [(5.0, 0.050), (8.0, 0.154)])

@@ -12,7 +12,7 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.quaternion import yaw
-from sitl_mock.physics.sensors import WhiteNoise
+from sitl_mock.physics.sensors import white_noise
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 PERFECT = {
@@ -72,10 +72,11 @@ def test_delays_show_the_past():
     assert estimate.velocity_ned == history[-21].velocity_ned
 
 
-def test_the_white_noise_is_that_of_random_gauss_however_it_is_drawn():
-    noise, judge = WhiteNoise("3/sensors"), Random("3/sensors")
-    for count in (15, 15, 0, 1, 2, 3, 8):
-        assert noise.draw(count) == [judge.gauss(0.0, 1.0) for _ in range(count)]
+def test_the_white_noise_is_that_of_random_gauss():
+    uniform, judge = Random("3/sensors"), Random("3/sensors")
+    numbers, deviations = [uniform.random() for _ in range(30)], (0.0, 0.1, 2.0)
+    white_noise(numbers, deviations)
+    assert numbers == [judge.gauss(0.0, deviations[index % 3]) for index in range(30)]
 
 
 def test_noise_has_the_configured_spread():

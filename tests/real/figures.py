@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 
 import yaml
@@ -18,7 +19,7 @@ from tests.real.airframes import AIRFRAMES, Airframe
 from tests.real.flights import ESTIMATORS, PARTS, VARIANTS
 from tests.real.flown import Flying
 from tests.real.incidents import INCIDENTS
-from tests.real.mock_vehicle import MockVehicle
+from tests.real.mock_vehicle import MockInMemory
 from tests.real.vehicle import merged, real_vehicle
 
 VEHICLES = ("px4", "ardupilot", "mock-px4", "mock-ardupilot")
@@ -54,18 +55,35 @@ def fly(
     changes: dict | None = None,
     base: list[Path] | None = None,
     fifo: bool = False,
+    identified: Path | None = None,
+    until: float = inf,
 ) -> list[dict]:
-    """Fly on one vehicle without restarting it; rows are printed and kept in `folder`."""
+    """Fly on one vehicle without restarting it; rows are printed and kept in `folder`.
+
+    Args:
+        name: px4, ardupilot, mock-px4 or mock-ardupilot.
+        flights: names, each with `*TIMES` behind it or not.
+        folder: a new one.
+        airframe: which of `AIRFRAMES`.
+        start: more arguments of the autopilot's `start`.
+        changes: of the configuration, in all flights.
+        base: configurations above the one that ships.
+        fifo: autopilot before other programs of this computer.
+        identified: the file for flights `@identified` before the first `identify`.
+        until: no flight begins later, s of `time.monotonic`.
+    """
     folder = folder.resolve()
     folder.mkdir(parents=True)
     rows: list[dict] = []
     vehicle_flown = AIRFRAMES[airframe]
     told = ESTIMATORS[name.removeprefix("mock-")] if vehicle_flown.estimated else {}
     with simulation(name, folder, vehicle_flown, start or [], fifo) as vehicle:
-        flying = Flying(vehicle, merged(told, changes or {}), base or [])
+        flying = Flying(vehicle, merged(told, changes or {}), base or [], identified)
         for asked in flights:
             flight, _, times = asked.partition("*")
             for _ in range(int(times or 1)):
+                if time.monotonic() > until:
+                    break
                 for row in flying(flight, folder / f"{len(rows) + 1:02}-{flight}"):
                     rows.append({"vehicle": name, "airframe": airframe, **row})
                     print(json.dumps(rows[-1]), flush=True)
@@ -77,14 +95,10 @@ def fly(
 
 @contextmanager
 def simulation(name: str, folder: Path, airframe: Airframe, start: list[str], fifo: bool):
-    """A vehicle that flies: the mock in lockstep, or a real autopilot."""
+    """A vehicle that flies: the mock vehicle in memory, or a real autopilot."""
     autopilot = name.removeprefix("mock-")
     if name != autopilot:
-        mock = MockVehicle(autopilot, airframe.mock)
-        try:
-            yield mock
-        finally:
-            mock.close()
+        yield MockInMemory(autopilot, airframe.mock)
         return
     arguments = [*airframe.arguments(autopilot, folder), *start]
     with real_vehicle(

@@ -10,7 +10,7 @@ from companion.mavlink.tlog_file import messages
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
 from tests.real.measures import straightness, tracking_errors
-from tests.real.stamps import stamp_offset
+from tests.real.stamps import estimated, stamp_offset
 from tests.real.truth import Floats, NoTruthError
 from tests.real.vehicle import merged
 
@@ -25,13 +25,16 @@ class Flying:
         vehicle: a `Vehicle` or a `MockVehicle`.
         changes: of the configuration, in all flights.
         base: configurations above the one that ships.
+        identified: the file for flights `@identified` before the first `identify`.
     """
 
-    def __init__(self, vehicle, changes: dict, base: list[Path]) -> None:
+    def __init__(
+        self, vehicle, changes: dict, base: list[Path], identified: Path | None = None
+    ) -> None:
         self._vehicle = vehicle
         self._changes = changes
         self._base = [shipped(vehicle.autopilot), *base]
-        self._identified: Path | None = None
+        self._identified = identified
 
     def __call__(self, flight: str, folder: Path) -> Iterator[dict]:
         """Fly it; a row for it, or for each of a series."""
@@ -103,15 +106,18 @@ class Flying:
         offset = stamp_offset(_rows(log / "rates.csv"), log / "flight.tlog")
         tracking[:, 0] += offset
         truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
+        if truth is not None:
+            np.savez_compressed(log / "truth.npz", **truth._asdict())
         out: dict = {"reported": result["tracking"]}
         if (log / "response.csv").exists():
             response = _rows(log / "response.csv")
             response[:, 0] += offset
-            found = straightness(response, truth, result["gain_per_s"])
+            told = estimated(response[:, 0], log / "flight.tlog")
+            found = straightness(response, told, truth, result["gain_per_s"])
             if found is not None:
-                told = result["response"]
-                out["cross_axis"] = {"reported": told["cross_axis_max"], **found}
-                out["time_constant_s"] = told["time_constant_s"]
+                reported = result["response"]
+                out["cross_axis"] = {"reported": reported["cross_axis_max"], **found}
+                out["time_constant_s"] = reported["time_constant_s"]
         errors = tracking_errors(tracking, positions(log / "flight.tlog"), truth)
         moving = [part for part in named(name).parts if PARTS[part].maneuvers in MOVING]
         out["tracking"] = dict(zip(moving, errors["moving"], strict=False))

@@ -34,22 +34,28 @@ _SHORTEST = 1.0
 """A part that lasts less is not measured, s."""
 
 
-def straightness(response: Floats, truth: Truth | None, gain: float) -> dict[str, float] | None:
+def straightness(
+    response: Floats, estimated: Floats, truth: Truth | None, gain: float
+) -> dict[str, float] | None:
     """Cross-axis of the steps by telemetry and by truth; None where none was flown.
 
     Args:
-        response: (n, 7), rows of `FlightTrace.response`.
+        response: (n, 7), rows of `FlightTrace.response`, whose attitudes leave out what the
+            estimator corrected of its heading during the steps.
+        estimated: (n, 4), the attitudes at those times as telemetry told them.
         truth: of that flight, or None where there is none to be had.
         gain: p, 1/s.
     """
-    told = measure_response(response, gain)
+    rows = response.copy()
+    rows[:, 1:5] = estimated
+    told = measure_response(rows, gain)
     if told is None:
         return None
     if truth is None:
         return {"telemetry": told.cross_axis_max}
     q = true_attitudes(response, truth)
-    turn = mean_angle([heading(a) - heading(b) for a, b in zip(response[:, 1:5], q, strict=True)])
-    rows = response.copy()
+    turn = mean_angle(_headings_apart(response[:, 1:5], q))
+    wander = np.unwrap(_headings_apart(estimated, q))
     rows[:, 1:5] = turned(q, turn)
     true = measure_response(rows, gain)
     assert true is not None
@@ -58,8 +64,14 @@ def straightness(response: Floats, truth: Truth | None, gain: float) -> dict[str
         "truth": true.cross_axis_max,
         "heading_deg": degrees(heading(tuple(response[0, 1:5]))),
         "heading_off_deg": degrees(turn),
+        "heading_wander_deg": degrees(float(np.ptp(wander))),
         "attitude_late_ms": 1e3 * attitude_lateness(response, truth),
     }
+
+
+def _headings_apart(left: Floats, right: Floats) -> list[float]:
+    """Differences of the headings of attitudes, row by row, rad."""
+    return [heading(tuple(a)) - heading(tuple(b)) for a, b in zip(left, right, strict=True)]
 
 
 def true_attitudes(response: Floats, truth: Truth) -> Floats:

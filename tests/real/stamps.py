@@ -40,5 +40,20 @@ def stamp_offset(rates: Floats, log: Path) -> float:
     return offset
 
 
+def estimated(time: Floats, log: Path) -> Floats:
+    """(n, 4), the attitudes that telemetry told at these stamps, s: the samples themselves."""
+    rows = np.array(
+        [
+            (m.time_boot_ms / 1e3, m.q1, m.q2, m.q3, m.q4)
+            for _, m in messages(log, {"ATTITUDE_QUATERNION"})
+        ]
+    )
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    after = np.clip(np.searchsorted(rows[:, 0], time), 1, len(rows) - 1)
+    before_is_nearer = time - rows[after - 1, 0] < rows[after, 0] - time
+    nearest: Floats = rows[after - before_is_nearer, 1:]
+    return nearest / np.linalg.norm(nearest, axis=1, keepdims=True)
+
+
 def _key(*rates: float) -> bytes:
     return np.array(rates, dtype=np.float32).tobytes()

@@ -14,7 +14,18 @@ from pathlib import Path
 from statistics import median
 
 _SAID = ("reported", "telemetry", "truth", "along", "across", "height", "estimator")
-_HEAD = ("vehicle", "flight", "planner", *_SAID, "late, ms", "flown", "load", "mock", "ratio")
+_HEAD = (
+    "vehicle",
+    "flight",
+    "planner",
+    *_SAID,
+    "wander, °",
+    "late, ms",
+    "flown",
+    "load",
+    "mock",
+    "ratio",
+)
 STRAIGHT, TRACKING = "Straightness: largest distance from the line of a step", "Tracking: RMS, m"
 
 
@@ -66,7 +77,8 @@ def straightness(row: dict) -> dict[str, dict]:
     cross = row.get("cross_axis")
     if cross is None:
         return {}
-    return {_name(row): {**cross, "late": cross.get("attitude_late_ms")}}
+    measured = {"late": cross.get("attitude_late_ms"), "wander": cross.get("heading_wander_deg")}
+    return {_name(row): {**cross, **measured}}
 
 
 def tracking(row: dict) -> dict[str, dict]:
@@ -92,20 +104,25 @@ def _figures(rows: list[dict], title: str, figures) -> str:
         for name, values in figures(row).items():
             key = (_vehicle(row), name, row.get("planner", ""))
             kinds.setdefault(key, []).append({**values, "load": _load(row)})
-    lines = [
-        _line(key, flown, kinds.get((f"mock-{key[0]}", *key[1:]))) for key, flown in kinds.items()
-    ]
+    lines = [_line(key, flown, _mocks(kinds, key)) for key, flown in sorted(kinds.items())]
     if not lines:
         return ""
     filled = [k for k in range(len(_HEAD)) if any(line[k] for line in lines)]  # no empty columns
     return _table(title, [_HEAD[k] for k in filled], [[line[k] for k in filled] for line in lines])
 
 
-def _line(key: tuple[str, str, str], flown: list[dict], mocks: list[dict] | None) -> list[str]:
+def _mocks(kinds: dict[tuple[str, str, str], list[dict]], key: tuple[str, str, str]) -> list[dict]:
+    """The same flights on the mock vehicle, whose rate loop is known without `identify`."""
+    vehicle, name, planner = key
+    return kinds.get((f"mock-{vehicle}", name.removesuffix("@identified"), planner), [])
+
+
+def _line(key: tuple[str, str, str], flown: list[dict], mocks: list[dict]) -> list[str]:
     loads = [each["load"] for each in flown]
     cells = [*key, *(_text(_median(flown, name), 4) for name in _SAID)]
+    cells += [_text(_median(flown, "wander"), 2)]
     cells += [_text(_median(flown, "late"), 1), str(len(flown)), f"{min(loads)}-{max(loads)}"]
-    mock, real = _median(mocks or [], "truth"), _median(flown, "truth")
+    mock, real = _median(mocks, "truth"), _median(flown, "truth")
     ratio = real / mock if mock and real is not None else None
     return [*cells, _text(mock, 4), _text(ratio, 2)]
 
@@ -136,7 +153,7 @@ def _incidents(rows: list[dict]) -> str:
     lines = [
         [
             _vehicle(row),
-            row["flight"],
+            row.get("ends_by", row["flight"]),
             row.get("result") or "",
             _text(row.get("last_setpoint_s"), 3),
             ", ".join(f"{mode} {at}" for at, mode in row.get("modes", [])),
@@ -144,7 +161,7 @@ def _incidents(rows: list[dict]) -> str:
             str(_load(row)),
         ]
         for row in rows
-        if row["flight"] in ("kill", "takeover")
+        if row.get("ends_by", row["flight"]) in ("kill", "takeover")
     ]
     head = (
         "vehicle",

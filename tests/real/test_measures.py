@@ -131,7 +131,7 @@ def step_rows(*, bent, turn=0.0, every=0.004, late=0.0):
 def test_the_distance_from_the_line_is_that_of_the_true_attitude(every):
     told, _ = step_rows(bent=0.0)
     _, truth = step_rows(bent=0.03, turn=0.05, every=every)
-    figures = straightness(told, truth, 4.0)
+    figures = straightness(told, told[:, 1:5], truth, 4.0)
     assert figures["telemetry"] < 0.001
     # The target is reached up to exp(-8), so the line is that of the step.
     assert figures["truth"] == pytest.approx(0.03, abs=0.0015)
@@ -140,4 +140,6 @@ def test_the_distance_from_the_line_is_that_of_the_true_attitude(every):
 
 def test_late_telemetry_is_told():
     rows, truth = step_rows(bent=0.01, late=0.006)
-    assert straightness(rows, truth, 4.0)["attitude_late_ms"] == pytest.approx(6.0, abs=0.2)
+    assert straightness(rows, rows[:, 1:5], truth, 4.0)["attitude_late_ms"] == pytest.approx(
+        6.0, abs=0.2
+    )

@@ -1,0 +1,60 @@
+"""The frame of open-loop steps, in which the estimator's heading corrections are left out.
+
+A step shall be a straight line in the world. An estimator corrects its heading most when the
+vehicle accelerates after a hover: by 1.3° within the first step on ArduCopter's simulator, which
+bends that line by 0.015. The body rates show that the vehicle did not turn. So while steps are
+flown, the planner sees an attitude without the heading changes that body rates do not explain.
+
+In closed loop, guidance computes each acceleration in the estimator's frame. There the target is
+turned with the attitude, so the acceleration stays as guidance asked, and the turn decays.
+"""
+
+from math import exp, radians
+
+from companion.attitude import Quaternion, Target
+from companion.attitude.representation import wrap_angle
+from companion.attitude.rotation import clamp, turned_about_vertical
+from companion.guidance.reference import rotated
+
+_LARGEST = radians(3.0)
+"""Largest turn of the frame, rad: it limits what a wrong gyro can do."""
+_DECAY_S = 2.0
+"""Time constant with which the turn decays after the steps, s."""
+
+
+class StepFrame:
+    """Keeps the turn between the estimator's frame and the frame of the steps.
+
+    Attributes:
+        turn: heading in the estimator's frame minus heading in this frame, rad.
+    """
+
+    def __init__(self) -> None:
+        self.turn = 0.0
+        self._zero = 0.0
+
+    def advance(self, corrections: float, dt: float, *, stepping: bool) -> None:
+        """Follow the estimator's corrections during steps; let the turn decay otherwise.
+
+        Args:
+            corrections: sum of all heading changes that body rates do not explain, rad.
+            dt: time since the last call, s.
+            stepping: whether an open-loop step is flown.
+        """
+        if stepping:
+            self.turn = clamp(corrections - self._zero, _LARGEST)
+        else:
+            self.turn *= exp(-dt / _DECAY_S)
+            self._zero = corrections - self.turn
+
+    def attitude(self, q: Quaternion) -> Quaternion:
+        """An attitude of the estimator's frame in this frame."""
+        return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
+
+    def target(self, target: Target) -> Target:
+        """A target of the estimator's frame in this frame; targets of steps are in it already."""
+        if self.turn == 0.0:
+            return target
+        north, east = rotated(target.north, target.east, -self.turn)
+        heading = wrap_angle(target.heading - self.turn)
+        return target._replace(north=north, east=east, heading=heading)

@@ -1,0 +1,92 @@
+"""Open-loop steps keep their line while the estimator corrects its heading."""
+
+from math import exp, radians
+
+import pytest
+
+from companion.attitude import BodyRates, Target, attitude, coefficients, heading
+from companion.attitude.rotation import turned_about_vertical
+from companion.attitude.types import Coefficients
+from companion.control.estimator_resets import EstimatorResets
+from companion.control.planner_runner import PlannerRunner
+from companion.vehicle.records import AttitudeSample
+
+DT = 0.004
+STILL = BodyRates(0.0, 0.0, 0.0)
+TRUE = attitude(Coefficients(0.3, 0.4), 0.2)
+TARGET = Target(0.4, 0.5, 0.2)
+
+
+class Seeing:
+    """A planner that keeps what it is shown."""
+
+    def reset(self, q, body_rates=None):
+        pass
+
+    def rates(self, q, target, dt, body_rates=None):
+        self.q, self.target = q, target
+        return STILL
+
+
+class Vehicle:
+    """It hangs still, and its estimator's heading error changes."""
+
+    def __init__(self):
+        self.resets, self.planner = EstimatorResets(), Seeing()
+        self.runner = PlannerRunner(self.planner, self.resets)
+        self.error, self.time = 0.0, 5.0
+
+    def fly(self, seconds, rate_deg_s=0.0, *, is_step, dt=DT):
+        for _ in range(round(seconds / dt)):
+            self.error += radians(rate_deg_s) * dt
+            self.time += dt
+            q = turned_about_vertical(TRUE, self.error)
+            sample = AttitudeSample(0, self.time, self.time, 0, q, STILL)
+            self.resets.on_attitude(sample)
+            self.runner.rates(sample, TARGET, dt, is_step=is_step)
+        return self.planner
+
+
+def test_a_corrected_heading_does_not_turn_the_line_of_a_step():
+    vehicle = Vehicle()
+    vehicle.fly(2.0, 0.3, is_step=False)
+    before = vehicle.fly(DT, is_step=True).q
+    seen = vehicle.fly(0.5, -2.6, is_step=True)
+    assert seen.q == pytest.approx(before, abs=1e-9)
+    assert seen.target is TARGET
+
+
+def test_it_follows_at_most_three_degrees_and_does_not_trust_samples_far_apart():
+    vehicle = Vehicle()
+    vehicle.fly(DT, is_step=True)
+    seen = vehicle.fly(2.0, 4.0, is_step=True)
+    assert heading(seen.q) == pytest.approx(0.2 + radians(5.0), abs=1e-3)
+    rare = Vehicle()
+    rare.fly(0.03, is_step=True, dt=0.03)
+    seen = rare.fly(0.9, 2.0, is_step=True, dt=0.03)
+    assert heading(seen.q) == pytest.approx(0.2 + radians(1.8), abs=1e-6)
+
+
+def test_after_steps_the_turn_decays_and_guidance_gets_the_acceleration_it_asked_for():
+    vehicle = Vehicle()
+    vehicle.fly(DT, is_step=True)
+    vehicle.fly(0.5, 4.0, is_step=True)
+    seen = vehicle.fly(DT, is_step=False)
+    turn = heading(vehicle.runner._resets.attitude(turned_about_vertical(TRUE, vehicle.error)))
+    turn -= heading(seen.q)
+    assert turn == pytest.approx(radians(2.0), abs=1e-3)
+    # Target and attitude are turned alike: seen from the estimator's frame nothing has changed.
+    goal = turned_about_vertical(attitude(seen.target[:2], seen.target.heading), turn)
+    assert coefficients(goal) == pytest.approx((0.4, 0.5), abs=1e-9)
+    assert heading(goal) == pytest.approx(0.2, abs=1e-9)
+    later = vehicle.fly(4.0, is_step=False)
+    left = 0.2 + vehicle.error - heading(later.q)
+    assert left == pytest.approx(turn * exp(-2.0), rel=0.01)
+
+
+def test_a_new_step_begins_where_the_old_ones_left_the_frame():
+    vehicle = Vehicle()
+    vehicle.fly(DT, is_step=True)
+    vehicle.fly(0.5, 4.0, is_step=True)
+    before = vehicle.fly(0.5, is_step=False).q
+    assert vehicle.fly(DT, is_step=True).q == pytest.approx(before, abs=1e-4)
