@@ -18,7 +18,7 @@ from companion.recording.recorded_summary import summary_of
 from tests.flight.fly import fly, mock_vehicle
 
 TOLD = struct.Struct("<dd")
-LASTS = 14.0
+LASTS = 10.0
 """At least this long lasts the flight, s of vehicle time."""
 SLOWED_S = 0.04
 """The child sleeps so long at each status, so that a second of our time is a part of the flight."""
