@@ -66,7 +66,7 @@ class GuidanceConfig(Section):
     """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
     disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T."""
+    null: 1.5/T; with a quick rate loop and smooth positions up to 2.4/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
     that is set wrong. Measure it against an independent position."""

@@ -81,7 +81,7 @@ class MotionEstimate:
             position.vehicle_time, VehicleMotion(position.position_ned, position.velocity_ned)
         )
         known = self._known(slope, measured)
-        self._observer.observe(position.vehicle_time, measured, known)
+        self._observer.observe(position.vehicle_time, measured, known, self._correction.smoothness)
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 

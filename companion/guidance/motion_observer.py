@@ -18,12 +18,14 @@ class ObserverSettings:
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
         largest: largest disturbance, m/s².
+        sharpening: relative increase of the bandwidth with smooth positions.
     """
 
     bandwidth: float
     position_time: float
     position_pull: float
     largest: float
+    sharpening: float = 0.0
 
 
 class MotionObserver:
@@ -48,13 +50,16 @@ class MotionObserver:
         self._motion = None
         self.disturbance = (0.0, 0.0)
 
-    def observe(self, time: float, measured: VehicleMotion, known: Horizontal) -> None:
+    def observe(
+        self, time: float, measured: VehicleMotion, known: Horizontal, smoothness: float = 0.0
+    ) -> None:
         """Take a measured position and velocity.
 
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
             known: horizontal acceleration by thrust and drag since the last measurement, m/s².
+            smoothness: 1 if the positions are smooth, 0 if they are noisy.
         """
         motion, dt = self._motion, time - self._time
         self._time = time
@@ -62,8 +67,9 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        velocity_gain = 1.0 - exp(-2.0 * settings.bandwidth * dt)
-        disturbance_gain = (1.0 - exp(-settings.bandwidth * dt)) ** 2 / dt
+        bandwidth = (1.0 + smoothness * settings.sharpening) * settings.bandwidth
+        velocity_gain = 1.0 - exp(-2.0 * bandwidth * dt)
+        disturbance_gain = (1.0 - exp(-bandwidth * dt)) ** 2 / dt
         position_gain = 1.0
         if settings.position_time > 0.0:
             position_gain = 1.0 - exp(-dt / settings.position_time)

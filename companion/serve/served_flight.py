@@ -58,6 +58,7 @@ class ServedFlight:
         observer: is told of phases and events.
         environment: of the flight.
         records: makes the record of the flight.
+        from_ground: whether the vehicle stands armed, and takes off first.
     """
 
     def __init__(
@@ -70,6 +71,8 @@ class ServedFlight:
         observer: Observer,
         environment: Environment,
         records: FlightRecords,
+        *,
+        from_ground: bool = False,
     ) -> None:
         self.let_go = False
         self._records, self._record = records, records.new()
@@ -87,7 +90,7 @@ class ServedFlight:
             self._recorder,
             decline_landing,
             self._record.folder,
-            TakeoverPlan(self._source),
+            TakeoverPlan(self._source, from_ground=from_ground),
             environment,
         )
         self._source.resets = self._assembled.context.loop.resets

@@ -196,10 +196,7 @@ class NavigationFilter:
         self.state = FilterState(level, upright, yaw, turned, compass, sag, at, now, way, speed)
 
     def _turned(self, speed: complex, pull: complex) -> float:
-        """Return the next heading error without that of the compass.
-
-        It is coloured noise about a mean that follows the turn rate.
-        """
+        """Return the next heading error, apart from the compass's: noise that follows turns."""
         config, decay, state = self._config, self._yaw_decay, self.state
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
@@ -210,12 +207,8 @@ class NavigationFilter:
     def _rested_on_compass(self, pull: float, elapsed: float) -> float:
         """Return the next heading error that comes from the compass, rad.
 
-        Without acceleration only the compass tells the heading. An acceleration shows the true
-        heading, because the fixes measure its direction.
-
-        Args:
-            pull: horizontal acceleration, m/s^2.
-            elapsed: time since the last fix, s.
+        Only a horizontal acceleration (``pull``, m/s^2) shows the true heading, because the fixes
+        measure its direction.
         """
         slow = 1.0 / _COMPASS_S
         rate = slow + _SHOWN * pull**2
