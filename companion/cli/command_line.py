@@ -81,6 +81,7 @@ def _add_flights(commands: Commands) -> None:
             action="store_true",
             help="slow a trajectory down that the limits do not allow, instead of refusing it",
         )
+        tool_options.add_live(command)
         _add_flight_options(command)
 
 
@@ -150,7 +151,9 @@ def _add_identify(commands: Commands) -> None:
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
-    command.set_defaults(run="identify.identify", trajectory=None, slow_down=False)
+    command.set_defaults(
+        run="identify.identify", trajectory=None, slow_down=False, watch=False, live=None
+    )
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
