@@ -96,6 +96,7 @@ class ControlLoop:
             TypeError: the planner is of another package and cannot change them.
         """
         self.planner.retune(constants)
+        self._rows = SampleRows(limits, self._hover_thrust.limits)
         self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
