@@ -45,6 +45,10 @@ class MotionObserver:
         self._motion: VehicleMotion | None = None
         self._time = 0.0
 
+    def retune(self, settings: ObserverSettings) -> None:
+        """Use other settings from the next measurement on; the estimate continues."""
+        self._settings = settings
+
     def reset(self) -> None:
         """Start again: offboard control was not active, or the estimate jumped."""
         self._motion = None
