@@ -205,7 +205,7 @@ def test_on_the_ground_ardupilot_s_setpoints_are_refused_in_words():
     async def whole():
         async with serving(vehicle, "ardupilot") as session:
             script = MemoryClient().connect(session)
-            await asyncio.sleep(50.0)
+            await asyncio.sleep(6.0)
             script.command(176, 1, 4)
             await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
             assert "take off first" in " ".join(script.texts())
