@@ -73,6 +73,7 @@ class ModelFollowingPlanner:
         self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self._plans)
         self._still = 0.0
         self._started = False
+        self.planned: PlannedTilt | None = None
         self.retune(constants)
 
     def retune(self, constants: Constants) -> None:
@@ -165,6 +166,7 @@ class ModelFollowingPlanner:
         plausible = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:
             self._started = False
+            self.planned = None
             return BodyRates(*first_order(q, target, dt, constants))
         if not self._started:
             self._start(q, plausible)
@@ -174,6 +176,7 @@ class ModelFollowingPlanner:
         self._hold.take(dt)
         dt = self._hold.step
         by_tilt, by_yaw = self._plans.in_effect(self._hold.late)
+        self.planned = by_tilt
         north_speed, east_speed, turn = self._feedback(by_tilt, by_yaw, north, east, heading)
         more_roll, more_pitch, more_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed

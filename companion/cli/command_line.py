@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from companion.cli import tool_options
+from companion.cli.recording_options import add_recordings
 from companion.cli.tool_options import Commands, number
 
 _PACKAGE = "mavlink-companion"
@@ -46,6 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
+    add_recordings(commands)
     tool_options.add_config(commands)
     return parser
 

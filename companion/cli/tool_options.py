@@ -161,7 +161,7 @@ def add_tools(commands: Commands) -> None:
     plot = commands.add_parser("plot", help="draw a recorded flight (extra `plot`)")
     plot.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     plot.add_argument("--out", type=Path, metavar="FILE", help="default: FOLDER/flight.png")
-    plot.set_defaults(run="tools.plot")
+    plot.set_defaults(run="recordings.plot")
 
 
 def add_config(commands: Commands) -> None:

@@ -1,4 +1,4 @@
-"""The commands that do not fly: `bench`, `study`, `plot`."""
+"""The commands that do not fly: `bench` and `study`."""
 
 import argparse
 import json
@@ -7,7 +7,6 @@ from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.files.yaml_file import ConfigError
-from companion.recording.figure import draw_flight
 from companion.study import registry
 
 
@@ -70,12 +69,4 @@ def study(options: argparse.Namespace) -> int:
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:
         print(json.dumps(rows, allow_nan=False))
-    return EXIT_OK
-
-
-def plot(options: argparse.Namespace) -> int:
-    """Draw a recorded flight."""
-    out = options.out or options.folder / "flight.png"
-    draw_flight(options.folder, out)
-    print(out)
     return EXIT_OK

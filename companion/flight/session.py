@@ -10,7 +10,7 @@ from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.flight_record import FlightRecord
+from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
@@ -77,7 +77,7 @@ class Session:
             self._assembled.flight.note(text)
 
     async def fly(self) -> Summary:
-        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
+        """Fly, and write the folder: `config.yaml`, `flight.tlog`, `flight.mcap`, `summary.json`.
 
         `companion fly --config FOLDER/config.yaml` flies the same again, from any working folder.
 
@@ -90,7 +90,7 @@ class Session:
         # This takes up to a second, during which an open link would not be read.
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         environment = self._environment
-        record = FlightRecord(
+        record = FlightFiles(
             self._config, self._folder, environment, self.note, follows=self._plan is None
         )
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()

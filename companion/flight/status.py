@@ -11,6 +11,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
+from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
@@ -122,6 +123,7 @@ class StatusReporter:
         self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
         self._counted: deque[tuple[float, int]] = deque()
+        self._rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
         """Record and show until cancelled; steps that came too late are left out."""
@@ -139,6 +141,7 @@ class StatusReporter:
         if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
             self.takeoff = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
+        self._rows.record(now)
         speed, tilt = self._speed(), self._tilt()
         vehicle_time = context.loop.record.last_vehicle_time
         row = (
@@ -148,7 +151,8 @@ class StatusReporter:
             None if tilt is None else degrees(tilt),
             self._error(),
         )
-        self._trace.add_motion((now - self._began, *(nan if one is None else one for one in row)))
+        known = (nan if one is None else one for one in row)
+        self._trace.add_motion(now, (now - self._began, *known))
 
     def status(self) -> FlightStatus:
         """The state now."""
