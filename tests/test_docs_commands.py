@@ -34,7 +34,7 @@ from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
 
 RECORDED = "flights/2026-11-22T10-54-16Z"
 FLYING = {"demo", "fly", "identify"}
-FOR_LONG = {"bench", "study", "doctor", "serve"}  # or a vehicle; test_docs.py reads them
+FOR_LONG = {"bench", "study", "doctor", "serve", "tune"}  # or a vehicle; test_docs.py reads them
 SOFTWARE = ("make px4_sitl", "sim_vehicle.py")  # of the autopilots, not in this repository
 
 

@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_serve(commands)
     _add_doctor(commands)
     _add_identify(commands)
+    tool_options.add_tune(commands)
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)

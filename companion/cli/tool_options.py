@@ -45,6 +45,36 @@ def add_serve(commands: Commands) -> None:
     serve.set_defaults(run="serve.serve")
 
 
+def add_tune(commands: Commands) -> None:
+    """Add `tune`."""
+    tune = commands.add_parser(
+        "tune",
+        help="propose gain, weights and bandwidth for an identified vehicle",
+        description="Compute stability margins, settling, rate use and tracking error of the whole "
+        "control loop by linear analysis, search the values with the smallest error within the "
+        "margins, fly them on the mock vehicle, and write them as YAML with their reasons.",
+    )
+    tune.add_argument(
+        "vehicle",
+        type=Path,
+        metavar="PATH",
+        help="file or flight folder that `companion identify` wrote",
+    )
+    tune.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="the configuration to tune; default: that of the flight, or the defaults",
+    )
+    tune.add_argument(
+        "--output", type=Path, metavar="FILE", help="default: tuned.yaml beside the vehicle file"
+    )
+    tune.add_argument("--force", action="store_true", help="replace FILE if it exists")
+    tune.add_argument("--no-flights", action="store_true", help="do not fly it on the mock vehicle")
+    tune.add_argument("--json", action="store_true", help="end with one line of JSON")
+    tune.set_defaults(run="tune.tune")
+
+
 def add_live(command: argparse.ArgumentParser) -> None:
     """Add `--watch` and `--live`."""
     command.add_argument(
