@@ -21,14 +21,14 @@ async def main(address: str) -> None:
     await drone.action.arm()
     await drone.action.takeoff()
     async for position in drone.telemetry.position():
-        if position.relative_altitude_m > 4.6:
+        if position.relative_altitude_m > 2.2:
             break
     await asyncio.sleep(3.0)
     await drone.offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, 0.0))
     await drone.offboard.start()
     await drone.offboard.set_velocity_ned(VelocityNedYaw(1.5, 0.0, 0.0, 0.0))
     await asyncio.sleep(4.0)
-    await drone.offboard.set_position_ned(PositionNedYaw(2.0, 3.0, -5.0, 90.0))
+    await drone.offboard.set_position_ned(PositionNedYaw(2.0, 3.0, -3.0, 90.0))
     await asyncio.sleep(8.0)
     async for now in drone.telemetry.position_velocity_ned():
         print(f"north {now.position.north_m:.2f} m, east {now.position.east_m:.2f} m")

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from companion import testing
+from tests.flight.fly import QuickVehicle
 from tests.serve.serving import free_ports, mock, serving
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -42,14 +44,17 @@ def as_users_do(folder: Path, program: str, *arguments: str) -> str:
 
 
 def output(folder: Path, program: str) -> str:
-    """Standard output of one example, run in this process: the imports cost more than the rest."""
-    said, arguments, path = io.StringIO(), sys.argv, sys.path[:]
-    sys.argv, sys.path[0] = [program], str(EXAMPLES)
-    try:
-        with contextlib.chdir(folder), contextlib.redirect_stdout(said):
+    """Standard output of one example, run in this process: the imports cost more than the rest.
+
+    Its vehicle boots, climbs and lands quickly: that is most of the time of most examples.
+    """
+    said = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, contextlib.chdir(folder):
+        patch.setattr(sys, "argv", [program])
+        patch.setattr(sys, "path", [str(EXAMPLES), *sys.path[1:]])
+        patch.setattr(testing, "MockVehicle", QuickVehicle)
+        with contextlib.redirect_stdout(said):
             runpy.run_path(str(EXAMPLES / program), run_name="__main__")
-    finally:
-        sys.argv, sys.path[:] = arguments, path
     return said.getvalue()
 
 

@@ -6,9 +6,10 @@ from typing import NoReturn
 
 from companion.attitude import Target
 from companion.config import Config
-from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.control_loop import ControlLoop
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
+from companion.control.loop_record import Deadlines
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings
 from companion.recording.trace import FlightTrace

@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from companion.cli import tool_options
+from companion.cli.recording_options import add_recordings
 from companion.cli.tool_options import Commands, number
 
 _PACKAGE = "mavlink-companion"
@@ -42,9 +43,11 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_serve(commands)
     _add_doctor(commands)
     _add_identify(commands)
+    tool_options.add_tune(commands)
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
+    add_recordings(commands)
     tool_options.add_config(commands)
     return parser
 
@@ -79,6 +82,7 @@ def _add_flights(commands: Commands) -> None:
             action="store_true",
             help="slow a trajectory down that the limits do not allow, instead of refusing it",
         )
+        tool_options.add_live(command)
         _add_flight_options(command)
 
 
@@ -148,7 +152,9 @@ def _add_identify(commands: Commands) -> None:
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
-    command.set_defaults(run="identify.identify", trajectory=None, slow_down=False)
+    command.set_defaults(
+        run="identify.identify", trajectory=None, slow_down=False, watch=False, live=None
+    )
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:

@@ -15,6 +15,7 @@ from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.figure import FigureError
+from companion.recording.flight_record import RecordError
 
 _USAGE = (
     ConfigError,
@@ -23,6 +24,7 @@ _USAGE = (
     LogError,
     MissingExtraError,
     RealtimeError,
+    RecordError,
     SigningError,
 )
 """The command line or the configuration is wrong."""

@@ -1,4 +1,4 @@
-"""The commands that do not fly: `bench`, `study`, `plot`."""
+"""The commands that do not fly: `bench` and `study`."""
 
 import argparse
 import json
@@ -7,7 +7,6 @@ from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
 from companion.files.yaml_file import ConfigError
-from companion.recording.figure import draw_flight
 from companion.study import registry
 
 
@@ -45,7 +44,7 @@ def bench_flight(options: argparse.Namespace) -> int:
     """Measure how quickly one core flies."""
     from companion.bench import flight  # noqa: PLC0415  no other command needs it
 
-    figures = flight.run(options.seconds, options.json)
+    figures = flight.run(options.seconds, options.json, profile=options.profile)
     if options.json:
         print(json.dumps(figures))
     return EXIT_OK
@@ -70,12 +69,4 @@ def study(options: argparse.Namespace) -> int:
     console.print(f"Open {page}", soft_wrap=True, highlight=False)
     if options.json:
         print(json.dumps(rows, allow_nan=False))
-    return EXIT_OK
-
-
-def plot(options: argparse.Namespace) -> int:
-    """Draw a recorded flight."""
-    out = options.out or options.folder / "flight.png"
-    draw_flight(options.folder, out)
-    print(out)
     return EXIT_OK

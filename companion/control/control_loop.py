@@ -4,13 +4,13 @@ Read `ControlLoop` from `on_sample` downwards: its functions are in the order in
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf, nan
 from time import perf_counter_ns
 
 from companion.attitude import (
     AttitudeError,
     BodyRates,
+    Constants,
     InvalidQuaternionError,
     Limits,
     Planner,
@@ -19,33 +19,19 @@ from companion.attitude import (
 from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import LoopRecord, Unanswered
+from companion.control.loop_record import Deadlines, LoopRecord, Unanswered
 from companion.control.planner_runner import PlannerRunner
+from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
 from companion.guidance import HoverThrust
 from companion.mavlink.errors import InvalidSetpoint
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock_jumps import Misfit
-from companion.vehicle.records import AttitudeSample
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends the sample's time_boot_ms, body rates and thrust; False if the link does not accept it."""
 
 _MISFITS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
-
-
-@dataclass(frozen=True, slots=True)
-class Deadlines:
-    """When data are too old, and when a setpoint is too late; s.
-
-    Attributes:
-        telemetry_stale: greatest age of a sample that is answered.
-        target_stale: greatest age of a command from guidance.
-        deadline: longest time from a sample's arrival to its setpoint; a longer one is counted.
-    """
-
-    telemetry_stale: float
-    target_stale: float
-    deadline: float
 
 
 class ControlLoop:
@@ -97,9 +83,42 @@ class ControlLoop:
         self._deadlines = deadlines
         self._trace = trace
         self._limits = limits
+        self._rows = SampleRows(limits, hover_thrust.limits)
+        self._checked = nan
+        self._sent: Answer | None = None
+        if trace.recorder is not None:
+            self.planner.on_attitude_target = self._record_attitude_target
+
+    def retune(self, constants: Constants, limits: Limits) -> None:
+        """Use other gains and limits from the next sample on.
+
+        Raises:
+            TypeError: the planner is of another package and cannot change them.
+        """
+        self.planner.retune(constants)
+        self._rows = SampleRows(limits, self._hover_thrust.limits)
+        self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. The link calls this when the datagram arrives."""
+        recorder = self._trace.recorder
+        if recorder is None:
+            self._take(sample)
+            return
+        flags = LoopFlags(
+            self.on,
+            self.taking_over,
+            self.offboard_active,
+            self.awaiting_mode,
+            self.is_same_vehicle(),
+        )
+        self._checked, self._sent = nan, None
+        self._take(sample)
+        reason = self.record.reason if flags.on else None
+        entry = SampleEntry(sample, reason, flags, self._checked, self._sent)
+        recorder.add(sample.received, self._rows.sample, entry)
+
+    def _take(self, sample: AttitudeSample) -> None:
         if sample.misfit is None and self.resets.on_attitude(sample):
             self.planner.restart()
         record = self.record
@@ -145,7 +164,8 @@ class ControlLoop:
         try:
             rates, thrust = self._answer(sample, command, period)
             # This process may have been stopped since the sample came.
-            if sample.age + self._clock() - sample.received > self._deadlines.telemetry_stale:
+            now = self._checked = self._clock()
+            if sample.age + now - sample.received > self._deadlines.telemetry_stale:
                 return Unanswered.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):
                 return Unanswered.NOT_SENT
@@ -198,6 +218,11 @@ class ControlLoop:
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
         self._trace.add_latency(latency)
+        if self._trace.recorder is not None:
+            planned = not command.idle and command.body_rates is None
+            asked, plan = (self.planner.asked, self.planner.planned) if planned else (None, None)
+            flags = command.is_step, command.idle
+            self._sent = Answer(rates, thrust, latency, asked, plan, *flags)
         if self.offboard_active:
             self._hover_thrust.sent(thrust, sample.q)
             self._trace.add_rates(
@@ -211,6 +236,22 @@ class ControlLoop:
         if command.is_step:
             q = self.planner.attitude(sample.q)
             self._trace.add_response(sample.vehicle_time, q, command.target)
+
+    def drop_command(self) -> None:
+        """Drop the newest command, so that nothing is sent until guidance makes another one."""
+        self.command = None
+        if self._trace.recorder is not None:
+            self._trace.recorder.action(self._clock(), "drop_command")
+
+    def restart_planner(self) -> None:
+        """Reset the planner at the next sample, because its state is not valid any more."""
+        self.planner.restart()
+        if self._trace.recorder is not None:
+            self._trace.recorder.action(self._clock(), "restart_planner")
+
+    def _record_attitude_target(self, target: AttitudeTarget) -> None:
+        if self._trace.recorder is not None:
+            self._trace.recorder.add(self._clock(), self._rows.attitude_target, target)
 
     def resume(self) -> None:
         """Answer again after a gap, because the autopilot has confirmed offboard."""

@@ -7,20 +7,20 @@ from companion.attitude import Quaternion, Target, heading, is_unit
 from companion.attitude.kinematics import tilt_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.flown_source import FlownSource
-from companion.control.ground_contact import GroundContact
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.predictive import Predictive
+from companion.control.step_recorder import StepRecorder
+from companion.control.step_rows import StepFlags, StepOutput
+from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
 from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GRAVITY, GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.linear import Guidance
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
-from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
-from companion.vehicle.state import VehicleState
 
 _LEVEL = Target(0.0, 0.0, 0.0)
 
@@ -44,6 +44,9 @@ class GuidanceLoop:
             None.
         estimate: estimates the motion.
         learning: learns the hover thrust.
+        guidance: makes targets of references.
+        max_tilt: largest tilt in open loop, rad.
+        before_step: called at the beginning of each step with the time, s.
         record: records how the reference is tracked.
     """
 
@@ -53,15 +56,15 @@ class GuidanceLoop:
         guidance: Guidance,
         estimate: MotionEstimate,
         hover_thrust: HoverThrust,
-        state: VehicleState,
-        ground: GroundContact,
+        state: Telemetry,
+        ground: Ground,
         trace: FlightTrace,
         *,
         max_tilt: float,
         period: float,
         position_stale: float,
         clock: Callable[[], float],
-        vehicle_clock: VehicleClock,
+        vehicle_clock: Clock,
     ) -> None:
         self.flown = FlownSource()
         self.given_up: str | None = None
@@ -72,17 +75,17 @@ class GuidanceLoop:
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self._loop = loop
-        self._guidance = guidance
-        self._state = state
+        self.guidance = guidance
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
-        self._max_tilt = max_tilt
+        self.max_tilt = max_tilt
         self._period = period
-        self._position_stale = position_stale
+        self._fresh = FreshPosition(state, vehicle_clock, position_stale)
+        self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
-        self._vehicle_clock = vehicle_clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._ticker = Ticker(period, clock)
+        self._recorder = StepRecorder(trace.recorder, state, vehicle_clock)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Keep an attitude that is a unit quaternion and fits the vehicle's clock."""
@@ -92,14 +95,11 @@ class GuidanceLoop:
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it arrived, or was measured, too long ago."""
-        position, now = self._state.position, self._clock()
-        if position is None or now - position.received > self._position_stale:
-            return None
-        age = self._vehicle_clock.age(position.vehicle_time, now)
-        return None if age is not None and age > self._position_stale else position
+        return self._fresh.at(self._clock())
 
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
+        self._recorder.action(self._clock(), "stand_by")
         self.flown.clear()
 
     def hold_here(self) -> None:
@@ -108,30 +108,40 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no position has come yet.
         """
-        self.stand_by()
-        position_ned = self._guidance_input(self._clock()).now.position_ned
-        self.flown.pose = Pose(position_ned, self._heading())
+        now = self._clock()
+        self._recorder.action(now, "hold_here")
+        self._hold_here(now)
+
+    def _hold_here(self, now: float) -> None:
+        self.flown.clear()
+        self.flown.pose = Pose(self._guidance_input(now).now.position_ned, self._heading())
 
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, at which a maneuver has ended."""
         now = self._clock()
-        reference = self.flown.reference(now, self.motion_now(), self._heading())(now)
-        self.stand_by()
+        self._recorder.action(now, "hold_reference")
+        motion = self._guidance_input(now).now
+        reference = self.flown.reference(now, motion, self._heading())(now)
+        self.flown.clear()
         self.flown.pose = Pose(reference.position_ned, reference.heading)
 
     def give_up(self) -> None:
         """Hold here, and fly no source any more."""
+        now = self._clock()
+        self._recorder.action(now, "give_up")
         self.bound_to_hold = True
-        self.hold_here()
+        self._hold_here(now)
 
     def follow(self, source: Source) -> None:
         """Fly `source` from the held pose; after `give_up`, keep holding."""
         if self.bound_to_hold:
             return
+        now = self._clock()
+        self._recorder.action(now, "follow")
         if self.flown.pose is None:
-            self.hold_here()
+            self._hold_here(now)
         assert self.flown.pose is not None
-        self.flown.begin(source, self.flown.pose, self._clock())
+        self.flown.begin(source, self.flown.pose, now)
 
     @property
     def finished(self) -> bool:
@@ -163,19 +173,36 @@ class GuidanceLoop:
     def step(self) -> None:
         """Make one command, unless the position is stale."""
         now = self._clock()
-        position = self.fresh_position()
+        self.before_step(now)
+        position = self._fresh.at(now)
+        standing = self._ground.standing
+        may_idle = standing and self._ground.may_idle
+        before, active = self._loop.command, self._loop.offboard_active
+        made = self._step(now, position, standing=standing, may_idle=may_idle)
+        command = self._loop.command
+        self._recorder.step(
+            StepFlags(position is not None, standing, may_idle, active),
+            now,
+            made,
+            None if command is before else command,
+        )
+
+    def _step(
+        self, now: float, position: LocalPosition | None, *, standing: bool, may_idle: bool
+    ) -> StepOutput | None:
+        """Make one command; return what it was computed from, or None."""
         if position is None:
             self.learning.pause()
-            return
+            return None
         # While offboard is active, a landed flag must not lead to zero thrust, which would make it
         # true; the safety monitors judge it.
-        standing = self._ground.standing and not self._loop.offboard_active
+        standing = standing and not self._loop.offboard_active
         if standing:
             self.learning.on_ground()
             self._loop.resets.forget()
-            if self._ground.may_idle:
+            if may_idle:
                 self._loop.command = GuidanceCommand(_LEVEL, 0.0, now, idle=True)
-                return
+                return None
         position = self._loop.resets.without_jumps(position)
         self.estimate.turn_to(self._loop.resets.turn)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
@@ -191,15 +218,16 @@ class GuidanceLoop:
                 offboard_active=self._loop.offboard_active,
                 steady=reference.height_is_steady,
             )
+        measured_at = self.estimate.vehicle_time(now, position)
         if self._loop.offboard_active:
-            measured_at = self.estimate.vehicle_time(now, position)
             self.record.add(now, measured_at, reference, inputs.now)
+        return StepOutput(measured_at, self._q, inputs, reference, self.off_course)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`; return the reference from which it was made."""
         reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
-        linear = self._guidance.command(reference_at, now, inputs)
+        linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
             turn = self._loop.resets.turn
             vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
@@ -228,7 +256,7 @@ class GuidanceLoop:
 
     def _guidance_input(self, now: float) -> GuidanceInput:
         return self.estimate.guidance_input(
-            now, self._guidance.acts_after, self.learning.thrust_limits
+            now, self.guidance.acts_after, self.learning.thrust_limits
         )
 
     def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
@@ -237,9 +265,9 @@ class GuidanceLoop:
         if name is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
-        most = min(self._max_tilt, self.learning.largest_tilt())
+        most = min(self.max_tilt, self.learning.largest_tilt())
         if tilt <= most:
             return
-        limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
+        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
-        self.hold_here()
+        self._hold_here(now)

@@ -3,10 +3,10 @@
 from math import sin
 
 from companion.attitude import Quaternion, Target
+from companion.control.telemetry import Telemetry
 from companion.guidance import GRAVITY, HoverThrust
 from companion.guidance.reference import limited
 from companion.guidance.thrust import largest_tilt
-from companion.vehicle.state import VehicleState
 
 _CLEAR = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
@@ -25,7 +25,7 @@ class HoverLearning:
     hover thrust is corrected before the takeover. After offboard control nothing is learned.
     """
 
-    def __init__(self, hover_thrust: HoverThrust, state: VehicleState) -> None:
+    def __init__(self, hover_thrust: HoverThrust, state: Telemetry) -> None:
         self._hover_thrust = hover_thrust
         self._state = state
         self._had_control = False

@@ -62,6 +62,21 @@ _REFUSALS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Deadlines:
+    """When data are too old, and when a setpoint is too late; s.
+
+    Attributes:
+        telemetry_stale: greatest age of a sample that is answered.
+        target_stale: greatest age of a command from guidance.
+        deadline: longest time from a sample's arrival to its setpoint; a longer one is counted.
+    """
+
+    telemetry_stale: float
+    target_stale: float
+    deadline: float
+
+
 @dataclass(slots=True)
 class LoopRecord:
     """Counters since the loop was made, and latest times in s of event-loop time.

@@ -4,7 +4,14 @@ from collections.abc import Callable
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
-from companion.guidance import GRAVITY, DragEstimate, GuidanceInput, MotionObserver, VehicleMotion
+from companion.guidance import (
+    GRAVITY,
+    DragEstimate,
+    GuidanceInput,
+    MotionObserver,
+    ObserverSettings,
+    VehicleMotion,
+)
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.reference import Horizontal
@@ -51,6 +58,15 @@ class MotionEstimate:
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
         self._turn = 0.0
+
+    @property
+    def disturbance(self) -> Horizontal:
+        """Acceleration by wind and bias, m/s², NED."""
+        return self._observer.disturbance
+
+    def retune(self, settings: ObserverSettings) -> None:
+        """Use other settings of the observer from the next position on."""
+        self._observer.retune(settings)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude, which gives the direction of the thrust."""

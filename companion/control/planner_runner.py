@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import BodyRates, Planner, Quaternion, Target
+from companion.attitude import BodyRates, Constants, LawPlanner, Planner, Quaternion, Target
+from companion.attitude.history import PlannedTilt
+from companion.attitude.model_following import ModelFollowingPlanner
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.step_frame import StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
@@ -24,21 +26,42 @@ class PlannerRunner:
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
             along its axes, or None.
+        on_attitude_target: called with each new one before the planner gets it.
+        asked: attitude and target of the newest sample, as the planner saw them, or None.
     """
 
     def __init__(self, planner: Planner, resets: EstimatorResets) -> None:
         self.attitude_target: Callable[[], AttitudeTarget | None] = lambda: None
+        self.on_attitude_target: Callable[[AttitudeTarget], None] | None = None
+        self.asked: tuple[Quaternion, Target] | None = None
         self._planner = planner
+        self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._resets = resets
         self._frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
         self._noted: AttitudeTarget | None = None
+        self._told: AttitudeTarget | None = None
         self._turn, self._turned_ms = 0.0, -1
+
+    def retune(self, constants: Constants) -> None:
+        """Use other gains and limits from the next sample on.
+
+        Raises:
+            TypeError: the planner is of another package and cannot change them.
+        """
+        if not isinstance(self._planner, LawPlanner | ModelFollowingPlanner):
+            raise TypeError(f"{type(self._planner).__name__} cannot be retuned")
+        self._planner.retune(constants)
 
     def restart(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""
         self._planned_at = -inf
+
+    @property
+    def planned(self) -> PlannedTilt | None:
+        """The plan in effect at the newest sample; None for a planner without a plan."""
+        return None if self._follower is None else self._follower.planned
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the autopilot in the frame that the planner sees."""
@@ -72,6 +95,7 @@ class PlannerRunner:
         self._period = period
         self._planned_at = sample.vehicle_time
         self._note_attitude_target(sample)
+        self.asked = q, target
         return self._planner.rates(q, target, period, sample.body_rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
@@ -84,6 +108,9 @@ class PlannerRunner:
         target = self.attitude_target()
         if target is None or target is self._noted:
             return
+        if target is not self._told and self.on_attitude_target is not None:
+            self._told = target
+            self.on_attitude_target(target)
         if self._turned_ms < target.time_boot_ms <= sample.time_boot_ms:
             self._noted = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)

@@ -3,18 +3,20 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from companion.config import Config
-from companion.control.control_loop import ControlLoop, Deadlines
 from companion.control.ground_contact import GroundContact
-from companion.control.guidance_loop import GuidanceLoop
-from companion.control.inner_loop import hover_thrust, planner, rate_limits
-from companion.control.outer_loop import make_guidance, motion_estimate, predictive
+from companion.control.loops import make_loops
+from companion.control.outer_loop import predictive
+from companion.drag import Drag
+from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
+from companion.flight.flown_config import description, flat
 from companion.flight.maneuvers import unbegun
 from companion.flight.observer import EventRecorder
 from companion.flight.plan import Plan
@@ -30,6 +32,7 @@ from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.realtime import Wishes
+from companion.recording.recorder import FlightRecorder
 from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
@@ -91,6 +94,13 @@ def _signing(key_file: Path | None) -> Signing | None:
     return Signing(key, file=StampFile(key))
 
 
+def _record_drag(record: FlightRecorder, clock: Callable[[], float], drag: Drag | None) -> None:
+    if drag is None:
+        record.action(clock(), "drag_prior")
+    else:
+        record.action(clock(), "drag_prior", drag=(drag.linear, drag.quadratic))
+
+
 @dataclass(frozen=True, slots=True)
 class Assembled:
     """A flight ready to run over an open link, and its figures afterwards."""
@@ -102,6 +112,7 @@ class Assembled:
     memory: VehicleMemory
     ladder: SafetyLadder
     reporter: StatusReporter
+    changes: Changes
 
     def close(self) -> None:
         """End the process of predictive control."""
@@ -139,14 +150,27 @@ def assemble(
     folder: Path | None,
     plan: Plan,
     environment: Environment = THIS_COMPUTER,
+    changes: Changes | None = None,
 ) -> Assembled:
     """Assemble a flight by `plan` over an open link.
 
     Its records are written to `folder`; with None, nothing is written or remembered.
     """
     clock: Callable[[], float] = asyncio.get_running_loop().time
-    trace = FlightTrace(folder)
-    loop, guidance_loop, ground = _control(config, link, trace, clock, environment)
+    record, real_time = recorder.file, environment.realtime and not config.link.lockstep
+    trace = FlightTrace(folder, record)
+    ground = GroundContact(link.state, clock)
+    loop, guidance_loop = make_loops(
+        config,
+        link.send_setpoint,
+        link.state,
+        ground,
+        link.clock,
+        trace,
+        clock,
+        environment.clock_ns,
+    )
+    loop.planner.attitude_target = lambda: link.state.attitude_target
     snapshot_builder = SnapshotBuilder(
         link, loop, guidance_loop, real_time=not config.link.lockstep
     )
@@ -181,6 +205,11 @@ def assemble(
                 flight.note(text)
             if config.guidance.kind == "nmpc":
                 guidance_loop.predictive = predictive(config, part, flight.note)
+    if record is not None:
+        record.metadata("configuration", flat(config.model_dump(mode="json")))
+        record.begin(flight.began, description(config, plan, real_time=real_time))
+        ladder.on_change = record.alarm
+        memory.on_begin = partial(_record_drag, record, clock)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
 
     def phase() -> PhaseNow:
@@ -196,49 +225,7 @@ def assemble(
         phase,
         recorder.status,
         clock,
-        real_time=environment.realtime and not config.link.lockstep,
+        real_time=real_time,
     )
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter)
-
-
-def _control(
-    config: Config,
-    link: Link,
-    trace: FlightTrace,
-    clock: Callable[[], float],
-    environment: Environment,
-) -> tuple[ControlLoop, GuidanceLoop, GroundContact]:
-    """The control loop, and the guidance loop that writes its commands."""
-    thrust = hover_thrust(config)
-    deadman = config.deadman
-    loop = ControlLoop(
-        planner(config),
-        thrust,
-        link.send_setpoint,
-        Deadlines(
-            telemetry_stale=deadman.telemetry_stale,
-            target_stale=deadman.target_stale,
-            deadline=deadman.deadline,
-        ),
-        trace,
-        rate_limits(config),
-        clock,
-        environment.clock_ns,
-    )
-    ground = GroundContact(link.state, clock)
-    guidance_loop = GuidanceLoop(
-        loop,
-        make_guidance(config),
-        motion_estimate(config, lambda: link.clock.offset),
-        thrust,
-        link.state,
-        ground,
-        trace,
-        max_tilt=config.limits.max_tilt,
-        period=1.0 / config.guidance.rate_hz,
-        position_stale=deadman.position_stale,
-        clock=clock,
-        vehicle_clock=link.clock,
-    )
-    loop.planner.attitude_target = lambda: link.state.attitude_target
-    return loop, guidance_loop, ground
+    changes = changes or Changes(config)
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)

@@ -174,7 +174,7 @@ def _stop_moving(context: FlightContext) -> None:
     if not context.loop.offboard_active:
         return
     try:
-        context.loop.planner.restart()  # the estimator may have been reset
+        context.loop.restart_planner()  # the estimator may have been reset
         context.guidance_loop.hold_here()
     except Exception as error:  # the exit must go on whatever fails in guidance
         context.note(internal(error))

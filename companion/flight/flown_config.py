@@ -1,6 +1,10 @@
 """The configuration of a flight in the flight's own folder, with what it flies: it flies again."""
 
+import json
+import platform
 import shutil
+from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +12,8 @@ from companion.config import Config
 from companion.config.files import FILES_READ
 from companion.config.trajectory_file import TrajectoryFile, is_table
 from companion.files import bounded_yaml, yaml_file
+from companion.files.write_whole import write_whole
+from companion.flight.plan import ConfiguredPlan, Plan
 
 _NAME = "config.yaml"
 _TRAJECTORY = "trajectory"
@@ -35,7 +41,40 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     path = config.flight.trajectory
     if follows and path is not None and "trajectory" in config.flight.maneuvers:
         data["flight"]["trajectory"] = f"{_TRAJECTORY}/{_copied(path, folder / _TRAJECTORY)}"
-    (folder / _NAME).write_text(bounded_yaml.dump(data), encoding="utf-8")
+    write_whole(folder / _NAME, bounded_yaml.dump(data))
+
+
+def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str]:
+    """The metadata "flight" of a recorded flight, except when it began."""
+    limits, deadman = config.limits, config.deadman
+    seed = None if config.mock is None else config.mock.get("seed")
+    return {
+        "companion": version("mavlink-companion"),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "pymavlink": version("pymavlink"),
+        "mcap": version("mcap"),
+        "plan": "configuration" if isinstance(plan, ConfiguredPlan) else "program",
+        "planner": config.planner_name,
+        "gain_per_s": repr(config.planner.gain_per_s),
+        "deadline_s": repr(deadman.deadline),
+        "min_battery": repr(limits.min_battery),
+        "max_tilt_rate_rad_s": repr(limits.max_tilt_rate),
+        "max_yaw_rate_rad_s": repr(limits.max_yaw_rate),
+        "real_time": "yes" if real_time else "no",
+        **({} if seed is None else {"seed": str(seed)}),
+    }
+
+
+def flat(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    """The keys of a configuration as `section.key`, and their values as JSON."""
+    found: dict[str, str] = {}
+    for key, value in section.items():
+        if isinstance(value, dict):
+            found.update(flat(value, f"{prefix}{key}."))
+        else:
+            found[f"{prefix}{key}"] = json.dumps(value)
+    return found
 
 
 def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from companion.flight.status import FlightStatus
 from companion.mavlink.texts import StatusText
+from companion.recording.recorder import FlightRecorder
 from companion.vehicle.state import VehicleState
 
 
@@ -20,7 +21,7 @@ class Observer(Protocol):
         ...
 
     def status(self, status: FlightStatus) -> None:
-        """Five times a second: the state of the flight."""
+        """Ten times a second: the state of the flight."""
         ...
 
     def event(self, time: float, text: str) -> None:
@@ -44,6 +45,37 @@ class Silent:
         """Ignore it."""
 
 
+class Several:
+    """Passes all on to several observers, in order.
+
+    Args:
+        observers: who is told.
+    """
+
+    def __init__(self, *observers: Observer) -> None:
+        self._observers = observers
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.phase(name, waits_for)
+
+    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.waiting(name, detail, elapsed, timeout)
+
+    def status(self, status: FlightStatus) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.status(status)
+
+    def event(self, time: float, text: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.event(time, text)
+
+
 async def decline_landing() -> bool:
     """Answer no when asked whether to land: where nobody can be asked, the vehicle holds on."""
     return False
@@ -57,18 +89,25 @@ class EventRecorder:
     Attributes:
         phases: (when it began, s on our clock, name) of each phase.
         write: writes words down at the present time.
+        file: `flight.mcap`; None: the flight is not recorded.
 
     Args:
         observer: to which all is passed on.
         clock: ours, s.
         write: see above.
+        file: see above.
     """
 
     def __init__(
-        self, observer: Observer, clock: Callable[[], float], write: Callable[[str], None]
+        self,
+        observer: Observer,
+        clock: Callable[[], float],
+        write: Callable[[str], None],
+        file: FlightRecorder | None = None,
     ) -> None:
         self.phases: list[tuple[float, str]] = []
         self.write = write
+        self.file = file
         self._observer = observer
         self._clock = clock
 
@@ -76,6 +115,8 @@ class EventRecorder:
         """Keep, write and pass on."""
         self.phases.append((self._clock(), name))
         self.write(f"phase: {name}")
+        if self.file is not None:
+            self.file.phase(name, waits_for)
         self._tell(lambda observer: observer.phase(name, waits_for))
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:

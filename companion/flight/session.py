@@ -6,10 +6,11 @@ from pathlib import Path
 from companion import realtime
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
-from companion.flight.flight_record import FlightRecord
+from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
@@ -31,6 +32,9 @@ class Session:
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
         plan: of the flight; None: as configured.
         environment: what the flight gets from the computer.
+
+    Attributes:
+        changes: of the values that may change in flight.
     """
 
     def __init__(
@@ -42,6 +46,7 @@ class Session:
         plan: Plan | None = None,
         environment: Environment = THIS_COMPUTER,
     ) -> None:
+        self.changes = Changes(config)
         self._config = config
         self._folder = folder
         self._observer = observer
@@ -72,7 +77,7 @@ class Session:
             self._assembled.flight.note(text)
 
     async def fly(self) -> Summary:
-        """Fly, and write the folder: `flight.tlog`, `config.yaml`, `summary.json`, CSV files.
+        """Fly, and write the folder: `config.yaml`, `flight.tlog`, `flight.mcap`, `summary.json`.
 
         `companion fly --config FOLDER/config.yaml` flies the same again, from any working folder.
 
@@ -85,7 +90,7 @@ class Session:
         # This takes up to a second, during which an open link would not be read.
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         environment = self._environment
-        record = FlightRecord(
+        record = FlightFiles(
             self._config, self._folder, environment, self.note, follows=self._plan is None
         )
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
@@ -100,6 +105,7 @@ class Session:
                     self._folder,
                     plan,
                     environment,
+                    self.changes,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)

@@ -34,7 +34,7 @@ async def takeoff(context: FlightContext) -> None:
     height = context.config.flight.takeoff_height_m
     command = context.link.autopilot.take_off(height, _home_altitude(context))
     context.ground.command_takeoff()
-    context.loop.command = None  # drops the idle command, which must not be sent from here on
+    context.loop.drop_command()  # the idle command must not be sent from here on
     context.guidance_loop.step()
     # Checked again before each try: a disarmed PX4 stores the command and takes off once armed.
     await command_if_ours(

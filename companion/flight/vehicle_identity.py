@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.config.known_drag import prior_of
+from companion.drag import Drag
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
@@ -121,6 +122,9 @@ class VehicleMemory:
         estimate: of the drag.
         configured: whether the configuration sets the drag.
         note: takes messages for the user.
+
+    Attributes:
+        on_begin: called with the drag from which the estimate starts; None: of any vehicle.
     """
 
     def __init__(
@@ -133,6 +137,7 @@ class VehicleMemory:
         self._directory, self._estimate = directory, estimate
         self._configured, self._note = configured, note
         self._file: LearnedFile | None = None
+        self.on_begin: Callable[[Drag | None], None] = lambda _: None
 
     def load(self, identity: Identity) -> None:
         """Load the learned drag of this vehicle, before it is flown."""
@@ -146,6 +151,7 @@ class VehicleMemory:
             return
         kept, trouble = file.load()
         self._estimate.begin(ANY_VEHICLE if kept is None else prior_of(kept.drag))
+        self.on_begin(None if kept is None else kept.drag)
         if trouble is not None:
             self._note(trouble)
         if kept is not None:

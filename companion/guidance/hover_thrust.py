@@ -66,6 +66,11 @@ class HoverThrust:
         self._count = 0
 
     @property
+    def limits(self) -> tuple[float, float]:
+        """Smallest and largest normalised thrust that is sent, 0..1."""
+        return self._settings.lowest, self._settings.highest
+
+    @property
     def configured(self) -> float:
         """Normalised thrust at hover in the settings."""
         return self._settings.hover

@@ -1,18 +1,21 @@
 """A flight as a picture: response, straightness, ground track and history; extra `plot`."""
 
-import json
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.extras import require
+from companion.recording.flight_record import FlightRecord, RecordError, read_flight
 from companion.recording.history import HEIGHTS, Marks, draw_history, marks_of
+from companion.recording.recorded_summary import summary_of, trace_of
 from companion.recording.response import first_order
 from companion.recording.second_order import StepRun, nearest_second_order, step_runs
+from companion.recording.series import Series
+from companion.recording.trace import FlightTrace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,10 +51,12 @@ def draw_flight(folder: Path, out: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
-    panels, motion = _panels(folder), _rows(folder / "motion.csv", 6)
+    record = _record(folder)
+    trace = trace_of(record)
+    panels, motion = _panels(record, trace), _rows(record, "motion", trace.motion)
     if not panels and motion is None:
         raise FigureError(f"{folder}: no flight with anything to draw is recorded there")
-    marks = Marks() if motion is None else _marks(folder)
+    marks = Marks() if motion is None else _marks(record)
     above, below = bool(panels) * _HEIGHT, 0.0 if motion is None else _HISTORY_HEIGHT
     heights = [height for height in (above, below) if height]
     figure = plt.figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
@@ -71,74 +76,60 @@ def draw_flight(folder: Path, out: Path) -> None:
         plt.close(figure)
 
 
-def _panels(folder: Path) -> "list[Callable[[Axes], None]]":
+def _record(folder: Path) -> FlightRecord:
+    try:
+        return read_flight(folder)
+    except RecordError as error:
+        raise FigureError(str(error)) from error
+
+
+def _panels(record: FlightRecord, trace: FlightTrace) -> "list[Callable[[Axes], None]]":
     """What draws each of the upper panels."""
-    response, tracking = _rows(folder / "response.csv", 7), _rows(folder / "tracking.csv", 7)
+    response = _rows(record, "response", trace.response)
+    tracking = _rows(record, "tracking", trace.tracking)
     panels: list[Callable[[Axes], None]] = []
     runs = [] if response is None else step_runs(response)
     if runs:
-        gain = _gain(_summary(folder), folder)
+        gain = _gain(record)
         panels += [lambda axes: _draw_steps(axes, runs, gain), lambda axes: _draw_plane(axes, runs)]
     if tracking is not None:
         panels.append(lambda axes: _draw_ground(axes, tracking))
     return panels
 
 
-def _rows(path: Path, columns: int) -> Floats | None:
-    """The (N, columns) numbers of a CSV file; None where the flight wrote none.
+def _rows(record: FlightRecord, name: str, series: Series) -> Floats | None:
+    """The rows of a series; None if it has none.
 
     Raises:
-        FigureError: the file is not as `FlightTrace.save` writes it.
+        FigureError: a number is so large that no flight writes it.
     """
-    if not path.is_file():
-        return None
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()[1:]
-        if not any(map(str.strip, lines)):
-            raise ValueError("it holds no rows")
-        rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
-    except ValueError as error:
-        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
-    if rows.shape[1] != columns:
-        raise FigureError(
-            f"{path}: not as a flight writes it: {rows.shape[1]} columns instead of {columns}"
-        )
+    rows = series.rows()
     # NaN stands for what there was not; nothing else is that large.
     if np.abs(rows[~np.isnan(rows)]).max(initial=0.0) > _LARGEST:
-        raise FigureError(f"{path}: not as a flight writes it: a number is above {_LARGEST:g}")
-    return rows
+        raise FigureError(
+            f"{record.folder}: {name}: not as a flight records it: a number is above {_LARGEST:g}"
+        )
+    return rows if len(rows) else None
 
 
-def _summary(folder: Path) -> Any:
-    path = folder / "summary.json"
+def _gain(record: FlightRecord) -> float:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
-
-
-def _gain(summary: Any, folder: Path) -> float:
-    try:
-        gain = float(summary["gain_per_s"])
+        gain = float(record.metadata["flight"]["gain_per_s"])
         if not 0.0 < gain < inf:
             raise ValueError(f"gain_per_s is {gain:g}")
         return gain
-    except (ValueError, KeyError, TypeError) as error:
-        raise FigureError(
-            f"{folder / 'summary.json'}: not as a flight writes it: {error}"
-        ) from error
+    except (ValueError, KeyError) as error:
+        raise FigureError(f"{record.folder}: not as a flight records it: {error}") from error
 
 
-def _marks(folder: Path) -> Marks:
-    """The marks of the history; none where the flight wrote no summary."""
-    if not (folder / "summary.json").is_file():
-        return Marks()
+def _marks(record: FlightRecord) -> Marks:
+    """The marks of the history."""
+    summary, _ = summary_of(record)
     try:
-        return marks_of(_summary(folder))
+        return marks_of(summary)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
-        raise FigureError(
-            f"{folder / 'summary.json'}: not as a flight writes it: {error}"
-        ) from error
+        path = record.folder / "summary.json"
+        raise FigureError(f"{path}: not as a flight writes it: {error}") from error
 
 
 def _draw_steps(axes: "Axes", runs: list[StepRun], gain: float) -> None:

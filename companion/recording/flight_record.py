@@ -200,15 +200,24 @@ class _Rows(dict[str, Row]):
 def read_flight(folder: Path) -> FlightRecord:
     """Read the record in the folder of a flight.
 
+    Of a flight that was killed before it recorded anything, the record is empty.
+
     Raises:
         RecordError: there is none, or it cannot be read.
     """
     path = folder / FILE
+    killed_at_start = (folder / "config.yaml").is_file()
     try:
         content = read_mcap(path)
     except OSError as error:
-        raise RecordError(f"{path}: {error.strerror}; is this the folder of a flight?") from error
-    flight = content.metadata.get("flight", {})
+        if not killed_at_start:
+            raise RecordError(
+                f"{path}: {error.strerror}; is this the folder of a flight?"
+            ) from error
+        content = McapContent()
+    flight = content.metadata.setdefault("flight", {})
+    if not flight and killed_at_start and content.damage is None:
+        flight.update(began_s="0.0", epoch_s="0.0")
     try:
         began, epoch = float(flight["began_s"]), float(flight["epoch_s"])
     except (KeyError, ValueError) as error:

@@ -19,6 +19,9 @@ from companion.recording.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
 _LONGEST = 1 << 26
+_AXES = "roll", "pitch", "yaw"
+_SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
+_STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
 _REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
 _NO_REASONS = 2
 """The first of `REASONS` are no reasons of an unanswered sample."""
@@ -44,8 +47,8 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
         result=reason,
         phase=phase,
         planner=flight.get("planner", ""),
-        gain=float(flight.get("gain_per_s", "nan")),
-        counts=_counts(record, float(flight.get("deadline_s", "inf"))),
+        gain=float(flight.get("gain_per_s", "0")),
+        counts=_counts(record, float(flight.get("deadline_s", "0.004"))),
         link={
             name: int(resources[column][-1]) if len(resources) else 0
             for name, column in (("frames", "frames"), ("lost", "frames_lost"), ("sent", "sent"))
@@ -56,11 +59,12 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
         course=Course(
             began=record.began,
             phases=tuple((each.time, each.name) for each in record.phases),
+            takeoff=_takeoff(record),
             early_end=EarlyEnd(record.duration, None, phase),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
-            deadline=float(flight.get("deadline_s", "inf")),
-            lockstep=flight.get("lockstep") == "true",
+            deadline=float(flight.get("deadline_s", "0.004")),
+            lockstep=flight.get("real_time") == "no",
         ),
     )
     return summary.as_dict()
@@ -70,24 +74,19 @@ def trace_of(record: FlightRecord) -> FlightTrace:
     """The rows that the measurements after a flight take, as the flight itself kept them."""
     trace = FlightTrace()
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
-    answers = _answers(sample["received_s"], setpoint["received_s"])
-    for row, number in zip(setpoint.tolist(), answers.tolist(), strict=True):
-        (received, vehicle_time, roll, pitch, yaw, thrust, latency, north, east), flags = (
-            row[:9],
-            row[-6:],
-        )
-        trace.add_latency(round(1e3 * latency))
-        if number < 0:
-            continue
-        of = sample[number]
-        if flags[3]:
-            measured = [float(of[f"measured_{axis}_rad_s"]) for axis in ("roll", "pitch", "yaw")]
-            age = float(of["age_s"]) if of["age_known"] else float("nan")
-            trace.rates.add(
-                [vehicle_time, received, roll, pitch, yaw, thrust, *measured, age],
-            )
-        if flags[4]:
-            trace.response.add([vehicle_time, *(float(of[f"q_{p}"]) for p in "wxyz"), north, east])
+    sample = sample[sample["unanswered"] == 0]
+    # Of two samples that arrive together, the vehicle's stamps differ.
+    answers = _answers(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
+    measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
+    ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
+    for row, number in zip(setpoint, answers.tolist(), strict=True):
+        trace.add_latency(round(1e3 * float(row["latency_us"])))
+        time = float(row["vehicle_time_s"])
+        if row["offboard_active"] and number >= 0:  # else its sample was not recorded
+            sent = row[_SENT].tolist()
+            trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
+        if row["is_step"]:
+            trace.response.add([time, *row[_STEP].tolist()])
     for row in tracking_rows(guidance):
         trace.tracking.add(row.tolist())
     for row in record.rows("motion").tolist():
@@ -132,6 +131,17 @@ def _counts(record: FlightRecord, deadline: float) -> LoopCounts:
         rate_hz=_rate(record),
         unanswered=unanswered,
     )
+
+
+def _takeoff(record: FlightRecord) -> float | None:
+    """When the vehicle left the ground, s since the flight began; None: it did not."""
+    read = record.rows("guidance_input")
+    begun = next((each.time for each in record.phases if each.name == "takeoff"), None)
+    if begun is None:
+        return None
+    times = record.since_start(read["time_s"])
+    left = times[(times >= begun) & (read["standing"] == 0)]
+    return float(left[0]) if len(left) else None
 
 
 def _rate(record: FlightRecord) -> float:

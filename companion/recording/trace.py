@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.attitude import BodyRates, Quaternion, Target
+from companion.recording.mcap_file.channels import MOTION
+from companion.recording.recorder import FlightRecorder
 from companion.recording.series import Series, Spool
 
 _KEPT_RATES = 10_240
@@ -49,9 +51,11 @@ class FlightTrace:
 
     Args:
         folder: where older rows wait on the disk; None: they stay in memory. They are gone with
-            the trace; `save` writes what is to stay.
+            the trace.
+        recorder: see below.
 
     Attributes:
+        recorder: writes `flight.mcap`; None: the flight is not recorded.
         response: (vehicle time s, w, x, y, z, target north, target east), of steps only.
         tracking: (vehicle time s, reference north, east, down, measured north, east, down).
         rates: (vehicle time s, when it was received on our clock s, commanded roll, pitch, yaw
@@ -64,7 +68,8 @@ class FlightTrace:
         maneuvers: when each maneuver began and the last one ended.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, folder: Path | None = None, recorder: FlightRecorder | None = None) -> None:
+        self.recorder = recorder
         self._spool = Spool(folder)
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
@@ -104,29 +109,18 @@ class FlightTrace:
         self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
-    def add_motion(self, row: Iterable[float]) -> None:
-        """Record a row of `motion`."""
-        self.motion.add(list(row))
+    def add_motion(self, time: float, row: Iterable[float]) -> None:
+        """Record a row of `motion` at `time`, s on our clock."""
+        numbers = list(row)
+        self.motion.add(numbers)
+        if self.recorder is not None:
+            self.recorder.row(time, MOTION, numbers)
 
     def begin_maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
         """Record that a maneuver begins (None: that the last one ends), as `ManeuverMark`."""
         self.maneuvers.append(ManeuverMark(time, vehicle_time, name))
-
-    def save(self, folder: Path) -> None:
-        """Write `response.csv`, `tracking.csv`, `rates.csv` and `motion.csv`, if they have rows.
-
-        Raises:
-            OSError: a file cannot be written.
-        """
-        for name, series in (
-            ("response.csv", self.response),
-            ("tracking.csv", self.tracking),
-            ("rates.csv", self.rates),
-            ("motion.csv", self.motion),
-        ):
-            if len(series):
-                header = ",".join(series.columns)
-                np.savetxt(folder / name, series.rows(), "%.9g", ",", header=header, comments="")
+        if self.recorder is not None:
+            self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
         """Warning for the user if rows were lost; None if none were."""

@@ -34,11 +34,14 @@ class SafetyLadder:
 
     Attributes:
         note: called with a message when an alarm is raised or over.
+        on_change: called then with whether it is raised, the name of the monitor, the reason and
+            the action.
         breaches: dict from the description of each breach so far to its monitor's name.
     """
 
     def __init__(self, monitors: Sequence[Monitor], hold_time: float) -> None:
         self.note: Callable[[str], None] = lambda _: None
+        self.on_change: Callable[[bool, str, str, str], None] = lambda *_: None
         self.breaches: dict[str, str] = {}
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
@@ -78,9 +81,12 @@ class SafetyLadder:
         name = alarm.monitor.name
         if alarm.reason is None:
             self.note(f"safety: {name} is over")
+            self.on_change(False, name, "", "")
         else:
             self.breaches[alarm.reason] = name
-            self.note(f"safety: {name}: {alarm.reason} → {alarm.monitor.action.value}")
+            action = alarm.monitor.action.value
+            self.note(f"safety: {name}: {alarm.reason} → {action}")
+            self.on_change(True, name, alarm.reason, action)
         return alarm.reason is not None
 
 

@@ -5,6 +5,7 @@ import gc
 from typing import NamedTuple
 
 from companion.config import Config
+from companion.flight.changes import Changes
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
@@ -49,6 +50,7 @@ class ServedControl:
         observer: is told of phases and events of each flight.
         environment: of the flights.
         records: makes their records.
+        changes: of the values that may change in flight.
     """
 
     def __init__(
@@ -60,21 +62,20 @@ class ServedControl:
         observer: Observer,
         environment: Environment,
         records: FlightRecords,
+        changes: Changes,
     ) -> None:
-        self._records = records
         self._config, self._link, self._component = config, link, component
         self._keeper, self._observer, self._environment = keeper, observer, environment
-        self._clock = asyncio.get_running_loop().time
-        serve = config.serve
-        self.ownership = Ownership(serve.setpoint_timeout, serve.hold_s)
+        self._clock, self._not_before = asyncio.get_running_loop().time, 0.0
+        self._records, self._changes = records, changes
+        self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self._newest: dict[_Owner, Request] = {}
         self._flight: ServedFlight | None = None
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
-        self._not_before = 0.0
-        settings = link.settings
-        self._autopilot = Address(settings.target_system, settings.target_component)
-        self._own = Address(settings.source_system, settings.source_component)
+        ids = link.settings
+        self._autopilot = Address(ids.target_system, ids.target_component)
+        self._own = Address(ids.source_system, ids.source_component)
 
     @property
     def in_control(self) -> bool:
@@ -222,6 +223,7 @@ class ServedControl:
             self._observer,
             self._environment,
             self._records,
+            self._changes,
             from_ground=from_ground,
         )
         flight.give(self._newest[owner])

@@ -9,7 +9,7 @@ from companion import realtime
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import Environment
-from companion.flight.flight_record import FlightRecord
+from companion.flight.flight_files import FlightFiles
 from companion.mavlink.transport.base import Tap
 from companion.recording.folder import flight_folder
 from companion.recording.summary import Summary
@@ -47,7 +47,7 @@ class FlightRecords:
         if self._tap is not None:
             self._tap(time, frame)
 
-    def new(self) -> FlightRecord:
+    def new(self) -> FlightFiles:
         """The record of a new flight; if its folder cannot be made, it flies without one."""
         folder = None
         if self._directory is not None:
@@ -60,7 +60,7 @@ class FlightRecords:
         return self._record(None)
 
     @contextmanager
-    def recording(self, record: FlightRecord) -> Iterator[None]:
+    def recording(self, record: FlightFiles) -> Iterator[None]:
         """Write the frames of the link to a record while the block runs.
 
         Raises:
@@ -73,18 +73,18 @@ class FlightRecords:
             finally:
                 self._tap = None
 
-    def keep(self, record: FlightRecord, summary: Summary) -> None:
+    def keep(self, record: FlightFiles, summary: Summary) -> None:
         """Write the summary of a flight that is over; its log is closed."""
         record.save(summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
 
-    def discard(self, record: FlightRecord) -> None:
+    def discard(self, record: FlightFiles) -> None:
         """Remove the record of a takeover that failed: nothing was flown."""
         _remove(record.folder)
 
-    def _record(self, folder: Path | None) -> FlightRecord:
-        return FlightRecord(self._config, folder, self._environment, self._note, follows=False)
+    def _record(self, folder: Path | None) -> FlightFiles:
+        return FlightFiles(self._config, folder, self._environment, self._note, follows=False)
 
 
 def _remove(folder: Path | None) -> None:

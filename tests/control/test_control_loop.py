@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
-from companion.control.control_loop import ControlLoop, Deadlines
+from companion.control.control_loop import ControlLoop
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import Deadlines, Unanswered
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
 from companion.mavlink.errors import InvalidSetpoint

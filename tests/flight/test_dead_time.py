@@ -10,6 +10,8 @@ from companion.attitude import BodyRates
 from companion.config.files import load
 from companion.flight import assembly, dead_time_watch
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
+from companion.recording.flight_record import read_flight
+from companion.recording.recorded_summary import trace_of
 from companion.recording.trace import FlightTrace
 from tests.flight.fly import fly, mock_vehicle
 from tests.identification.vehicles import RATE_NOISE, lag_with_dead_time
@@ -197,7 +199,7 @@ def test_a_flight_measures_what_is_configured_and_keeps_its_rates(tmp_path):
     while (message := log.recv_match(type="SET_ATTITUDE_TARGET")) is not None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         asked[message.time_boot_ms] = (*rates, message.thrust)
-    rows = np.loadtxt(summary.log / "rates.csv", delimiter=",", skiprows=1)
+    rows = trace_of(read_flight(summary.log)).rates.rows()
     assert len(rows) > 3000
     sent = [asked[round(1000 * time)] for time in rows[:, 0]]
     assert rows[:, 2:6] == pytest.approx(np.array(sent), abs=1e-6)

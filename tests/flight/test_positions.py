@@ -48,14 +48,14 @@ def test_late_copies_of_positions_change_nothing(tmp_path, delay_ms):
     assert copied.result == "ok", copied.events
     assert copied.link["outdated"] > 100
     assert plain.link["outdated"] == 0
-    tracked = [(s.log / "tracking.csv").read_text() for s in (plain, copied)]
-    assert tracked[0] == tracked[1]
+    tracked = [s.trace.tracking.rows() for s in (plain, copied)]
+    np.testing.assert_array_equal(*tracked)
 
 
 def test_positions_a_little_late_are_carried_on_to_now(tmp_path):
     summary, _ = flown(tmp_path, "late", 200, flight={"maneuvers": ["circle"]})
     assert summary.result == "ok", summary.events
-    time, north, east = np.loadtxt(summary.log / "tracking.csv", delimiter=",", skiprows=1)[:, :3].T
+    time, north, east = summary.trace.tracking.rows()[:, :3].T
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     told = iter(lambda: log.recv_match(type=["LOCAL_POSITION_NED"]), None)
     stamps, x, y = np.array([(m.time_boot_ms / 1e3, m.x, m.y) for m in told]).T

@@ -8,6 +8,7 @@ from pymavlink import mavutil
 
 from companion.flight.observer import Silent
 from companion.recording.closing_words import closing_words
+from companion.recording.flight_record import read_flight
 from companion.testing import MockVehicle, fly
 from tests.flight.fly import QUICK_FLIGHT, QUICK_MOCK, QUICK_PARAMETERS, merged
 
@@ -102,7 +103,7 @@ def test_the_summary_tells_each_maneuver_and_keeps_the_old_keys(good):
 
 def test_the_motion_is_recorded_from_the_ground_to_the_ground(good):
     summary, _ = good
-    rows = np.genfromtxt(summary.log / "motion.csv", delimiter=",", names=True)
+    rows = read_flight(summary.log).rows("motion")
     assert np.diff(rows["time_s"]) == pytest.approx(0.1, abs=0.03)
     heights = rows["height_m"][~np.isnan(rows["height_m"])]
     assert heights[0] == pytest.approx(0.0, abs=0.2)

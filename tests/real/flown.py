@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from companion.mavlink.tlog_file import messages
+from companion.recording.flight_record import read_flight
+from companion.recording.recorded_summary import trace_of
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
 from tests.real.measures import straightness, tracking_errors
@@ -101,16 +103,17 @@ class Flying:
     def _measured(self, name: str, result: dict, arrival: float) -> dict:
         """All figures that the flight's folder and the truth give."""
         log = Path(result["log"])
-        tracking = _rows(log / "tracking.csv")
+        trace = trace_of(read_flight(log))
+        tracking = trace.tracking.rows().copy()
         assert len(tracking) > 2, "hardly anything was flown under control"
-        offset = stamp_offset(_rows(log / "rates.csv"), log / "flight.tlog")
+        offset = stamp_offset(trace.rates.rows(), log / "flight.tlog")
         tracking[:, 0] += offset
         truth = self._vehicle.truth(arrival, float(tracking[0, 0]) - 1.0)
         if truth is not None:
             np.savez_compressed(log / "truth.npz", **truth._asdict())
         out: dict = {"reported": result["tracking"]}
-        if (log / "response.csv").exists():
-            response = _rows(log / "response.csv")
+        if len(trace.response):
+            response = trace.response.rows().copy()
             response[:, 0] += offset
             told = estimated(response[:, 0], log / "flight.tlog")
             found = straightness(response, told, truth, result["gain_per_s"])
@@ -135,7 +138,3 @@ def positions(log: Path) -> Floats:
         [(m.time_boot_ms / 1e3, m.x, m.y, m.z) for _, m in messages(log, {"LOCAL_POSITION_NED"})]
     )
     return rows[np.unique(rows[:, 0], return_index=True)[1]]
-
-
-def _rows(path: Path) -> Floats:
-    return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)

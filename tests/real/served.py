@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from companion.recording.flight_record import read_flight
+from companion.recording.recorded_summary import trace_of
 from tests.real.build import REAL, ROOT
 from tests.real.measures import rms
 from tests.real.stamps import stamp_offset
@@ -95,8 +97,9 @@ def measured(vehicle, folder: Path, arrival: float) -> dict:
     """The summary of a recorded flight, and the errors on its circle at full speed, RMS in m."""
     summary = json.loads((folder / "summary.json").read_text())
     out = {"result": summary["result"], "latency_us": summary["latency_us"]}
-    tracking = _rows(folder / "tracking.csv")
-    tracking[:, 0] += stamp_offset(_rows(folder / "rates.csv"), folder / "flight.tlog")
+    trace = trace_of(read_flight(folder))
+    tracking = trace.tracking.rows().copy()
+    tracking[:, 0] += stamp_offset(trace.rates.rows(), folder / "flight.tlog")
     speed = np.linalg.norm(np.gradient(tracking[:, 1:4], tracking[:, 0], axis=0), axis=1)
     circle = tracking[abs(speed - SPEED) < _NEAR_SPEED]
     if len(circle) < _LEAST_ROWS:
@@ -110,10 +113,6 @@ def measured(vehicle, folder: Path, arrival: float) -> dict:
         shift = (circle[:, 4:7] - true).mean(axis=0)
         out["circle_truth_m"] = rms(true + shift - reference)
     return out
-
-
-def _rows(path: Path):
-    return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,12 @@ import pytest
 from companion.extras import MissingExtraError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.history import HEIGHTS, Marks, Span, draw_history, marks_of
+from companion.recording.mcap_file.channels import MOTION, SAMPLE, SETPOINT
+from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.writer import McapWriter
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 
-ROWS = "".join(f"{0.004 * k},1.0,0.0,0.0,0.0,0.1,0.0\n" for k in range(15))
-
-MOTION = "".join(f"{0.1 * k:.1f},nan,{0.05 * k},1.0,2.0,nan\n" for k in range(100))
 MARKS = Marks(
     phases=[(0.0, "connect"), (0.05, "checks"), (3.0, "takeoff"), (5.0, "maneuvers")],
     maneuvers=[Span(5.0, 6.0, "hover"), Span(6.0, 8.2, "steps (open loop)")],
@@ -33,25 +33,44 @@ SUMMARY = {
 }
 
 
+def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summary=None):
+    """A folder with a step north, ten seconds of motion, or both."""
+    writer = McapWriter(folder / "flight.mcap")
+    writer.metadata("flight", {"began_s": "0.0", "epoch_s": "0.0", "gain_per_s": gain})
+    for k in range(15 * steps):
+        time = 0.004 * k
+        numbers = {"received_s": time, "vehicle_time_s": time, "q_w": 1.0, "target_north": 0.1}
+        for channel, codes in ((SAMPLE, {}), (SETPOINT, {"is_step": 1})):
+            columns = (*channel.numbers, *channel.codes)
+            row = [{**numbers, **codes}.get(column.name, 0) for column in columns]
+            writer.message(channel.topic, k, channel.packing.pack(CDR, *row))
+    for k in range(100 * motion):
+        row = (0.1 * k, nan, 0.05 * k, 1.0, largest, nan)
+        writer.message("/motion", k, MOTION.packing.pack(CDR, *row))
+    writer.close()
+    (folder / "summary.json").write_text(json.dumps(summary))
+
+
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("broken", "words"),
     [
-        ("tracking.csv", "time\n", "it holds no rows"),
-        ("tracking.csv", "a,b\n1.0,2.0\n", "2 columns instead of 7"),
-        ("tracking.csv", "time\n" + "1e300," * 6 + "1\n", "a number is above 1e+09"),
-        ("tracking.csv", "time\n" + "x," * 6 + "1\n", "could not convert"),
-        ("summary.json", "[]", "summary.json: not as a flight writes it"),
-        ("summary.json", json.dumps({"gain_per_s": 0}), "gain_per_s is 0"),
-        ("motion.csv", "a,b\n1.0,2.0\n", "2 columns instead of 6"),
-        ("summary.json", json.dumps({"gain_per_s": 5.0, "phases": 3}), "not as a flight writes"),
+        ({"largest": 1e300}, "motion: not as a flight records it: a number is above 1e+09"),
+        ({"gain": "0"}, "gain_per_s is 0"),
+        ({"gain": "x"}, "could not convert"),
+        ({"summary": {"gain_per_s": 5.0, "phases": 3}}, "summary.json: not as a flight writes it"),
     ],
 )
-def test_files_that_no_flight_writes_are_refused(tmp_path, name, text, words):
-    (tmp_path / "response.csv").write_text("time\n" + ROWS)
-    (tmp_path / "motion.csv").write_text("time\n" + MOTION)
-    (tmp_path / "summary.json").write_text(json.dumps({"gain_per_s": 5.0}))
-    (tmp_path / name).write_text(text)
+def test_files_that_no_flight_writes_are_refused(tmp_path, broken, words):
+    record(tmp_path, **{"steps": True, "motion": True, "summary": SUMMARY, **broken})
     with pytest.raises(FigureError, match=words.replace("+", r"\+")):
+        draw_flight(tmp_path, tmp_path / "out.png")
+
+
+def test_a_folder_without_a_flight_is_refused(tmp_path):
+    with pytest.raises(FigureError, match="is this the folder of a flight"):
+        draw_flight(tmp_path, tmp_path / "out.png")
+    record(tmp_path, summary=SUMMARY)
+    with pytest.raises(FigureError, match="no flight with anything to draw"):
         draw_flight(tmp_path, tmp_path / "out.png")
 
 
@@ -89,14 +108,9 @@ def test_each_panel_has_its_curve_its_unit_and_all_marks():
         pyplot.close(figure)
 
 
-@pytest.mark.parametrize(
-    "kept", [("motion.csv",), ("response.csv",), ("motion.csv", "response.csv")]
-)
+@pytest.mark.parametrize("kept", [("motion",), ("steps",), ("motion", "steps")])
 def test_a_flight_is_drawn_with_what_it_recorded(tmp_path, kept):
-    for name, rows in (("motion.csv", MOTION), ("response.csv", ROWS)):
-        if name in kept:
-            (tmp_path / name).write_text("time\n" + rows)
-    (tmp_path / "summary.json").write_text(json.dumps(SUMMARY))
+    record(tmp_path, **dict.fromkeys(kept, True), summary=SUMMARY)
     draw_flight(tmp_path, tmp_path / "out.png")
     assert (tmp_path / "out.png").read_bytes()[:4] == b"\x89PNG"
 

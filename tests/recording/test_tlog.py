@@ -2,6 +2,7 @@
 
 import errno
 import io
+from pathlib import Path
 
 import pytest
 from pymavlink import mavutil
@@ -32,11 +33,11 @@ class FullDisk(io.BytesIO):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_full_disk_is_told_once_and_raises_nothing(tmp_path):
+def test_a_full_disk_is_told_once_and_raises_nothing(tmp_path, monkeypatch):
     told = []
     tlog = TlogWriter(tmp_path / "flight.tlog", 0.0, told.append)
-    tlog._file.close()
-    tlog._file = FullDisk()
+    monkeypatch.setattr(Path, "open", lambda *_, **__: FullDisk())
+    tlog.open()
     for k in range(100):
         tlog(float(k), b"frame")
     tlog.close()
@@ -48,4 +49,4 @@ def test_a_full_disk_is_told_once_and_raises_nothing(tmp_path):
 
 def test_a_folder_that_cannot_be_written_is_an_error_at_once(tmp_path):
     with pytest.raises(OSError, match="No such file"):
-        TlogWriter(tmp_path / "missing" / "flight.tlog", 0.0)
+        TlogWriter(tmp_path / "missing" / "flight.tlog", 0.0).open()

@@ -1,6 +1,4 @@
-"""What is kept of a flight, and what of it becomes a file."""
-
-import numpy as np
+"""What is kept of a flight."""
 
 from companion.attitude import BodyRates
 from companion.recording.trace import FlightTrace
@@ -17,18 +15,6 @@ def noted(rows=ROWS):
         measured = BodyRates(roll, pitch, yaw)
         trace.add_rates(time, received, BodyRates(*commanded), thrust, measured, age)
     return trace
-
-
-def test_rates_are_saved_with_their_names(tmp_path):
-    noted().save(tmp_path)
-    saved = np.genfromtxt(tmp_path / "rates.csv", delimiter=",", names=True)
-    assert saved["vehicle_time_s"].tolist() == [1.0, 1.1]
-    assert saved["received_s"].tolist() == [8.0, 8.2]
-    assert saved["commanded_pitch_rad_s"].tolist() == [0.2, 2.0]
-    assert saved["thrust"].tolist() == [0.5, 0.6]
-    assert saved["measured_yaw_rad_s"].tolist() == [-0.3, 6.0]
-    assert saved["age_s"].tolist() == [0.003, 0.004]
-    assert [path.name for path in tmp_path.iterdir()] == ["rates.csv"]
 
 
 def test_rows_can_be_had_from_one_on():

@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config.files import load
+from companion.recording.flight_record import read_flight
+from companion.replay.replay import Replay
 from tests.serve.virtual import (
     ALL,
     POSITION,
@@ -178,7 +180,11 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorde
         assert load(folder / "config.yaml").limits.max_tilt_deg == 45.0
         sent = sent_rates(folder / "flight.tlog")
         assert len(sent) == summary["setpoints"]
-        assert {name.name for name in folder.glob("*.csv")} >= {"tracking.csv", "rates.csv"}
+        replay = Replay(read_flight(folder), load(folder / "config.yaml"))
+        assert replay.follows_record
+        samples = replay.run()
+        assert sum(each.replayed is not None for each in samples) == summary["setpoints"]
+        assert [each for each in samples if not each.same] == []
 
     fly("px4", scene, directory=tmp_path)
 
@@ -199,7 +205,7 @@ def test_on_the_ground_ardupilot_s_setpoints_are_refused_in_words():
     async def whole():
         async with serving(vehicle, "ardupilot") as session:
             script = MemoryClient().connect(session)
-            await asyncio.sleep(50.0)
+            await asyncio.sleep(6.0)
             script.command(176, 1, 4)
             await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
             assert "take off first" in " ".join(script.texts())

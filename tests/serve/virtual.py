@@ -14,15 +14,14 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
+from tests.flight.fly import QuickVehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
 
 
 def mock(autopilot, **settings):
-    return testing.MockVehicle(
-        autopilot, lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings
-    )
+    return QuickVehicle(lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
 
 
 class MemoryClient(Client):

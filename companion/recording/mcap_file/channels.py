@@ -28,7 +28,8 @@ ACTIONS = (
     "hold_reference",
     "give_up",
     "follow",
-    "step_now",
+    "drop_command",
+    "restart_planner",
     "drag_prior",
 )
 """What a phase told guidance to do, by number."""
@@ -86,7 +87,11 @@ SETPOINT = Channel(
         Field("target_east", "The same, east."),
         Field("target_heading_rad", "Heading that the planner flies to, rad."),
         Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
-        Field("measured_north", "Acceleration coefficient of the measured attitude, north."),
+        *(
+            Field(f"q_{part}", "Attitude as the planner sees it, body FRD to NED.")
+            for part in "wxyz"
+        ),
+        Field("measured_north", "Acceleration coefficient of this attitude, north."),
         Field("measured_east", "The same, east."),
         Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
         Field("planned_east", "The same, east."),
@@ -120,6 +125,7 @@ GUIDANCE = Channel(
     (
         Code("holds_position", "Whether the vehicle should be at the horizontal reference."),
         Code("holds_height", "Whether the vehicle should be at the height of the reference."),
+        Code("height_steady", "Whether the commanded thrust is steady: no doublet, no own thrust."),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )
@@ -164,10 +170,10 @@ INPUT = Channel(
         Field("height_m", "Height above home, m."),
     ),
     (
+        Code("armed", "Whether the vehicle is armed."),
         Code("fresh", "Whether the position is fresh."),
         Code("standing", "Whether the vehicle stands on the ground."),
         Code("may_idle", "Whether zero thrust is safe."),
-        Code("armed", "Whether the vehicle is armed."),
         Code("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
 )

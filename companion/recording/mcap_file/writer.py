@@ -68,12 +68,15 @@ class McapWriter:
         self._writer.flush()  # type: ignore[no-untyped-call]
         os.fsync(self._file.fileno())
 
-    def close(self) -> None:
-        """Write the index and close the file.
+    def close(self, *, complete: bool = True) -> None:
+        """Close the file; first complete it by its index, unless a write has failed before.
 
         Raises:
             OSError: as `flush`.
         """
+        if not complete:
+            self._file.close()
+            return
         try:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self.flush()

@@ -1,4 +1,4 @@
-"""The records of one flight: its folder, its `.tlog`, and its summary."""
+"""The files of one flight: its configuration, `.tlog` and `.mcap`, and its summary."""
 
 import asyncio
 import time
@@ -9,6 +9,7 @@ from types import TracebackType
 
 from companion import realtime
 from companion.config import Config
+from companion.files.write_whole import write_whole
 from companion.flight import flown_config
 from companion.flight.assembly import Assembled
 from companion.flight.course import advice, course_of
@@ -16,14 +17,16 @@ from companion.flight.environment import Environment
 from companion.flight.observer import EventRecorder, Observer
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextFrames
+from companion.recording.recorder import FlightRecorder
 from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 
 
-class FlightRecord:
+class FlightFiles:
     """Records one flight. Use it as a context manager around the flight, inside the event loop.
 
-    `config.yaml` is written at the beginning, `flight.tlog` meanwhile, the rest by `save`.
+    `config.yaml` is written at the beginning, `flight.tlog` and `flight.mcap` meanwhile, the
+    summary by `save`.
 
     Args:
         config: of the flight.
@@ -35,6 +38,7 @@ class FlightRecord:
     Attributes:
         folder: as the argument.
         tap: writes frames down, or None if they are not recorded.
+        mcap: records the flight, or None.
 
     Raises:
         OSError: the folder cannot be written.
@@ -50,21 +54,26 @@ class FlightRecord:
         follows: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
-        self._in_vehicle_time = config.link.lockstep or not environment.realtime
         self._counted: dict[str, int] = {}
+        self._failed = False
         self.tap: TlogWriter | None = None
+        self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, follows=follows)
-
-    def __enter__(self) -> "FlightRecord":
-        if self.folder is not None:
             loop = asyncio.get_running_loop()
-            epoch = 0.0 if self._in_vehicle_time else time.time() - loop.time()
+            in_vehicle_time = config.link.lockstep or not environment.realtime
+            epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
 
-            def on_failure(text: str) -> None:  # called in the writing thread
-                loop.call_soon_threadsafe(self._note, text)
+            def on_failure(text: str) -> None:  # called in a writing thread
+                loop.call_soon_threadsafe(self._tell_failure, text)
 
-            self.tap = TlogWriter(self.folder / "flight.tlog", epoch, on_failure)
+            self.tap = TlogWriter(folder / "flight.tlog", epoch, on_failure)
+            self.mcap = FlightRecorder(folder / "flight.mcap", epoch, loop.time, on_failure)
+
+    def __enter__(self) -> "FlightFiles":
+        for file in (self.tap, self.mcap):
+            if file is not None:
+                file.open()
         return self
 
     def __exit__(
@@ -73,19 +82,28 @@ class FlightRecord:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self.tap is not None:
-            self.tap.close()
+        for file in (self.tap, self.mcap):
+            if file is not None:
+                file.close()
+
+    def _tell_failure(self, text: str) -> None:
+        """Tell once that the recording has stopped: a full disk stops both files."""
+        if not self._failed:
+            self._failed = True
+            self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """Passes phases and events on, and writes them into the `.tlog` as STATUSTEXT of ours."""
+        """Passes phases and events on, and records them; in the `.tlog` as STATUSTEXT of ours."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
             if self.tap is not None:
                 for frame in texts.frames(words):
                     self.tap(clock(), frame)
+            if self.mcap is not None:
+                self.mcap.event(words)
 
-        return EventRecorder(observer, clock, write)
+        return EventRecorder(observer, clock, write, self.mcap)
 
     def begin_counting(self, stats: LinkStats) -> None:
         """Count the link's frames from now on, where the link was open before the flight."""
@@ -136,20 +154,19 @@ class FlightRecord:
         )
 
     def save(self, summary: Summary) -> Summary:
-        """Write `summary.json` and the CSV files, once the log is closed; return the summary.
+        """Write `summary.json`, once the log is closed; return the summary.
 
-        A file that cannot be written is noted.
+        If it cannot be written, that is noted.
         """
-        dropped = 0 if self.tap is None else self.tap.dropped
+        dropped = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
         whole = replace(summary, link={**summary.link, "not_recorded": dropped})
         folder = self.folder
         if folder is None:
             return whole
         try:
-            (folder / "summary.json").write_text(whole.as_json() + "\n", encoding="utf-8")
-            whole.trace.save(folder)
+            write_whole(folder / "summary.json", whole.as_json() + "\n")
         except OSError as error:
-            self._note(f"{folder}: some files were not written: {error.strerror}")
+            self._note(f"{folder}: summary.json was not written: {error.strerror}")
         return whole
 
 

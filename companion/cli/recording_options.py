@@ -1,0 +1,44 @@
+"""The options of the commands that read recorded flights."""
+
+from pathlib import Path
+
+from companion.cli.tool_options import Commands
+
+
+def add_recordings(commands: Commands) -> None:
+    """Add `export` and `replay`."""
+    _add_export(commands)
+    _add_replay(commands)
+
+
+def _add_export(commands: Commands) -> None:
+    export = commands.add_parser("export", help="write a recorded flight as CSV or Parquet")
+    export.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    kind = export.add_mutually_exclusive_group(required=True)
+    kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
+    kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
+    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: the flight's folder")
+    export.set_defaults(run="recordings.export")
+
+
+def _add_replay(commands: Commands) -> None:
+    replay = commands.add_parser(
+        "replay",
+        help="run the code again over a recorded flight",
+        description="Run the control loop and guidance again over what a flight recorded, and "
+        "compare each command. With its own configuration all commands must be those of the "
+        "flight, to the bit; with another one it shows what would have been sent.",
+    )
+    replay.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
+    replay.add_argument("--config", type=Path, metavar="FILE", help="instead of the flight's own")
+    replay.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="instead of the configuration's, such as planner.gain_per_s=4; as often as needed",
+    )
+    replay.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write both answers to each sample"
+    )
+    replay.set_defaults(run="recordings.replay")

@@ -1,0 +1,58 @@
+"""The commands that read recorded flights: `plot`, `export` and `replay`."""
+
+import argparse
+from pathlib import Path
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.config.files import assigned, changed, load
+from companion.files.yaml_file import ConfigError
+from companion.recording.flight_record import read_flight
+
+
+def plot(options: argparse.Namespace) -> int:
+    """Draw a recorded flight."""
+    from companion.recording.figure import draw_flight  # noqa: PLC0415  no other command needs it
+
+    out = options.out or options.folder / "flight.png"
+    draw_flight(options.folder, out)
+    print(out)
+    return EXIT_OK
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write the tables of a recorded flight as CSV or Parquet."""
+    from companion.recording.export import export_csv, export_parquet  # noqa: PLC0415
+
+    record = read_flight(options.folder)
+    into: Path = options.into or options.folder
+    write = export_parquet if options.parquet else export_csv
+    try:
+        into.mkdir(parents=True, exist_ok=True)
+        for path in write(record, into):
+            print(path)
+    except OSError as error:
+        raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
+    return EXIT_OK
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Run the code again over a recorded flight; fails if its own configuration gives others."""
+    from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
+    from companion.replay.report import words, write_csv  # noqa: PLC0415
+
+    record = read_flight(options.folder)
+    own = options.config is None and not options.set
+    config = load(options.config or options.folder / "config.yaml")
+    if options.set:
+        config = changed(config, assigned(options.set), "--set")
+    flown = Replay(record, config)
+    samples = flown.run()
+    for line in words(samples, record.began, follows_record=flown.follows_record):
+        print(line)
+    if options.csv is not None:
+        try:
+            write_csv(samples, options.csv)
+        except OSError as error:
+            raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
+        print(options.csv)
+    return EXIT_OK if not own or all(each.same for each in samples) else EXIT_FLIGHT

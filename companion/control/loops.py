@@ -1,0 +1,70 @@
+"""Builds both loops from the configuration: the control loop, and guidance, which commands it."""
+
+from collections.abc import Callable
+
+from companion.config import Config
+from companion.control.control_loop import ControlLoop, SendSetpoint
+from companion.control.guidance_loop import GuidanceLoop
+from companion.control.inner_loop import hover_thrust, planner, rate_limits
+from companion.control.loop_record import Deadlines
+from companion.control.outer_loop import make_guidance, motion_estimate
+from companion.control.telemetry import Clock, Ground, Telemetry
+from companion.recording.trace import FlightTrace
+
+
+def make_loops(
+    config: Config,
+    send: SendSetpoint,
+    state: Telemetry,
+    ground: Ground,
+    vehicle_clock: Clock,
+    trace: FlightTrace,
+    clock: Callable[[], float],
+    clock_ns: Callable[[], int],
+) -> tuple[ControlLoop, GuidanceLoop]:
+    """The control loop, and the guidance loop that writes its commands.
+
+    Args:
+        config: of the flight.
+        send: sends setpoints.
+        state: telemetry of the vehicle.
+        ground: whether it stands on the ground.
+        vehicle_clock: the vehicle's clock.
+        trace: takes what the loops record.
+        clock: returns event-loop time, s.
+        clock_ns: returns the time that latencies are measured by, ns.
+
+    Raises:
+        ConfigError: a plug-in cannot be loaded.
+    """
+    thrust = hover_thrust(config)
+    deadman = config.deadman
+    loop = ControlLoop(
+        planner(config),
+        thrust,
+        send,
+        Deadlines(
+            telemetry_stale=deadman.telemetry_stale,
+            target_stale=deadman.target_stale,
+            deadline=deadman.deadline,
+        ),
+        trace,
+        rate_limits(config),
+        clock,
+        clock_ns,
+    )
+    guidance_loop = GuidanceLoop(
+        loop,
+        make_guidance(config),
+        motion_estimate(config, lambda: vehicle_clock.offset),
+        thrust,
+        state,
+        ground,
+        trace,
+        max_tilt=config.limits.max_tilt,
+        period=1.0 / config.guidance.rate_hz,
+        position_stale=deadman.position_stale,
+        clock=clock,
+        vehicle_clock=vehicle_clock,
+    )
+    return loop, guidance_loop

@@ -1,0 +1,144 @@
+"""What the control loop records of a sample: values in, messages of `flight.mcap` out.
+
+The loop hands over what it has at hand. The functions here run in the recorder's thread and take
+the numbers out of it, in the order of the columns in `companion.recording.mcap_file.channels`.
+"""
+
+from math import nan, sqrt
+from typing import NamedTuple
+
+from companion.attitude import BodyRates, Limits, Quaternion, Target
+from companion.attitude.history import PlannedTilt
+from companion.attitude.kinematics import tilt_products
+from companion.control.loop_record import Unanswered
+from companion.recording.mcap_file.channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
+from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.writer import McapWriter
+from companion.vehicle.clock_jumps import Misfit
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
+
+_CODES: dict[Unanswered | None, int] = {None: 0}
+_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
+CONTROL_OFF = 1
+"""Code of a sample that came while the loop was off."""
+_MISFITS = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
+_AT_LIMIT = 1.0 - 1e-9
+_NO_TARGET = Target(nan, nan, nan, nan)
+
+
+class LoopFlags(NamedTuple):
+    """The state of the control loop when a sample arrived; attributes as in `ControlLoop`."""
+
+    on: bool
+    taking_over: bool
+    offboard_active: bool
+    awaiting_mode: bool
+    same_vehicle: bool
+
+
+class Answer(NamedTuple):
+    """A setpoint that was sent, and what it was made from.
+
+    Attributes:
+        rates: rad/s.
+        thrust: 0..1.
+        latency_ns: from the sample's arrival, ns.
+        asked: attitude and target as the planner saw them; None: body rates of guidance, or idle.
+        planned: the plan in effect at the sample, or None.
+        is_step: see `GuidanceCommand`.
+        idle: see `GuidanceCommand`.
+    """
+
+    rates: BodyRates
+    thrust: float
+    latency_ns: int
+    asked: tuple[Quaternion, Target] | None
+    planned: PlannedTilt | None
+    is_step: bool
+    idle: bool
+
+
+class SampleEntry(NamedTuple):
+    """A sample that reached the control loop.
+
+    Attributes:
+        sample: the sample.
+        reason: why it is unanswered, or None.
+        flags: before it was answered.
+        checked: when its age was checked before sending, s on our clock; NaN: it was not.
+        answer: what was sent, or None.
+    """
+
+    sample: AttitudeSample
+    reason: Unanswered | None
+    flags: LoopFlags
+    checked: float
+    answer: Answer | None
+
+
+class SampleRows:
+    """Writes the channels of numbers that the control loop records.
+
+    Args:
+        limits: of the body rates.
+        thrust_limits: smallest and largest thrust that is sent, 0..1.
+    """
+
+    def __init__(self, limits: Limits, thrust_limits: tuple[float, float]) -> None:
+        self._tilt_rate = _AT_LIMIT * limits.tilt_rate
+        self._yaw_rate = _AT_LIMIT * limits.yaw_rate
+        self._thrust_limits = thrust_limits
+
+    def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
+        """Write a sample, and the setpoint that answers it."""
+        sample, reason, flags, checked, answer = entry
+        code = _CODES[reason] if flags.on else CONTROL_OFF
+        data = SAMPLE.packing.pack(
+            CDR,
+            sample.received,
+            sample.vehicle_time,
+            sample.time_boot_ms,
+            sample.age,
+            *sample.q,
+            *sample.body_rates,
+            checked,
+            code,
+            _MISFITS[sample.misfit],
+            sample.age_known,
+            *flags,
+        )
+        writer.message("/sample", time_ns, data)
+        if answer is not None:
+            data = SETPOINT.packing.pack(CDR, *self._setpoint(sample, flags, answer))
+            writer.message("/setpoint", time_ns, data)
+
+    def attitude_target(self, writer: McapWriter, time_ns: int, target: AttitudeTarget) -> None:
+        """Write a new ATTITUDE_TARGET."""
+        data = ATTITUDE_TARGET.packing.pack(CDR, target.time_boot_ms, *target.q)
+        writer.message("/attitude_target", time_ns, data)
+
+    def _setpoint(
+        self, sample: AttitudeSample, flags: LoopFlags, answer: Answer
+    ) -> tuple[float, ...]:
+        rates, thrust, latency_ns, asked, planned, is_step, idle = answer
+        q, target = asked or (sample.q, _NO_TARGET)
+        _, ax, ay = tilt_products(*q)
+        roll, pitch, yaw = rates
+        return (
+            sample.received,
+            sample.vehicle_time,
+            *rates,
+            thrust,
+            1e-3 * latency_ns,
+            *target,
+            *q,
+            -2.0 * ay,
+            2.0 * ax,
+            *((nan, nan) if planned is None else planned[:2]),
+            sqrt(roll * roll + pitch * pitch) >= self._tilt_rate,
+            abs(yaw) >= self._yaw_rate,
+            not idle and thrust in self._thrust_limits,
+            flags.offboard_active,
+            is_step,
+            idle,
+        )

@@ -1,0 +1,210 @@
+"""What guidance records of a step: values in, messages of `flight.mcap` out.
+
+As in `companion.control.sample_rows`, the functions run in the recorder's thread.
+"""
+
+from math import nan, sqrt
+from typing import NamedTuple
+
+from companion.attitude import Quaternion, Target
+from companion.control.guidance_command import GuidanceCommand
+from companion.guidance import GuidanceInput, Reference
+from companion.guidance.reference import Vector
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import GUIDANCE, INPUT, TARGET
+from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.writer import McapWriter
+from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
+
+_NO_VECTOR = (nan, nan, nan)
+_NO_TARGET = Target(nan, nan, nan, nan)
+_HALF_ROOT = sqrt(0.5)
+_DRAWN_EACH = 2
+"""Each second step of guidance is drawn in 3D."""
+
+
+class StepFlags(NamedTuple):
+    """What a step of guidance found.
+
+    Attributes:
+        fresh: whether the position is fresh.
+        standing: whether the vehicle stands on the ground.
+        may_idle: whether zero thrust is safe.
+        offboard_active: whether the autopilot obeys the setpoints.
+    """
+
+    fresh: bool
+    standing: bool
+    may_idle: bool
+    offboard_active: bool
+
+
+class StepInput(NamedTuple):
+    """The telemetry that a step of guidance reads; None: unknown.
+
+    Attributes:
+        time: when the step began, s on our clock.
+        position: the newest position.
+        clock_offset: vehicle time minus our time, s.
+        battery: of the vehicle.
+        autopilot_thrust: in ATTITUDE_TARGET.
+        height: above home, m.
+        armed: whether the vehicle is armed.
+        flags: what the step found.
+    """
+
+    time: float
+    position: LocalPosition | None
+    clock_offset: float | None
+    battery: Battery | None
+    autopilot_thrust: AttitudeTargetThrust | None
+    height: float | None
+    armed: bool | None
+    flags: StepFlags
+
+
+class StepOutput(NamedTuple):
+    """What a step of guidance computed.
+
+    Attributes:
+        measured_at: the step's time on the vehicle's clock, s.
+        q: newest attitude.
+        inputs: motion, wind and drag.
+        reference: reference of the step.
+        error: distance from the reference, m, or None.
+    """
+
+    measured_at: float
+    q: Quaternion
+    inputs: GuidanceInput
+    reference: Reference
+    error: float | None
+
+
+class StepEntry(NamedTuple):
+    """A step of guidance.
+
+    Attributes:
+        read: what it read.
+        made: what it computed; None: nothing, without a fresh position or on the ground.
+        command: what it left with the control loop; None: no new command.
+    """
+
+    read: StepInput
+    made: StepOutput | None
+    command: GuidanceCommand | None
+
+
+class StepRows:
+    """Writes the channels that guidance records, and the vehicle as 3D viewers draw it (ENU)."""
+
+    def __init__(self) -> None:
+        self._transform = cdr.PoseEncoder("world", "vehicle")
+        self._pose = cdr.PoseEncoder("world")
+        self._count = 0
+
+    def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
+        """Write what a step read and computed, and its command."""
+        read, made, command = entry
+        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input(read)))
+        if command is not None:
+            data = TARGET.packing.pack(CDR, *_target(command))
+            writer.message("/target", time_ns, data)
+        if made is not None:
+            data = GUIDANCE.packing.pack(
+                CDR, read.time, *_guidance(made), read.flags.offboard_active
+            )
+            writer.message("/guidance", time_ns, data)
+            self._count += 1
+            if self._count % _DRAWN_EACH == 0:
+                self._draw(writer, time_ns, made)
+
+    def _draw(self, writer: McapWriter, time_ns: int, made: StepOutput) -> None:
+        pose = (*_east_north_up(made.inputs.now.position_ned), *_enu_from_flu(made.q))
+        writer.message("/tf", time_ns, self._transform.message(time_ns, pose))
+        writer.message("/pose", time_ns, self._pose.message(time_ns, pose))
+        # Drawn with the attitude of the vehicle, because a reference has none.
+        there = (*_east_north_up(made.reference.position_ned), *_enu_from_flu(made.q))
+        writer.message("/reference", time_ns, self._pose.message(time_ns, there))
+
+
+def _input(read: StepInput) -> tuple[float, ...]:
+    position, battery, thrust = read.position, read.battery, read.autopilot_thrust
+    return (
+        read.time,
+        *(
+            (nan,) * 8
+            if position is None
+            else (
+                position.received,
+                position.vehicle_time,
+                *position.position_ned,
+                *position.velocity_ned,
+            )
+        ),
+        _number(read.clock_offset),
+        nan if battery is None else battery.received,
+        nan if battery is None else _number(battery.voltage_v),
+        nan if thrust is None else thrust.received,
+        nan if thrust is None else thrust.thrust,
+        _number(read.height),
+        read.armed is True,
+        *read.flags,
+    )
+
+
+def _target(command: GuidanceCommand) -> tuple[float, ...]:
+    return (
+        command.made_at,
+        *command.target,
+        *(command.later or _NO_TARGET),
+        command.acceleration_down,
+        *(command.body_rates or _NO_VECTOR),
+        _number(command.thrust),
+        command.turn,
+        command.period,
+        command.idle,
+        command.is_step,
+    )
+
+
+def _guidance(made: StepOutput) -> tuple[float, ...]:
+    inputs, reference = made.inputs, made.reference
+    return (
+        made.measured_at,
+        *reference.position_ned,
+        *reference.velocity_ned,
+        reference.heading,
+        *inputs.now.position_ned,
+        *inputs.now.velocity_ned,
+        _number(made.error),
+        *inputs.disturbance,
+        inputs.drag.linear,
+        inputs.drag.quadratic,
+        reference.holds_position,
+        reference.holds_height,
+        reference.height_is_steady,
+    )
+
+
+def _number(value: float | None) -> float:
+    return nan if value is None else value
+
+
+def _east_north_up(ned: Vector) -> Vector:
+    return ned[1], ned[0], -ned[2]
+
+
+def _enu_from_flu(q: Quaternion) -> Quaternion:
+    """(x, y, z, w) of body FLU → world ENU, from (w, x, y, z) of body FRD → world NED.
+
+    It is (0, √½, √½, 0) ⊗ q ⊗ (0, 1, 0, 0), with the other sign: the axes of the world are swapped
+    before q, those of the body after it.
+    """
+    w, x, y, z = q
+    return (
+        _HALF_ROOT * (x + y),
+        _HALF_ROOT * (x - y),
+        _HALF_ROOT * (w - z),
+        _HALF_ROOT * (w + z),
+    )

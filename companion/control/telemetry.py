@@ -1,0 +1,82 @@
+"""What guidance reads of the vehicle."""
+
+from typing import Protocol
+
+from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
+
+
+class Telemetry(Protocol):
+    """The telemetry that guidance reads; attributes as in `VehicleState`."""
+
+    @property
+    def position(self) -> LocalPosition | None:
+        """The newest position."""
+        ...
+
+    @property
+    def battery(self) -> Battery | None:
+        """The newest state of the battery."""
+        ...
+
+    @property
+    def attitude_target_thrust(self) -> AttitudeTargetThrust | None:
+        """The newest thrust of the autopilot."""
+        ...
+
+    @property
+    def height(self) -> float | None:
+        """Height above home, m."""
+        ...
+
+    @property
+    def armed(self) -> bool | None:
+        """Whether the vehicle is armed; None: unknown."""
+        ...
+
+
+class Ground(Protocol):
+    """Whether the vehicle stands on the ground, as `GroundContact` tells it."""
+
+    @property
+    def standing(self) -> bool:
+        """Whether it stands on the ground."""
+        ...
+
+    @property
+    def may_idle(self) -> bool:
+        """Whether zero thrust is safe."""
+        ...
+
+
+class Clock(Protocol):
+    """The vehicle's clock, as `VehicleClock` tells it."""
+
+    @property
+    def offset(self) -> float | None:
+        """Vehicle time minus event-loop time, s, or None."""
+        ...
+
+    def age(self, vehicle_time: float, now: float) -> float | None:
+        """Age at the event-loop time `now` of a message stamped with `vehicle_time`, s."""
+        ...
+
+
+class FreshPosition:
+    """The newest position while it is fresh.
+
+    Args:
+        state: telemetry of the vehicle.
+        vehicle_clock: the vehicle's clock.
+        stale: an older position is not used, s.
+    """
+
+    def __init__(self, state: Telemetry, vehicle_clock: Clock, stale: float) -> None:
+        self._state, self._vehicle_clock, self._stale = state, vehicle_clock, stale
+
+    def at(self, now: float) -> LocalPosition | None:
+        """The newest position; None if at `now` (s) it arrived or was measured too long ago."""
+        position = self._state.position
+        if position is None or now - position.received > self._stale:
+            return None
+        age = self._vehicle_clock.age(position.vehicle_time, now)
+        return None if age is not None and age > self._stale else position

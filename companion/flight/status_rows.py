@@ -1,0 +1,90 @@
+"""Records the thrust estimator, the resources of this program, and the counters of the link."""
+
+import resource
+from collections.abc import Callable
+from math import nan
+from time import process_time
+from typing import Protocol
+
+from companion.flight.context import FlightContext
+from companion.recording.mcap_file.channels import RESOURCES, THRUST
+from companion.recording.recorder import FlightRecorder
+
+_RESOURCES_PERIOD = 1.0
+_KB_PER_MB = 1024.0
+
+
+class Recording(Protocol):
+    """A file that is being recorded."""
+
+    @property
+    def waiting(self) -> int:
+        """Number of items that wait to be written."""
+        ...
+
+    @property
+    def dropped(self) -> int:
+        """Number of items that were not recorded."""
+        ...
+
+
+class StatusRows:
+    """Records ten times a second the thrust, once a second resources and link.
+
+    Args:
+        context: of the flight.
+        recorder: of the flight, or None.
+        clock: our clock, s.
+    """
+
+    def __init__(
+        self, context: FlightContext, recorder: FlightRecorder | None, clock: Callable[[], float]
+    ) -> None:
+        self._context, self._recorder, self._clock = context, recorder, clock
+        self._due = self._measured_at = clock()
+        self._processor_s = process_time()
+
+    def record(self, now: float) -> None:
+        """Record what is due at `now`, s on our clock."""
+        recorder = self._recorder
+        if recorder is None:
+            return
+        recorder.row(now, THRUST, self._thrust(now))
+        if now >= self._due:
+            self._due = now + _RESOURCES_PERIOD
+            recorder.row(now, RESOURCES, self._resources(now, recorder))
+
+    def _thrust(self, now: float) -> tuple[float, ...]:
+        context = self._context
+        learning, battery = context.guidance_loop.learning, context.link.state.battery
+        voltage = None if battery is None else battery.voltage_v
+        remaining = None if battery is None else battery.remaining
+        return (
+            now,
+            learning.hover,
+            *learning.thrust_limits,
+            context.loop.record.thrust,
+            nan if voltage is None else voltage,
+            nan if remaining is None else remaining,
+        )
+
+    def _resources(self, now: float, recorder: Recording) -> tuple[float, ...]:
+        """Processor time counts the whole program, in a test also the mock vehicle."""
+        processor_s, before = process_time(), self._processor_s
+        elapsed, self._measured_at = now - self._measured_at, now
+        self._processor_s = processor_s
+        link, record = self._context.link, self._context.loop.record
+        round_trip = link.timesync.round_trip_s
+        return (
+            now,
+            (processor_s - before) / elapsed if elapsed > 0.0 else nan,
+            resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _KB_PER_MB,
+            recorder.waiting,
+            recorder.dropped,
+            link.stats.frames,
+            link.stats.lost,
+            link.stats.sent,
+            nan if round_trip is None else 1e3 * round_trip,
+            record.setpoints,
+            record.missed_deadlines,
+        )

@@ -1,0 +1,78 @@
+"""Exports a recorded flight as CSV or Parquet: one file for each channel of numbers.
+
+Besides the channels there are three tables that join them, as the figures after a flight use them:
+`tracking`, `rates` and `response` (see `FlightTrace`).
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.extras import require
+from companion.recording.flight_record import FlightRecord
+from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.recorded_summary import trace_of
+
+_JOINED = ("tracking", "rates", "response")
+
+
+class Table(NamedTuple):
+    """A table: the names of its columns, and the columns."""
+
+    name: str
+    columns: dict[str, NDArray[np.generic]]
+
+
+def tables(record: FlightRecord) -> Iterator[Table]:
+    """All tables of a flight that have rows."""
+    for channel in CHANNELS:
+        rows = record.rows(channel.name)
+        if len(rows):
+            names = rows.dtype.names or ()
+            yield Table(channel.name, {name: rows[name] for name in names})
+    trace = trace_of(record)
+    for name in _JOINED:
+        series = getattr(trace, name)
+        if len(series):
+            yield Table(name, dict(zip(series.columns, series.rows().T, strict=True)))
+
+
+def export_csv(record: FlightRecord, folder: Path) -> list[Path]:
+    """Write each table as `NAME.csv` into an existing folder; returns the files.
+
+    Numbers have the digits that give the same number again when they are read.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    written = []
+    for name, columns in tables(record):
+        path = folder / f"{name}.csv"
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        with path.open("w", encoding="utf-8") as file:
+            file.write(",".join(columns) + "\n")
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+        written.append(path)
+    return written
+
+
+def export_parquet(record: FlightRecord, folder: Path) -> list[Path]:
+    """Write each table as `NAME.parquet` into an existing folder; returns the files.
+
+    Raises:
+        MissingExtraError: pyarrow is missing.
+        OSError: a file cannot be written.
+    """
+    require("pyarrow", "export", "exporting Parquet")
+    from pyarrow import Table as ArrowTable  # noqa: PLC0415  an extra
+    from pyarrow import parquet  # noqa: PLC0415
+
+    written = []
+    for name, columns in tables(record):
+        path = folder / f"{name}.parquet"
+        parquet.write_table(ArrowTable.from_pydict(columns), path)
+        written.append(path)
+    return written

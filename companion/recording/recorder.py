@@ -1,0 +1,151 @@
+"""Records a flight into `flight.mcap`, in a thread of its own.
+
+The control loop hands over an encoder and plain values. Making and writing the messages is the work
+of the thread.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import nan
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from companion.recording.background_file import BackgroundFile
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import ACTION, ACTIONS
+from companion.recording.mcap_file.fields import CDR, Channel
+from companion.recording.mcap_file.writer import McapWriter
+
+_MOST_WAITING = 50_000
+_INFORMATION, _WARNING = 2, 3
+
+Encoder = Callable[[McapWriter, int, Any], None]
+"""Writes the messages of one entry; gets the file, the time in ns since 1970, and the values."""
+
+
+class Entry(NamedTuple):
+    """What the thread makes messages of.
+
+    Attributes:
+        time: s on our clock.
+        encoder: makes the messages.
+        values: for the encoder; nothing in them changes any more.
+    """
+
+    time: float
+    encoder: Encoder
+    values: Any
+
+
+class FlightRecorder(BackgroundFile[Entry]):
+    """Records a flight; never delays it, and never raises in the middle of it.
+
+    Args:
+        path: file that `open` creates.
+        epoch: s since 1970 at which the flight's clock read 0.
+        clock: the flight's, s.
+        on_failure: called once, from the writing thread, when the file cannot be written any more.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        epoch: float,
+        clock: Callable[[], float],
+        on_failure: Callable[[str], None] | None = None,
+    ) -> None:
+        self._epoch, self._clock = epoch, clock
+        super().__init__(path, _MOST_WAITING, on_failure)
+
+    def _make_file(self) -> "_McapEntries":
+        return _McapEntries(self.path, self._epoch)
+
+    def add(self, time: float, encoder: Encoder, values: Any) -> None:
+        """Record an entry of `time` (s on our clock)."""
+        self.put(Entry(time, encoder, values))
+
+    def metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Record metadata."""
+        self.add(self._clock(), _metadata, (name, values))
+
+    def begin(self, began: float, values: Mapping[str, str]) -> None:
+        """Record when the flight began (s on our clock), and more about it as metadata."""
+        times = {"began_s": repr(began), "epoch_s": repr(self._epoch)}
+        self.metadata("flight", {**times, **values})
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Record that a phase begins now."""
+        now = self._clock()
+        self.add(now, _words, ("/phase", (now,), (name, waits_for)))
+
+    def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
+        """Record that a maneuver begins, or (None) the last one ends; see `ManeuverMark`."""
+        self.add(time, _words, ("/maneuver", (time, vehicle_time), (name or "",)))
+
+    def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
+        """Record that the alarm of a safety monitor is raised now, or is over."""
+        now = self._clock()
+        self.add(now, _words, ("/alarm", (now, float(raised)), (monitor, reason, action)))
+
+    def action(
+        self,
+        time: float,
+        name: str,
+        clock_offset: float | None = None,
+        drag: tuple[float, float] = (nan, nan),
+    ) -> None:
+        """Record what a phase tells guidance to do; the arguments are the columns of ACTION."""
+        offset = nan if clock_offset is None else clock_offset
+        self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
+
+    def event(self, text: str) -> None:
+        """Record an event of now, in words."""
+        source, colon, _ = text.partition(": ")
+        source = source if colon and source in ("safety", "autopilot", "phase") else "flight"
+        self.add(self._clock(), _log, (text, source))
+
+    def row(self, time: float, channel: Channel, values: Sequence[float]) -> None:
+        """Record a message of a channel of numbers: the float64 columns, then the uint8 columns."""
+        self.add(time, _row, (channel, values))
+
+
+class _McapEntries:
+    """Writes entries to a `.mcap`."""
+
+    def __init__(self, path: Path, epoch: float) -> None:
+        self._writer = McapWriter(path)
+        self._epoch_ns = round(epoch * 1e9)
+
+    def write(self, items: Sequence[Entry]) -> None:
+        writer, epoch_ns = self._writer, self._epoch_ns
+        for time, encoder, values in items:
+            encoder(writer, epoch_ns + round(time * 1e9), values)
+
+    def sync(self) -> None:
+        self._writer.flush()
+
+    def close(self, *, complete: bool) -> None:
+        self._writer.close(complete=complete)
+
+
+def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]]) -> None:
+    writer.metadata(*values)
+
+
+def _words(
+    writer: McapWriter,
+    time_ns: int,
+    values: tuple[str, tuple[float, ...], tuple[str, ...]],
+) -> None:
+    topic, numbers, texts = values
+    writer.message(topic, time_ns, cdr.words_message(numbers, texts))
+
+
+def _log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> None:
+    text, source = values
+    level = _WARNING if source == "safety" else _INFORMATION
+    writer.message("/log", time_ns, cdr.log_message(time_ns, level, text, source))
+
+
+def _row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
+    channel, numbers = values
+    writer.message(channel.topic, time_ns, channel.packing.pack(CDR, *numbers))

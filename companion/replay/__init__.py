@@ -1,0 +1,1 @@
+"""Runs the code of a flight again over what the flight recorded."""

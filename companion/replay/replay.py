@@ -1,0 +1,190 @@
+"""Replays a recorded flight: the same loops, fed with what entered them, command by command.
+
+Guidance flies the maneuvers of the configuration again. Where another program commanded the flight,
+or predictive control flew, the recorded commands of guidance are used, and only the control loop is
+replayed: what came from another process is not in the record.
+"""
+
+from math import isnan
+from typing import NamedTuple
+
+from companion.attitude import BodyRates
+from companion.config import Config
+from companion.config.known_drag import prior_of
+from companion.control.loops import make_loops
+from companion.flight.maneuvers import configured_maneuvers
+from companion.guidance import Pose, Reference, VehicleMotion
+from companion.guidance.drag_estimate import ANY_VEHICLE
+from companion.guidance.reference import ReferenceAt
+from companion.guidance.source import ManeuverSource, Source
+from companion.mavlink.codec import SetpointEncoder
+from companion.recording.flight_record import FlightRecord
+from companion.recording.mcap_file.channels import REASONS
+from companion.recording.trace import FlightTrace
+from companion.replay.entries import (
+    RecordedAction,
+    RecordedSample,
+    RecordedStep,
+    Setpoint,
+    entries,
+)
+from companion.replay.vehicle import ReplayedVehicle
+
+
+class ReplayedSample(NamedTuple):
+    """One sample in both.
+
+    Attributes:
+        received: when it arrived, s on our clock.
+        vehicle_time: its stamp, s.
+        recorded: what the flight sent, or None.
+        replayed: what the replay sends, or None.
+        recorded_reason: why the flight did not answer, of `REASONS`.
+        replayed_reason: why the replay does not.
+    """
+
+    received: float
+    vehicle_time: float
+    recorded: Setpoint | None
+    replayed: Setpoint | None
+    recorded_reason: str
+    replayed_reason: str
+
+    @property
+    def same(self) -> bool:
+        """Whether both sent the same numbers, to the bit, or nothing for the same reason."""
+        return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
+
+
+class Replay:
+    """Replays a flight with a configuration: its own, or another one.
+
+    Args:
+        record: of the flight.
+        config: to replay with.
+
+    Attributes:
+        follows_record: whether the commands of guidance are taken from the record.
+
+    Raises:
+        ConfigError: a maneuver of the configuration cannot be flown.
+    """
+
+    def __init__(self, record: FlightRecord, config: Config) -> None:
+        flew_program = record.metadata["flight"].get("plan") == "program"
+        self.follows_record = flew_program or config.guidance.kind == "nmpc"
+        self._record = record
+        self._now = 0.0
+        self._vehicle = vehicle = ReplayedVehicle()
+        self._loop, self._guidance = make_loops(
+            config,
+            self._send,
+            vehicle,
+            vehicle,
+            vehicle,
+            FlightTrace(),
+            lambda: self._now,
+            lambda: 0,
+        )
+        self._loop.is_same_vehicle = lambda: self._same_vehicle
+        self._loop.planner.attitude_target = lambda: vehicle.attitude_target
+        self._same_vehicle = self._accepts = True
+        self._sent: Setpoint | None = None
+        self._encoder = SetpointEncoder(1, 1, 1, 1, signed=False)
+        self._recorded_source = _RecordedSource()
+        self._source: Source = self._recorded_source
+        if not self.follows_record:
+            self._source = ManeuverSource(configured_maneuvers(config))
+
+    def run(self) -> list[ReplayedSample]:
+        """Replay all of it; returns every sample that reached the control loop."""
+        samples = []
+        for entry in entries(self._record):
+            if isinstance(entry, RecordedSample):
+                samples.append(self._answer(entry))
+            elif isinstance(entry, RecordedStep):
+                self._step(entry)
+            elif isinstance(entry, RecordedAction):
+                self._act(entry)
+            else:
+                self._vehicle.attitude_target = entry
+        return samples
+
+    def _answer(self, entry: RecordedSample) -> ReplayedSample:
+        loop, flags, sample = self._loop, entry.flags, entry.sample
+        loop.on, loop.taking_over = flags.on, flags.taking_over
+        loop.offboard_active = flags.offboard_active
+        self._same_vehicle = flags.same_vehicle
+        if loop.awaiting_mode and not flags.awaiting_mode:
+            loop.resume()
+        self._accepts = entry.reason != "not_sent"
+        self._now = sample.received if isnan(entry.checked) else entry.checked
+        self._sent = None
+        loop.on_sample(sample)
+        self._guidance.note_attitude(sample)
+        reason = loop.record.reason
+        told = REASONS[1] if not loop.on else REASONS[0] if reason is None else reason.value
+        sent = self._sent if told == REASONS[0] else None
+        return ReplayedSample(
+            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, told
+        )
+
+    def _step(self, entry: RecordedStep) -> None:
+        read = entry.read
+        self._vehicle.take(read)
+        self._now = read.time
+        self._loop.offboard_active = read.flags.offboard_active
+        self._recorded_source.held = entry.reference
+        before = self._loop.command
+        self._guidance.step()
+        if self.follows_record:
+            self._loop.command = before if entry.command is None else entry.command
+
+    def _act(self, entry: RecordedAction) -> None:
+        guidance = self._guidance
+        self._now, self._vehicle.offset = entry.time, entry.clock_offset
+        match entry.name:
+            case "drop_command":
+                self._loop.drop_command()
+            case "restart_planner":
+                self._loop.restart_planner()
+            case "drag_prior":
+                prior = ANY_VEHICLE if entry.drag is None else prior_of(entry.drag)
+                guidance.estimate.drag.begin(prior)
+            case "follow":
+                guidance.follow(self._source)
+            case "stand_by":
+                guidance.stand_by()
+            case "hold_here":
+                guidance.hold_here()
+            case "hold_reference":
+                guidance.hold_reference()
+            case _:
+                guidance.give_up()
+
+    def _send(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
+        self._encoder.frame(0, time_boot_ms, rates, thrust)  # refuses what the link refuses
+        self._sent = Setpoint(rates, thrust)
+        return self._accepts
+
+
+class _RecordedSource:
+    """Gives guidance the recorded references, whose commands are replaced by the recorded ones."""
+
+    name = "the record"
+    failure: str | None = None
+
+    def __init__(self) -> None:
+        self.held: Reference | None = None
+
+    def begin(self, now: float, pose: Pose) -> None:
+        """Do nothing: the references come one by one."""
+
+    def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
+        """The recorded reference of this step."""
+        held = Reference(motion.position_ned) if self.held is None else self.held
+        return lambda _: held
+
+    def finished(self, now: float) -> bool:
+        """Never: the record tells when another source follows."""
+        return False

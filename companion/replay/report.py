@@ -1,0 +1,104 @@
+"""What a replay found, in words and as a table."""
+
+from collections import Counter
+from collections.abc import Sequence
+from math import degrees
+from pathlib import Path
+
+from companion.replay.replay import ReplayedSample
+
+_COLUMNS = (
+    "received_s",
+    "vehicle_time_s",
+    *(
+        f"{which}_{name}"
+        for which in ("recorded", "replayed")
+        for name in ("roll_rad_s", "pitch_rad_s", "yaw_rad_s", "thrust", "reason")
+    ),
+)
+
+
+def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bool) -> list[str]:
+    """What is the same and what differs, in sentences.
+
+    Args:
+        samples: of the replay.
+        began: when the flight began, s on our clock.
+        follows_record: see `Replay`.
+    """
+    recorded = sum(each.recorded is not None for each in samples)
+    different = [each for each in samples if not each.same]
+    lines = []
+    if follows_record:
+        lines.append(
+            "The commands of guidance are those of the record, because another program commanded"
+            " the flight or predictive control flew; only the control loop is replayed."
+        )
+    if not different:
+        lines.append(
+            f"All {recorded} setpoints are those of the flight, to the bit, and all"
+            f" {len(samples) - recorded} unanswered samples have the same reason."
+        )
+        return lines
+    lines.append(
+        f"{len(different)} of {len(samples)} samples have another answer than in the flight, the"
+        f" first {different[0].received - began:.2f} s after it began."
+    )
+    both = [each for each in different if each.recorded and each.replayed]
+    if both:
+        lines.append(_largest(both, began))
+    return lines + _reasons(different)
+
+
+def _largest(both: Sequence[ReplayedSample], began: float) -> str:
+    def distances(each: ReplayedSample) -> list[float]:
+        assert each.recorded is not None
+        assert each.replayed is not None
+        pairs = zip(
+            (*each.recorded.rates, each.recorded.thrust),
+            (*each.replayed.rates, each.replayed.thrust),
+            strict=True,
+        )
+        return [abs(before - after) for before, after in pairs]
+
+    found = []
+    for index, name in enumerate(("roll", "pitch", "yaw", "thrust")):
+        worst = max(both, key=lambda each: distances(each)[index])
+        value = distances(worst)[index]
+        number = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
+        found.append(f"{name} {number} at {worst.received - began:.2f} s")
+    return f"{len(both)} setpoints differ, at most by: {', '.join(found)}."
+
+
+def _reasons(different: Sequence[ReplayedSample]) -> list[str]:
+    """What was answered in one of the two only, or unanswered for another reason."""
+    changes = Counter(
+        (each.recorded_reason, each.replayed_reason)
+        for each in different
+        if each.recorded_reason != each.replayed_reason
+    )
+    return [
+        f"{count} samples: {before.replace('_', ' ')} in the flight,"
+        f" {after.replace('_', ' ')} in the replay."
+        for (before, after), count in changes.most_common()
+    ]
+
+
+def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
+    """Write both answers to each sample; an empty field: nothing was sent.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(_COLUMNS) + "\n")
+        for each in samples:
+            row = [repr(each.received), repr(each.vehicle_time)]
+            answers = (
+                (each.recorded, each.recorded_reason),
+                (each.replayed, each.replayed_reason),
+            )
+            for setpoint, reason in answers:
+                sent = [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
+                row += [str(value) for value in sent] + [reason]
+            file.write(",".join(row) + "\n")

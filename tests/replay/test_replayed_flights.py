@@ -1,0 +1,173 @@
+"""A replay gives the commands of the flight to the bit; others read the files of a flight, too."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from pymavlink import mavutil
+
+from companion.cli.main import main
+from companion.config.files import changed, load
+from companion.recording.flight_record import read_flight
+from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.mcap_file.writer import WORDS
+from companion.recording.recorded_summary import derived_summary, summary_of
+from companion.replay.replay import Replay
+from tests.flight.fly import fly, mock_vehicle
+
+FLIGHTS = {
+    "steps": {
+        "flight": {"maneuvers": ["hover", "steps"]},
+        "steps": {"duration_s": 0.4, "settle_s": 0.5},
+    },
+    "circle": {"flight": {"maneuvers": ["circle"]}},
+    "exact": {"flight": {"maneuvers": ["corners"]}, "planner": {"name": "exact"}},
+    "doublets": {"flight": {"maneuvers": ["identify"]}, "planner": {"name": "first-order"}},
+}
+GUSTS = {"speed_m_s": 2.0, "gust_m_s": 1.0}
+FAULTS = [
+    {"kind": "stop_telemetry", "after_offboard_s": 3.0, "duration_s": 0.11},
+    {"kind": "estimator_reset", "after_offboard_s": 3.5, "yaw_deg": 8.0},
+    {"kind": "delay", "delay_ms": 60, "after_offboard_s": 4.0, "duration_s": 0.3},
+    {"kind": "reorder", "probability": 0.2, "after_offboard_s": 4.5, "duration_s": 1.0},
+    {"kind": "drop", "probability": 0.2, "after_offboard_s": 5.5, "duration_s": 0.5},
+    {"kind": "estimator_reset", "after_offboard_s": 6.5, "position_ned_m": [0.5, 0.0, 0.0]},
+]
+
+
+def flown(folder, autopilot="px4", flight="steps", **mock):
+    with mock_vehicle(autopilot=autopilot, seed=5, **mock) as vehicle:
+        return fly(vehicle, folder, hover={"duration_s": 1.0}, **FLIGHTS[flight])
+
+
+def replayed(folder, **changes):
+    config = changed(load(folder / "config.yaml"), changes, "test")
+    return Replay(read_flight(folder), config).run()
+
+
+SLOW = pytest.mark.slow
+LOCKSTEP = {"in_lockstep": True, "wind": GUSTS}
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "flight", "mock"),
+    [
+        ("ardupilot", "steps", {}),
+        ("px4", "circle", LOCKSTEP),
+        pytest.param("ardupilot", "circle", LOCKSTEP, marks=SLOW),
+        pytest.param("px4", "exact", {"wind": GUSTS}, marks=SLOW),
+        pytest.param("ardupilot", "exact", {"wind": GUSTS}, marks=SLOW),
+        pytest.param("px4", "doublets", {}, marks=SLOW),
+        pytest.param("ardupilot", "doublets", {}, marks=SLOW),
+    ],
+)
+def test_a_replay_gives_the_commands_of_the_flight_to_the_bit(tmp_path, autopilot, flight, mock):
+    summary = flown(tmp_path, autopilot, flight, **mock)
+    assert summary.result == "ok", summary.events
+    samples = replayed(tmp_path)
+    assert [each for each in samples if not each.same] == []
+    assert sum(each.recorded is not None for each in samples) == summary.counts.setpoints > 1000
+
+
+def test_a_replay_of_a_flight_with_faults_is_that_flight_too(tmp_path):
+    long = {"hover": {"duration_s": 8.0}, "flight": {"maneuvers": ["hover"]}}
+    with mock_vehicle(seed=5, faults=FAULTS, wind=GUSTS) as vehicle:
+        summary = fly(vehicle, tmp_path, **long)
+    samples = replayed(tmp_path)
+    assert [each for each in samples if not each.same] == []
+    reasons = {each.recorded_reason for each in samples}
+    assert {"answered", "not_newer", "awaiting_mode"} <= reasons, summary.events
+    with_recorded_commands = Replay(
+        read_flight(tmp_path), changed(load(tmp_path / "config.yaml"), {}, "test")
+    )
+    with_recorded_commands.follows_record = True
+    assert all(each.same for each in with_recorded_commands.run())
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """A flight with steps, its folder and its summary."""
+    folder = tmp_path_factory.mktemp("good")
+    return folder, flown(folder).as_dict()
+
+
+def test_other_readers_read_the_files(good):
+    folder, summary = good
+    with (folder / "flight.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        counts, schemas = {}, {}
+        for schema, channel, _, message in reader.iter_decoded_messages():
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+            schemas[channel.topic] = schema.name
+            newest = message
+        metadata = {each.name: each.metadata for each in reader.iter_metadata()}
+    assert newest is not None
+    of_ardupilot = {"/attitude_target", "/alarm"}  # nothing of these happens in this flight
+    assert set(counts) == {*(channel.topic for channel in CHANNELS), *WORDS} - of_ardupilot
+    assert schemas["/tf"] == "foxglove_msgs/msg/FrameTransform"
+    assert counts["/setpoint"] == summary["setpoints"]
+    assert metadata["flight"]["plan"] == "configuration"
+    assert metadata["configuration"]["planner.gain_per_s"] == "5.0"
+
+    log = mavutil.mavlink_connection(str(folder / "flight.tlog"))
+    sent = iter(lambda: log.recv_match(type="SET_ATTITUDE_TARGET"), None)
+    rows = read_flight(folder).rows("setpoint")
+    wire = np.array(
+        [(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, m.thrust) for m in sent]
+    )
+    columns = ["commanded_roll_rad_s", "commanded_pitch_rad_s", "commanded_yaw_rad_s", "thrust"]
+    ours = np.column_stack([rows[name] for name in columns])
+    np.testing.assert_array_equal(ours.astype(np.float32), wire.astype(np.float32))
+
+
+def test_the_record_alone_gives_the_figures_of_the_summary(good):
+    folder, summary = good
+    record = read_flight(folder)
+    derived = derived_summary(record)
+    assert summary_of(record) == (json.loads((folder / "summary.json").read_text()), False)
+    for key in ("samples", "setpoints", "unanswered", "response", "tracking", "maneuvers"):
+        assert derived[key] == summary[key], key
+    for key in ("extent", "latency_us", "phases", "planner", "gain_per_s", "lockstep"):
+        assert derived[key] == summary[key], key
+    assert derived["takeoff_s"] == pytest.approx(summary["takeoff_s"], abs=0.15)
+    assert "before it was over" in derived["result"]
+
+
+def test_the_command_tells_what_is_the_same_and_what_differs(good, tmp_path, capsys):
+    folder, summary = good
+    assert main(["replay", str(folder)]) == 0
+    assert f"All {summary['setpoints']} setpoints" in capsys.readouterr().out
+    table = tmp_path / "both.csv"
+    changes = ["--set", "planner.gain_per_s=4", "--csv", str(table)]
+    assert main(["replay", str(folder), *changes]) == 0
+    said = capsys.readouterr().out
+    assert "setpoints differ, at most by: roll " in said
+    rows = list(csv.DictReader(table.open()))
+    assert len(rows) == len(read_flight(folder).rows("sample"))
+    assert any(row["recorded_roll_rad_s"] != row["replayed_roll_rad_s"] for row in rows)
+
+
+def test_a_flight_is_exported_as_csv_and_parquet(good, tmp_path, capsys):
+    folder, _ = good
+    parquet = pytest.importorskip("pyarrow.parquet")
+    for kind in ("csv", "parquet"):
+        assert main(["export", str(folder), f"--{kind}", "--into", str(tmp_path)]) == 0
+    assert str(tmp_path / "tracking.csv") in capsys.readouterr().out
+    rows = read_flight(folder).rows("guidance")
+    for name in ("estimated_north_m", "time_s"):
+        csv_column = np.genfromtxt(tmp_path / "guidance.csv", delimiter=",", names=True)[name]
+        np.testing.assert_array_equal(csv_column, rows[name])
+        column = parquet.read_table(tmp_path / "guidance.parquet")[name].to_numpy()
+        np.testing.assert_array_equal(column, rows[name])
+
+
+def test_a_missing_extra_and_a_wrong_folder_are_one_sentence(good, tmp_path, capsys, monkeypatch):
+    folder, _ = good
+    assert main(["replay", str(tmp_path)]) == 2
+    assert "is this the folder of a flight?" in capsys.readouterr().err
+    monkeypatch.setattr("importlib.util.find_spec", lambda *_: None)
+    assert main(["export", str(folder), "--parquet", "--into", str(tmp_path)]) == 2
+    assert "exporting Parquet needs pyarrow" in capsys.readouterr().err
