@@ -2,6 +2,7 @@
 VENV   ?= .venv
 PYTHON ?= python3
 BIN    := $(VENV)/bin
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 # The tests start two hundred programs; without byte code each would compile all it imports.
 unexport PYTHONDONTWRITEBYTECODE
@@ -12,11 +13,12 @@ MAKEFLAGS += --jobs=2
 
 $(VENV)/.fly: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[report]'
+	$(INSTALL) -e '.[report]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.fly
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(INSTALL) --no-compile -e '.[test]'
+	$(INSTALL) --no-compile --no-deps MAVProxy
 	@touch $@
 
 demo: $(VENV)/.fly  ## fly the bundled vehicle and show what was measured
@@ -58,7 +60,7 @@ fuzz: $(VENV)/.test  ## an hour of random files, frames and telemetry
 	nice -n 19 $(BIN)/python -m tests.fuzz --minutes 60
 
 $(VENV)/.mutants: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[mutants]'
+	$(INSTALL) -e '.[mutants]'
 	@touch $@
 
 mutants: $(VENV)/.mutants  ## do the tests notice a change of the code? ROOM=attitude; an hour or more for all
@@ -68,7 +70,7 @@ bench: $(VENV)/.test  ## latency of our link against a bare echo and MAVSDK
 	$(BIN)/companion bench link
 
 $(VENV)/.docs: $(VENV)/.fly
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(INSTALL) -e '.[docs]'
 	@touch $@
 
 docs: $(VENV)/.docs  ## the pages of docs/ as a site in site/; a broken link is an error

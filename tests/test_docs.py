@@ -116,7 +116,7 @@ def test_keys_of_the_configuration_exist(page: Path) -> None:
         section, _, key = name.partition(".")
         field = Config.model_fields.get(section)
         known = getattr(field and field.annotation, "model_fields", None)
-        if known and re.fullmatch(r"[a-z0-9_]+", key) and key not in ("tlog", "yaml"):
+        if known and re.fullmatch(r"[a-z0-9_]+", key) and key not in ("tlog", "mcap", "yaml"):
             assert key in known or name in others, f"{named(page)}: there is no key `{name}`"
 
 

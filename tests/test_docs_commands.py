@@ -27,13 +27,14 @@ from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files import yaml_file
 from companion.files.yaml_file import ConfigError
-from companion.testing import MockVehicle, fly
+from companion.testing import fly
 from sitl_mock.settings import load_settings
+from tests.flight.fly import QuickVehicle
 from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
 
 RECORDED = "flights/2026-11-22T10-54-16Z"
 FLYING = {"demo", "fly", "identify"}
-FOR_LONG = {"bench", "study", "doctor", "serve"}  # or a vehicle; test_docs.py reads them
+FOR_LONG = {"bench", "study", "doctor", "serve", "tune"}  # or a vehicle; test_docs.py reads them
 SOFTWARE = ("make px4_sitl", "sim_vehicle.py")  # of the autopilots, not in this repository
 
 
@@ -49,7 +50,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "my-path.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
     px4 = shipped("mock-px4.yaml")
     short = {"flight": {"maneuvers": ["hover"]}, "hover": {"duration_s": 1.0}}
-    fly(changed(load(px4), short, "short"), MockVehicle(config=px4), folder / RECORDED)
+    fly(changed(load(px4), short, "short"), QuickVehicle(config=px4), folder / RECORDED)
     return folder
 
 

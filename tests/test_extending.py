@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.flight.fly import QUICK_PARAMETERS
+
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/extending.md").read_text("utf-8")
 BLOCK = re.compile(r'^( *)```python(?: title="([^"]+)")?\n(.*?)^ *```$', re.MULTILINE | re.DOTALL)
@@ -67,10 +69,11 @@ from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
 px4 = shipped("mock-px4.yaml")
 changes = {"planner": {"name": "thrust-axis"}, "flight": {"maneuvers": ["hover"]}}
-changes["hover"] = {"duration_s": 3.0}
-summary = fly(changed(load(px4), changes, "hover"), MockVehicle(config=px4))
+changes["hover"] = {"duration_s": 1.5}
+mock = MockVehicle(config=px4, prearm_delay_s=0.2, parameters=QUICK)
+summary = fly(changed(load(px4), changes, "hover"), mock)
 print(summary.result, summary.planner, [text for _, text in summary.events])
-"""
+""".replace("QUICK", repr(QUICK_PARAMETERS["px4"]))
 
 
 def test_the_planner_has_its_name_and_flies(tree: Path) -> None:

@@ -54,15 +54,12 @@ class ModelFollowingPlanner:
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
         roll, pitch, yaw = (axis.with_least_lag() for axis in response.axes)
-        tilt = roll, pitch
-        self._constants = constants
+        self._tilt = tilt = roll, pitch
         self._yaw = yaw
         self._lag = max(axis.lag for axis in tilt)
         self._dead_time = dead_time = max(axis.dead_time for axis in tilt)
         self._frame = TargetFrame(response)
         self._hold = SampleHold()
-        self._gain = min(feedback_gain(constants.gain, axis) for axis in tilt)
-        self._yaw_gain = feedback_gain(constants.yaw_gain, yaw)
         self._model = ReferenceModel(
             constants,
             model_lag(constants.gain, self._lag),
@@ -77,6 +74,15 @@ class ModelFollowingPlanner:
         self._still = 0.0
         self._started = False
         self.planned: PlannedTilt | None = None
+        self.retune(constants)
+
+    def retune(self, constants: Constants) -> None:
+        """Use these gains and limits from the next sample on; the planned motion continues."""
+        self._constants = constants
+        self._gain = min(feedback_gain(constants.gain, axis) for axis in self._tilt)
+        self._yaw_gain = feedback_gain(constants.yaw_gain, self._yaw)
+        self._model.retune(constants, model_lag(constants.gain, self._lag))
+        self._heading.retune(constants)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
@@ -191,9 +197,9 @@ class ModelFollowingPlanner:
     def _feedback(
         self, by_tilt: PlannedTilt, by_yaw: PlannedYaw, north: float, east: float, heading: float
     ) -> tuple[float, float, float]:
-        """Feedback towards the plan: speed of north and east (1/s) and of the heading (rad/s).
+        """Feedback towards the plan: speed of north, east (1/s) and heading (rad/s).
 
-        It is 0 during the first dead time after a start, when no plan has taken effect yet.
+        It is 0 in the first dead time after a start, when no plan has taken effect yet.
         """
         speed_north = speed_east = turn = 0.0
         if self._plans.time >= self._dead_time:
@@ -206,9 +212,7 @@ class ModelFollowingPlanner:
     def _feed_forward(
         self, target: Target, heading: float, yaw_feedback: float, dt: float
     ) -> tuple[float, float, float]:
-        """Advance the plan by `dt` seconds; return the rates that follow it, rad/s.
-
-        The lag of each axis is compensated.
+        """Advance the plan by `dt` seconds; return the rates that follow it in spite of lag, rad/s.
 
         Args:
             target: an admissible target.
@@ -237,15 +241,11 @@ class ModelFollowingPlanner:
     def _append_plan(self, x: float, y: float, still_turn: float, dt: float) -> None:
         """Append the plan of `dt` seconds later.
 
-        Args:
-            x: planned roll rate at heading 0, rad/s.
-            y: planned pitch rate at heading 0, rad/s.
-            still_turn: yaw in these `dt` seconds that keeps the heading still, rad.
-            dt: s.
+        `x`, `y`: planned roll and pitch rate at heading 0, rad/s. `still_turn`: yaw meanwhile, rad.
         """
         model, body = self._model, self._body
         still = self._plans.tilt.newest.still + still_turn
-        slopes = model.rate_slopes()
+        slopes = model.rate_slopes(x, y)
         self._plans.add(
             dt,
             PlannedTilt(model.north, model.east, still, x, y, *slopes, self._still),

@@ -74,6 +74,11 @@ class LawPlanner:
         rates = self.law(normalised(q), self._limited_target, dt, self.constants)
         return _make_body_rates(BodyRates, rates)
 
+    def retune(self, constants: Constants) -> None:
+        """Use other gains and limits from the next sample on."""
+        self.constants = constants
+        self._last_target = None  # was limited by the constants before
+
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Do nothing: the law sends rates along the axes of the body."""
 

@@ -83,6 +83,7 @@ class ReferenceModel:
         "_lag",
         "_slope_east",
         "_slope_north",
+        "_square",
         "_tilt_rate_weight",
         "_v_east",
         "_v_north",
@@ -99,14 +100,18 @@ class ReferenceModel:
         acceleration: float = inf,
         square: float = 0.0,
     ) -> None:
+        self._acceleration, self._square = acceleration, square
+        self.retune(constants, lag)
+        self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
+
+    def retune(self, constants: Constants, lag: float) -> None:
+        """Use other gains and limits, and the τ (s) that belongs to them; the motion continues."""
         self._constants = constants
         self._braking = braking_lead(constants.gain, lag)
-        self._lag = Lag(lag, square)
-        self._acceleration = acceleration
+        self._lag = Lag(lag, self._square)
         # Near the target v falls by p·v a second.
-        slowed_in_time = acceleration / constants.gain
+        slowed_in_time = self._acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
-        self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
         """Start at these coefficients, moving at this speed (1/s)."""
@@ -120,9 +125,13 @@ class ReferenceModel:
         """Body rates of the reference now, at heading 0, rad/s."""
         return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
-    def rate_slopes(self) -> tuple[float, float]:
-        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences."""
-        roll, pitch, _ = self.rates()
+    def rate_slopes(self, roll: float, pitch: float) -> tuple[float, float]:
+        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences.
+
+        Args:
+            roll: the first of `rates` now, rad/s.
+            pitch: the second, rad/s.
+        """
         later_roll, later_pitch, _ = rates_along(
             self.north + _DIFFERENCE_STEP * self.speed_north,
             self.east + _DIFFERENCE_STEP * self.speed_east,

@@ -26,14 +26,18 @@ class HeadingModel:
     __slots__ = ("_acceleration", "_fastest", "_gain", "_lag", "_v", "heading", "turn_rate")
 
     def __init__(self, constants: Constants, yaw: AxisResponse) -> None:
-        self._gain = constants.yaw_gain
         self._lag = yaw.lag
         self._acceleration = yaw.acceleration
+        self.retune(constants)
+        self.start_at(0.0, 0.0)
+
+    def retune(self, constants: Constants) -> None:
+        """Use another gain and limit; the planned heading continues."""
+        self._gain = constants.yaw_gain
         # Near the target v falls by k·v a second.
         self._fastest = constants.max_yaw_rate
         if self._gain > 0.0:
-            self._fastest = min(self._fastest, yaw.acceleration / self._gain)
-        self.start_at(0.0, 0.0)
+            self._fastest = min(self._fastest, self._acceleration / self._gain)
 
     def start_at(self, heading: float, turn_rate: float) -> None:
         """Start at this heading (rad), turning at this rate (rad/s)."""

@@ -2,7 +2,7 @@
 
 The program and the mock vehicle run in one process (`companion.testing`). The processor time of
 both together is measured, so that other programs on the computer count little. A first, short
-flight, which imports modules, is not measured.
+flight, which imports modules, is not measured. The physics are compiled if numba is installed.
 """
 
 from time import process_time
@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.batch import can_compile
+from companion.bench.profile import sampled, shares
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.testing import MockVehicle, fly
@@ -26,16 +27,18 @@ _WARM_UP_S = 0.2
 _WIRE_S = 0.0005
 
 
-def run(seconds: float, as_json: bool) -> dict[str, Any]:
+def run(seconds: float, as_json: bool, profile: bool = False) -> dict[str, Any]:
     """Fly a hover with each autopilot, in lockstep and free.
 
     Args:
         seconds: duration of the hover, without take-off and landing, s.
         as_json: print nothing; the caller prints the result.
+        profile: fly once more and measure which part uses how much processor time.
 
     Returns:
         By autopilot and clock, of the quickest of three flights: `vehicle_s`, `cpu_s`, their ratio
-        `times_real_time`, and `setpoints`.
+        `times_real_time`, `setpoints`, and whether the physics are `compiled`; with `profile` also
+        `shares` of the processor time by part.
 
     Raises:
         ConfigError: a shipped configuration cannot be found.
@@ -44,27 +47,33 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     for autopilot in FILES:
         figures[autopilot] = {
-            name: _best_flight(autopilot, CLOCKS[name], seconds) for name in CLOCKS
+            name: _measured(autopilot, CLOCKS[name], seconds, profile) for name in CLOCKS
         }
     if not as_json:
         _print(figures)
     return figures
 
 
-def _best_flight(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+def _measured(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> dict[str, Any]:
     _fly_once(autopilot, lockstep, _WARM_UP_S)
-    return min(
+    best = min(
         (_fly_once(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
         key=lambda flight: flight["cpu_s"],
     )
+    if profile:
+        with sampled() as counts:
+            _fly_once(autopilot, lockstep, seconds)
+        best["shares"] = shares(counts)
+    return best
 
 
-def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float]:
+def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     """Figures of one flight."""
     path = shipped(FILES[autopilot])
     config = _hovering(load(path), seconds)
+    compiled = can_compile()
     vehicle = MockVehicle(
-        config=path, lockstep=lockstep, delay_s=_WIRE_S, compiled=can_compile(), prearm_delay_s=0.2
+        config=path, lockstep=lockstep, delay_s=_WIRE_S, compiled=compiled, prearm_delay_s=0.2
     )
     began = process_time()
     summary = fly(config, vehicle)
@@ -76,6 +85,7 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, float
         "cpu_s": cpu,
         "times_real_time": vehicle.time / cpu,
         "setpoints": summary.counts.setpoints,
+        "compiled": compiled,
     }
 
 
@@ -95,4 +105,24 @@ def _print(figures: dict[str, Any]) -> None:
                 f"{flown['cpu_s']:.2f}",
                 f"{flown['times_real_time']:.1f}",
             )
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    if not can_compile():
+        console.print("Flights are quicker with numba: pip install 'mavlink-companion[study]'")
+    _print_shares(figures, console)
+
+
+def _print_shares(figures: dict[str, Any], console: Console) -> None:
+    """Print the shares of the processor time, a column for each kind of flight."""
+    flights = {
+        f"{autopilot}, {clock}": flown["shares"]
+        for autopilot, clocks in figures.items()
+        for clock, flown in clocks.items()
+        if "shares" in flown
+    }
+    if not flights:
+        return
+    table = Table("share of the processor time", *flights)
+    for part in next(iter(flights.values())):
+        table.add_row(part, *(f"{shares.get(part, 0.0):.0%}" for shares in flights.values()))
+    console.print(table)

@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_serve(commands)
     _add_doctor(commands)
     _add_identify(commands)
+    tool_options.add_tune(commands)
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
     tool_options.add_tools(commands)
@@ -84,6 +85,7 @@ def _add_flights(commands: Commands) -> None:
             action="store_true",
             help="slow a trajectory down that the limits do not allow, instead of refusing it",
         )
+        tool_options.add_live(command)
         _add_flight_options(command)
 
 
@@ -153,7 +155,9 @@ def _add_identify(commands: Commands) -> None:
     command.add_argument("--force", action="store_true", help="replace FILE if it exists")
     _add_link_options(command)
     _add_flight_options(command)
-    command.set_defaults(run="identify.identify", trajectory=None, slow_down=False)
+    command.set_defaults(
+        run="identify.identify", trajectory=None, slow_down=False, watch=False, live=None
+    )
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:

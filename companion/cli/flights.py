@@ -5,6 +5,7 @@ import webbrowser
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.helping import helper
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.recording.folder import flight_folder
@@ -17,7 +18,10 @@ def fly(options: argparse.Namespace) -> int:
     config = flying.as_told(load(options.config), options)
     folder = flight_folder(config.recording.directory)
     called = flying.invocation(options)
-    return _ended(flying.fly(config, folder, _console(options), called), options)
+    console = _console(options)
+    with helper(options, config, options.config, folder, console, follows=True) as beside:
+        summary = flying.fly(config, folder, console, called, beside)
+    return _ended(summary, options)
 
 
 def demo(options: argparse.Namespace) -> int:

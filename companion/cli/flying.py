@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from companion import demo
+from companion.cli.helping import helper
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -16,7 +17,9 @@ from companion.config.files import assigned, changed, load
 from companion.control.outer_loop import predictive_settings
 from companion.extras import MissingExtraError, require
 from companion.flight.maneuvers import configured_maneuvers
+from companion.flight.observer import Several
 from companion.flight.session import Session
+from companion.live.helper import Helper
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
@@ -73,7 +76,11 @@ def invocation(options: argparse.Namespace) -> Invocation:
 
 
 def fly(
-    config: Config, folder: Path, console: FlightConsole, called: Invocation | None = None
+    config: Config,
+    folder: Path,
+    console: FlightConsole,
+    called: Invocation | None = None,
+    beside: Helper | None = None,
 ) -> Summary:
     """Fly as configured, record it in `folder`, tell it on `console`, tables and words included.
 
@@ -82,6 +89,7 @@ def fly(
         folder: for its files.
         console: to which it is told.
         called: for the command that comes next; None: that is said elsewhere.
+        beside: watches a file or serves the live page meanwhile, or None.
 
     Raises:
         LinkError: the link could not be opened; nothing was sent.
@@ -89,12 +97,17 @@ def fly(
         RealtimeError: what `realtime` requires is not granted; nothing was sent.
     """
     observer = TerminalObserver(console)
-    session = Session(config, folder, observer, observer.ask_landing)
+    told = observer if beside is None else Several(observer, beside)
+    session = Session(config, folder, told, observer.ask_landing)
+    flight = fly_interruptibly(session)
+    if beside is not None:
+        beside.changes, beside.note = session.changes, session.note
+        flight = beside.serve_beside(flight)
     run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
     with ExitStack() as stack:
         stack.callback(observer.close)
         try:
-            summary = run(fly_interruptibly(session))
+            summary = run(flight)
         except (EndpointError, RealtimeError, SigningError):
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
@@ -143,5 +156,9 @@ def fly_bundled(
         config = as_told(config, options, planner)
         demo.check_mock(path)
         folder = flight_folder(config.recording.directory)
-        with demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=config.link.lockstep):
-            return fly(config, folder, console, called)
+        in_lockstep = config.link.lockstep
+        with (
+            helper(options, config, path, folder, console, follows=True) as beside,
+            demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
+        ):
+            return fly(config, folder, console, called, beside)

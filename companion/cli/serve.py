@@ -8,12 +8,14 @@ import time
 from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
+from companion.cli.helping import helper
 from companion.cli.signals import LEAVE_AFTER
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
+from companion.flight.observer import Several
 from companion.flight.status import FlightStatus
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError
@@ -24,17 +26,24 @@ from companion.serve.session import ServeSession
 def serve(options: argparse.Namespace) -> int:
     """Pass everything between the vehicle and other programs, and fly their setpoints."""
     config = _as_told(load(options.config), options)
-    observer = _Events(FlightConsole(stderr=options.json, highlight=False))
+    console = FlightConsole(stderr=options.json, highlight=False)
+    observer = _Events(console)
     began = time.monotonic()
 
     def note(text: str) -> None:
-        observer.event(time.monotonic() - began, text)
+        told.event(time.monotonic() - began, text)
 
-    session = ServeSession(config, note, observer, directory=config.recording.directory)
-    try:
-        counters = link_loop.run(_until_stopped(session))
-    finally:
-        observer.close()
+    with helper(options, config, options.config, None, console, follows=False) as beside:
+        told = observer if beside is None else Several(observer, beside)
+        session = ServeSession(config, note, told, directory=config.recording.directory)
+        serving = _until_stopped(session)
+        if beside is not None:
+            beside.changes, beside.note = session.changes, note
+            serving = beside.serve_beside(serving)
+        try:
+            counters = link_loop.run(serving)
+        finally:
+            observer.close()
     if options.json:
         print(json.dumps(counters))
     return EXIT_OK

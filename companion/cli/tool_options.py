@@ -41,7 +41,55 @@ def add_serve(commands: Commands) -> None:
         help="instead of the configuration's, such as link.target_system=2; as often as needed",
     )
     serve.add_argument("--json", action="store_true", help="end with the counters as one JSON line")
+    add_live(serve)
     serve.set_defaults(run="serve.serve")
+
+
+def add_tune(commands: Commands) -> None:
+    """Add `tune`."""
+    tune = commands.add_parser(
+        "tune",
+        help="propose gain, weights and bandwidth for an identified vehicle",
+        description="Compute stability margins, settling, rate use and tracking error of the whole "
+        "control loop by linear analysis, search the values with the smallest error within the "
+        "margins, fly them on the mock vehicle, and write them as YAML with their reasons.",
+    )
+    tune.add_argument(
+        "vehicle",
+        type=Path,
+        metavar="PATH",
+        help="file or flight folder that `companion identify` wrote",
+    )
+    tune.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="the configuration to tune; default: that of the flight, or the defaults",
+    )
+    tune.add_argument(
+        "--output", type=Path, metavar="FILE", help="default: tuned.yaml beside the vehicle file"
+    )
+    tune.add_argument("--force", action="store_true", help="replace FILE if it exists")
+    tune.add_argument("--no-flights", action="store_true", help="do not fly it on the mock vehicle")
+    tune.add_argument("--json", action="store_true", help="end with one line of JSON")
+    tune.set_defaults(run="tune.tune")
+
+
+def add_live(command: argparse.ArgumentParser) -> None:
+    """Add `--watch` and `--live`."""
+    command.add_argument(
+        "--watch",
+        action="store_true",
+        help="apply edits of the configuration file in flight: limits, gains and weights",
+    )
+    command.add_argument(
+        "--live",
+        nargs="?",
+        const="127.0.0.1:8090",
+        metavar="[HOST][:PORT]",
+        help="serve a page to watch the flight, and to change limits with the token shown "
+        "(127.0.0.1:8090)",
+    )
 
 
 def add_benches(commands: Commands) -> None:
@@ -71,6 +119,9 @@ def add_benches(commands: Commands) -> None:
     )
     flight.add_argument(
         "--seconds", type=number(0.1, 3600.0), default=20.0, help="of hover in each flight (20)"
+    )
+    flight.add_argument(
+        "--profile", action="store_true", help="also which part uses how much processor time"
     )
     flight.set_defaults(run="tools.bench_flight")
     for each in (link, serve, step, flight):

@@ -44,7 +44,7 @@ def bench_flight(options: argparse.Namespace) -> int:
     """Measure how quickly one core flies."""
     from companion.bench import flight  # noqa: PLC0415  no other command needs it
 
-    figures = flight.run(options.seconds, options.json)
+    figures = flight.run(options.seconds, options.json, profile=options.profile)
     if options.json:
         print(json.dumps(figures))
     return EXIT_OK

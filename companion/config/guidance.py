@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from companion import plugins
 from companion.attitude import PLANNER_NAMES
+from companion.config.markers import ANY
 from companion.config.units import Si
 from companion.drag import Drag
 from companion.files.yaml_file import Section
@@ -32,9 +33,9 @@ class PlannerConfig(Section):
     discretisation error. model-following: stays linear behind the vehicle's own rate loop,
     needs `vehicle`. quaternion, so3, euler: the paper's comparison laws. Or a planner of another
     package, by the name of its entry point in `companion.planners`."""
-    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)] = 5.0
+    gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=ANY)] = 5.0
     """p: the acceleration approaches its target with time constant 1/p."""
-    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 2.0
+    yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 2.0
     """Heading approaches its target with the time constant 1/yaw_gain; quaternion, so3 and euler
     use gain_per_s for it."""
 
@@ -55,28 +56,34 @@ class GuidanceConfig(Section):
     guidance of another package, by the name of its entry point in `companion.guidance`."""
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """Rate at which guidance computes a new target."""
-    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = None
+    position_weight_per_s4: Annotated[float, Field(ge=0.01, le=10000.0)] | None = Field(
+        default=None, json_schema_extra=ANY
+    )
     """Weight of the horizontal position error against the acceleration spent on it; a larger one
     makes a stiffer hold. The gains follow from it (LQR). null: k/T⁴. k = 2 where dead time + lag/2
     + s/2 is at most 65 ms, 1 from 80 ms on or where unknown, between them in between. s is the time
     in which the rate loop slews to limits.max_tilt_rate_deg_s; 0 without a known slew limit.
     T is the delay of the attitude behind its target plus half a guidance period. That delay
     follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s."""
-    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = None
+    velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
+        default=None, json_schema_extra=ANY
+    )
     """Weight of the horizontal velocity error; a larger one makes a calmer hold. null: 1/T²."""
-    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
+    disturbance_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=30.0)] | None = Field(
+        default=None, json_schema_extra=ANY
+    )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T."""
+    null: 1.5/T; with a quick rate loop and smooth positions up to 2.4/T."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example a GPS delay
     that is set wrong. Measure it against an independent position."""
-    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0)] = 6.0
+    max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 6.0
     """Largest acceleration by wind that the observer estimates."""
     lead: bool = True
     """Lead the targets by the known attitude response, so that the vehicle does not lag."""
-    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 1.5
+    height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 1.5
     """Vertical speed commanded per metre of height error."""
-    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0)] = 3.5
+    climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=ANY)] = 3.5
     """Vertical acceleration commanded per m/s of vertical speed error."""
     drag_per_s: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """Linear drag per mass, for feedforward. null: unknown. The flight estimates it, and the

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from companion.config import Config
+from companion.config.markers import IN_FLIGHT
 from companion.files import bounded_yaml
 
 _UNITS = {
@@ -132,6 +133,8 @@ def _allowed(schema: dict[str, Any]) -> str:
         words += [text.format(option[bound]) for bound, text in _BOUNDS if bound in option]
         if option.get("type") == "null":
             words.append("or null")
+    if IN_FLIGHT in schema:
+        words.append(f"changeable in flight {schema[IN_FLIGHT]}")
     return ", ".join(words)
 
 

@@ -10,6 +10,7 @@ from time import perf_counter_ns
 from companion.attitude import (
     AttitudeError,
     BodyRates,
+    Constants,
     InvalidQuaternionError,
     Limits,
     Planner,
@@ -87,6 +88,16 @@ class ControlLoop:
         self._sent: Answer | None = None
         if trace.recorder is not None:
             self.planner.on_attitude_target = self._record_attitude_target
+
+    def retune(self, constants: Constants, limits: Limits) -> None:
+        """Use other gains and limits from the next sample on.
+
+        Raises:
+            TypeError: the planner is of another package and cannot change them.
+        """
+        self.planner.retune(constants)
+        self._rows = SampleRows(limits, self._hover_thrust.limits)
+        self._limits = limits
 
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer `sample`, or count why not. The link calls this when the datagram arrives."""

@@ -6,8 +6,8 @@ from math import asin, degrees, hypot
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.reference_model import rates_along
 from companion.config import Config
+from companion.control.hold_settings import attitude_delay, hold_gains, hold_weights
 from companion.control.inner_loop import slower_tilt, tilt_response
-from companion.control.outer_loop import attitude_delay, hold_gains, hold_weights
 from companion.guidance import InnerResponse
 
 LARGEST_PRODUCT = 0.45

@@ -44,6 +44,9 @@ class GuidanceLoop:
             None.
         estimate: estimates the motion.
         learning: learns the hover thrust.
+        guidance: makes targets of references.
+        max_tilt: largest tilt in open loop, rad.
+        before_step: called at the beginning of each step with the time, s.
         record: records how the reference is tracked.
     """
 
@@ -72,12 +75,13 @@ class GuidanceLoop:
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
         self._loop = loop
-        self._guidance = guidance
+        self.guidance = guidance
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown)
-        self._max_tilt = max_tilt
+        self.max_tilt = max_tilt
         self._period = period
         self._fresh = FreshPosition(state, vehicle_clock, position_stale)
+        self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._ticker = Ticker(period, clock)
@@ -169,6 +173,7 @@ class GuidanceLoop:
     def step(self) -> None:
         """Make one command, unless the position is stale."""
         now = self._clock()
+        self.before_step(now)
         position = self._fresh.at(now)
         standing = self._ground.standing
         may_idle = standing and self._ground.may_idle
@@ -222,7 +227,7 @@ class GuidanceLoop:
         """Write the command for `now`; return the reference from which it was made."""
         reference_at = self.flown.reference(now, inputs.now, self._heading())
         reference = reference_at(now)
-        linear = self._guidance.command(reference_at, now, inputs)
+        linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
             turn = self._loop.resets.turn
             vehicle, following = self.estimate.vehicle(now, inputs), self.flown.following(now, turn)
@@ -251,7 +256,7 @@ class GuidanceLoop:
 
     def _guidance_input(self, now: float) -> GuidanceInput:
         return self.estimate.guidance_input(
-            now, self._guidance.acts_after, self.learning.thrust_limits
+            now, self.guidance.acts_after, self.learning.thrust_limits
         )
 
     def _give_up_if_tilted(self, now: float, motion: VehicleMotion) -> None:
@@ -260,9 +265,9 @@ class GuidanceLoop:
         if name is None:
             return
         tilt = tilt_angle(self._q[1], self._q[2])
-        most = min(self._max_tilt, self.learning.largest_tilt())
+        most = min(self.max_tilt, self.learning.largest_tilt())
         if tilt <= most:
             return
-        limit = "limits.max_tilt_deg" if most == self._max_tilt else "the thrust can hold"
+        limit = "limits.max_tilt_deg" if most == self.max_tilt else "the thrust can hold"
         self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
         self._hold_here(now)

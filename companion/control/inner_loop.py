@@ -3,7 +3,8 @@
 from typing import Any
 
 from companion import plugins
-from companion.attitude import PLANNER_NAMES, Limits, Planner, make_planner
+from companion.attitude import PLANNER_NAMES, Constants, Limits, Planner, make_planner
+from companion.attitude.limits import make_constants
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.attitude.reference_model import model_lag, model_response
 from companion.attitude.within_limits import WithinLimits
@@ -30,6 +31,14 @@ def planner(config: Config) -> Planner:
         **(config.vehicle.response if name == MODEL_FOLLOWING else {}),
     )
     return made if own else WithinLimits(made, limits)
+
+
+def law_constants(config: Config) -> Constants:
+    """Gains and limits of our own planners."""
+    gains, recovery_angle = config.planner, config.limits.recovery_angle
+    return make_constants(
+        gains.gain_per_s, gains.yaw_gain_per_s, rate_limits(config), recovery_angle
+    )
 
 
 def plugin(group: str, name: str) -> Any:

@@ -4,7 +4,14 @@ from collections.abc import Callable
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
-from companion.guidance import GRAVITY, DragEstimate, GuidanceInput, MotionObserver, VehicleMotion
+from companion.guidance import (
+    GRAVITY,
+    DragEstimate,
+    GuidanceInput,
+    MotionObserver,
+    ObserverSettings,
+    VehicleMotion,
+)
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import PositionCorrection
 from companion.guidance.reference import Horizontal
@@ -52,6 +59,15 @@ class MotionEstimate:
         self._position: LocalPosition | None = None
         self._turn = 0.0
 
+    @property
+    def disturbance(self) -> Horizontal:
+        """Acceleration by wind and bias, m/s², NED."""
+        return self._observer.disturbance
+
+    def retune(self, settings: ObserverSettings) -> None:
+        """Use other settings of the observer from the next position on."""
+        self._observer.retune(settings)
+
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
@@ -81,7 +97,7 @@ class MotionEstimate:
             position.vehicle_time, VehicleMotion(position.position_ned, position.velocity_ned)
         )
         known = self._known(slope, measured)
-        self._observer.observe(position.vehicle_time, measured, known)
+        self._observer.observe(position.vehicle_time, measured, known, self._correction.smoothness)
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 

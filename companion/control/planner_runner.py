@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import BodyRates, Planner, Quaternion, Target
+from companion.attitude import BodyRates, Constants, LawPlanner, Planner, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.control.estimator_resets import EstimatorResets
@@ -43,6 +43,16 @@ class PlannerRunner:
         self._noted: AttitudeTarget | None = None
         self._told: AttitudeTarget | None = None
         self._turn, self._turned_ms = 0.0, -1
+
+    def retune(self, constants: Constants) -> None:
+        """Use other gains and limits from the next sample on.
+
+        Raises:
+            TypeError: the planner is of another package and cannot change them.
+        """
+        if not isinstance(self._planner, LawPlanner | ModelFollowingPlanner):
+            raise TypeError(f"{type(self._planner).__name__} cannot be retuned")
+        self._planner.retune(constants)
 
     def restart(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""

@@ -11,6 +11,7 @@ from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import predictive
 from companion.drag import Drag
+from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch, rate_loops
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -111,6 +112,7 @@ class Assembled:
     memory: VehicleMemory
     ladder: SafetyLadder
     reporter: StatusReporter
+    changes: Changes
 
     def close(self) -> None:
         """End the process of predictive control."""
@@ -148,6 +150,7 @@ def assemble(
     folder: Path | None,
     plan: Plan,
     environment: Environment = THIS_COMPUTER,
+    changes: Changes | None = None,
 ) -> Assembled:
     """Assemble a flight by `plan` over an open link.
 
@@ -224,4 +227,5 @@ def assemble(
         clock,
         real_time=real_time,
     )
-    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter)
+    changes = changes or Changes(config)
+    return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)

@@ -21,7 +21,7 @@ class Observer(Protocol):
         ...
 
     def status(self, status: FlightStatus) -> None:
-        """Five times a second: the state of the flight."""
+        """Ten times a second: the state of the flight."""
         ...
 
     def event(self, time: float, text: str) -> None:
@@ -43,6 +43,37 @@ class Silent:
 
     def event(self, time: float, text: str) -> None:
         """Ignore it."""
+
+
+class Several:
+    """Passes all on to several observers, in order.
+
+    Args:
+        observers: who is told.
+    """
+
+    def __init__(self, *observers: Observer) -> None:
+        self._observers = observers
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.phase(name, waits_for)
+
+    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.waiting(name, detail, elapsed, timeout)
+
+    def status(self, status: FlightStatus) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.status(status)
+
+    def event(self, time: float, text: str) -> None:
+        """Pass on."""
+        for observer in self._observers:
+            observer.event(time, text)
 
 
 async def decline_landing() -> bool:

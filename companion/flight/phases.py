@@ -12,6 +12,7 @@ from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
 _RISING = frozenset({Role.TAKEOFF, Role.READY})
+_STANDING = frozenset({Role.READY})
 _AIRBORNE = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD})
 _UNDER_CONTROL = frozenset({Role.OFFBOARD})
 _GRACE = 10.0
@@ -114,23 +115,35 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
-    return (
-        Phase(
-            "checks",
-            "the vehicle to be ready to be taken over",
-            takeover.look_over,
-            config.ready_timeout_s,
-            modes=_RISING,
-        ),
-        Phase(
-            "offboard",
-            "the autopilot to obey our rates",
-            takeoff.offboard,
-            _TAKE_OVER,
-            Exit.HOLD,
-            modes=_RISING | _UNDER_CONTROL,
-            monitored=True,
-        ),
+    checks = _look_over(config, "to be taken over", takeover.look_over, _RISING)
+    return checks, _take_over_held()
+
+
+def takeoff_for_client_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
+    """The phases that let a vehicle take off which somebody else armed, and take it over."""
+    checks = _look_over(config, "to take off", takeover.look_over_standing, _STANDING)
+    (takeoff_phase,) = (
+        phase for phase in takeoff_phases(config, autopilot) if phase.name == "takeoff"
+    )
+    return checks, takeoff_phase, _take_over_held()
+
+
+def _look_over(config: FlightConfig, ready: str, work: Work, modes: frozenset[Role]) -> Phase:
+    return Phase(
+        "checks", f"the vehicle to be ready {ready}", work, config.ready_timeout_s, modes=modes
+    )
+
+
+def _take_over_held() -> Phase:
+    """The takeover of a vehicle that holds in the air; if it fails, the autopilot holds on."""
+    return Phase(
+        "offboard",
+        "the autopilot to obey our rates",
+        takeoff.offboard,
+        _TAKE_OVER,
+        Exit.HOLD,
+        modes=_RISING | _UNDER_CONTROL,
+        monitored=True,
     )
 
 

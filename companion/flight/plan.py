@@ -14,6 +14,7 @@ from companion.flight.phases import (
     ground_phases,
     hand_back_phase,
     program_phase,
+    takeoff_for_client_phases,
     takeover_phases,
 )
 from companion.guidance import ManeuverSequence
@@ -59,22 +60,29 @@ class ConfiguredPlan:
 class TakeoverPlan:
     """Takes over a vehicle that its autopilot holds in the air, flies a source, and hands it back.
 
-    Nothing is armed and no take-off is commanded. If the checks or the takeover fail, or the
-    source does, the autopilot is asked to hold.
+    Nothing is armed. If the checks or the takeover fail, or the source does, the autopilot is asked
+    to hold.
 
     Args:
         source: of the references; it decides when control ends.
+        from_ground: the vehicle stands armed; the autopilot is asked to take off first, to
+            `flight.takeoff_height_m`.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, *, from_ground: bool = False) -> None:
         self.maneuvers = ManeuverSequence(())
-        self._source = source
+        self._source, self._from_ground = source, from_ground
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
-        """The checks, the takeover, control, and the hand-back."""
-        connect, *_ = ground_phases(context.config.flight)
+        """The checks, perhaps the take-off, the takeover, control, and the hand-back."""
+        config = context.config.flight
+        connect, *_ = ground_phases(config)
         yield connect
-        for phase in takeover_phases(context.config.flight):
+        if self._from_ground:
+            phases = takeoff_for_client_phases(config, context.link.autopilot)
+        else:
+            phases = takeover_phases(config)
+        for phase in phases:
             yield phase
         work = partial(fly_commanded, source=self._source)
         yield program_phase("control", f"{self._source.name} to end its control", work)

@@ -6,6 +6,7 @@ from pathlib import Path
 from companion import realtime
 from companion.config import Config
 from companion.flight.assembly import Assembled, assemble, open_link, realtime_wishes
+from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding
@@ -31,6 +32,9 @@ class Session:
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
         plan: of the flight; None: as configured.
         environment: what the flight gets from the computer.
+
+    Attributes:
+        changes: of the values that may change in flight.
     """
 
     def __init__(
@@ -42,6 +46,7 @@ class Session:
         plan: Plan | None = None,
         environment: Environment = THIS_COMPUTER,
     ) -> None:
+        self.changes = Changes(config)
         self._config = config
         self._folder = folder
         self._observer = observer
@@ -100,6 +105,7 @@ class Session:
                     self._folder,
                     plan,
                     environment,
+                    self.changes,
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)

@@ -2,22 +2,22 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import degrees, hypot, inf, nan
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
 from companion.flight.status_rows import StatusRows
+from companion.flight.view import view
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder
 from companion.vehicle.records import Battery
 
 _PERIOD = 0.1
-_SHOWN_EACH = 2
-"""Each second row is shown."""
 _WINDOW = 1.0
 """The rate of setpoints is counted over this time, s."""
 
@@ -45,6 +45,7 @@ class FlightStatus(NamedTuple):
         battery: of the vehicle.
         monitored: whether the safety monitors judge now.
         alarms: names of the safety monitors whose alarm is raised.
+        view: attitude, target, motion, reference and more, for a picture; see `flight.view`.
     """
 
     time: float
@@ -66,6 +67,7 @@ class FlightStatus(NamedTuple):
     battery: Battery | None = None
     monitored: bool = False
     alarms: tuple[str, ...] = ()
+    view: Mapping[str, Any] = MappingProxyType({})
 
 
 class PhaseNow(NamedTuple):
@@ -125,12 +127,10 @@ class StatusReporter:
 
     async def run(self) -> None:
         """Record and show until cancelled; steps that came too late are left out."""
-        due, count = self._clock(), 0
+        due = self._clock()
         while True:
             self.record()
-            if count % _SHOWN_EACH == 0:
-                self._show(self.status())
-            count += 1
+            self._show(self.status())
             due = max(due + _PERIOD, self._clock())
             await asyncio.sleep(due - self._clock())
 
@@ -179,6 +179,7 @@ class StatusReporter:
             battery=context.link.state.battery,
             monitored=phase.monitored and context.loop.offboard_active,
             alarms=self._ladder.raised,
+            view=view(context, now),
         )
 
     def _rate(self, now: float, record: LoopRecord) -> float | None:

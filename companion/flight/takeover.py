@@ -1,9 +1,16 @@
-"""The phase before a takeover in the air: a vehicle that somebody else armed and flew there."""
+"""The phases before a takeover: a vehicle that somebody else armed, in the air or on the ground."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
 
 from companion.flight.context import SLOWEST_HEARTBEAT, FlightContext
 from companion.flight.preflight_phases import note_heartbeat_rate, report_offboard_loss
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
+
+_ARMED_SHOWS = 1.5
+"""Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
 
 
 async def look_over(context: FlightContext) -> None:
@@ -12,6 +19,29 @@ async def look_over(context: FlightContext) -> None:
     Raises:
         FlightEnded: it does not fly, or a finding blocks the takeover.
     """
+    await _look_over(context, Stage.AIRBORNE, _require_flying)
+    context.ground.note_flying()
+
+
+async def look_over_standing(context: FlightContext) -> None:
+    """Check a vehicle that somebody else armed on the ground; only telemetry is asked of it.
+
+    It may have been armed since the newest heartbeat.
+
+    Raises:
+        FlightEnded: it does not stand armed, or a finding blocks the take-off.
+    """
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_ARMED_SHOWS):
+            await context.until(context.armed, "the vehicle to show that it is armed")
+    await _look_over(context, Stage.ARMED, _require_standing)
+    await context.until(lambda: context.link.state.home is not None, "the home position")
+
+
+async def _look_over(
+    context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
+) -> None:
+    """Run the checks of a stage; `require` raises unless the vehicle is in it, before and after."""
     context.same_vehicle.begin()
     context.same_vehicle.commit()
     context.heartbeat_limit = SLOWEST_HEARTBEAT
@@ -19,16 +49,22 @@ async def look_over(context: FlightContext) -> None:
     await context.preflight.ask_for_telemetry()
     state = context.link.state
     await context.until(lambda: state.landed or state.flying, "whether the vehicle flies")
-    _require_flying(context)
+    require(context)
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     context.detail = "counting telemetry rates and reading the autopilot's parameters"
-    evidence = await context.preflight.require(Stage.AIRBORNE)
+    evidence = await context.preflight.require(stage)
     note_heartbeat_rate(context, evidence)
     report_offboard_loss(context, evidence.survey.values)
-    _require_flying(context)
-    context.ground.note_flying()
+    require(context)
 
 
 def _require_flying(context: FlightContext) -> None:
     if not context.armed() or not context.link.state.flying:
         raise FlightEnded("the vehicle does not fly: take off first", Exit.LEAVE)
+
+
+def _require_standing(context: FlightContext) -> None:
+    if not context.armed() or not context.link.state.landed:
+        raise FlightEnded(
+            "the vehicle does not stand armed on the ground: arm it first", Exit.LEAVE
+        )

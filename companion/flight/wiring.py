@@ -1,8 +1,9 @@
-"""Connects the link's callbacks to a flight."""
+"""Connects the link's callbacks and changes in flight to a flight."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from companion.control.retuning import Retuning
 from companion.flight.assembly import Assembled
 from companion.flight.observer import StateLogger
 from companion.vehicle.link import Link
@@ -11,7 +12,7 @@ from companion.vehicle.records import AttitudeSample
 
 @contextmanager
 def connected(link: Link, assembled: Assembled) -> Iterator[None]:
-    """Connect the link to the flight while the block runs: samples, errors, and the mode.
+    """Connect link and changes to the flight while the block runs: samples, errors, the mode.
 
     Only one flight at a time may be connected to a link.
     """
@@ -42,7 +43,8 @@ def connected(link: Link, assembled: Assembled) -> Iterator[None]:
         link.subscribe("CURRENT_MODE", on_current_mode),
     )
     try:
-        yield
+        with assembled.changes.applied_by(Retuning(loop, guidance_loop), flight.note):
+            yield
     finally:
         link.on_attitude = link.on_error = None
         for end in ends:

@@ -104,6 +104,10 @@ class LinearGuidance:
     def __init__(self, settings: LinearSettings) -> None:
         self._settings = settings
 
+    def retune(self, settings: LinearSettings) -> None:
+        """Use other settings from the next step on."""
+        self._settings = settings
+
     @property
     def acts_after(self) -> float:
         """Mean delay from computing a command until the vehicle responds to its feedback, s."""

@@ -4,9 +4,27 @@ from collections import deque
 from dataclasses import dataclass
 from itertools import islice
 from math import exp
+from typing import NamedTuple
 
 from companion.attitude.history import between
 from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
+
+
+class ObserverGains(NamedTuple):
+    """How one measurement corrects the observer.
+
+    The position is corrected per position error. Velocity and disturbance are corrected per error
+    of the velocity, to which `ObserverSettings.position_pull` adds the position error.
+
+    Attributes:
+        position: m per m.
+        velocity: m/s per m/s.
+        disturbance: m/s² per m/s.
+    """
+
+    position: float
+    velocity: float
+    disturbance: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,12 +36,29 @@ class ObserverSettings:
         position_time: time constant with which the position follows the measured one, s.
         position_pull: correction of the velocity per position error, 1/s.
         largest: largest disturbance, m/s².
+        sharpening: relative increase of the bandwidth with smooth positions.
     """
 
     bandwidth: float
     position_time: float
     position_pull: float
     largest: float
+    sharpening: float = 0.0
+
+    def gains(self, dt: float, smoothness: float = 0.0) -> ObserverGains:
+        """The gains for measurements `dt` seconds apart.
+
+        Args:
+            dt: s.
+            smoothness: 1 if the positions are smooth, 0 if they are noisy.
+        """
+        bandwidth = (1.0 + smoothness * self.sharpening) * self.bandwidth
+        position = 1.0 if self.position_time <= 0.0 else 1.0 - exp(-dt / self.position_time)
+        return ObserverGains(
+            position,
+            1.0 - exp(-2.0 * bandwidth * dt),
+            (1.0 - exp(-bandwidth * dt)) ** 2 / dt,
+        )
 
 
 class MotionObserver:
@@ -43,18 +78,25 @@ class MotionObserver:
         self._motion: VehicleMotion | None = None
         self._time = 0.0
 
+    def retune(self, settings: ObserverSettings) -> None:
+        """Use other settings from the next measurement on; the estimate continues."""
+        self._settings = settings
+
     def reset(self) -> None:
         """Start again: offboard control was not active, or the estimate jumped."""
         self._motion = None
         self.disturbance = (0.0, 0.0)
 
-    def observe(self, time: float, measured: VehicleMotion, known: Horizontal) -> None:
+    def observe(
+        self, time: float, measured: VehicleMotion, known: Horizontal, smoothness: float = 0.0
+    ) -> None:
         """Take a measured position and velocity.
 
         Args:
             time: vehicle time of the measurement, s.
             measured: measured motion, NED.
             known: horizontal acceleration by thrust and drag since the last measurement, m/s².
+            smoothness: 1 if the positions are smooth, 0 if they are noisy.
         """
         motion, dt = self._motion, time - self._time
         self._time = time
@@ -62,11 +104,7 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        velocity_gain = 1.0 - exp(-2.0 * settings.bandwidth * dt)
-        disturbance_gain = (1.0 - exp(-settings.bandwidth * dt)) ** 2 / dt
-        position_gain = 1.0
-        if settings.position_time > 0.0:
-            position_gain = 1.0 - exp(-dt / settings.position_time)
+        gains = settings.gains(dt, smoothness)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):
@@ -77,9 +115,9 @@ class MotionObserver:
             v = motion.velocity_ned[axis] + dt * acceleration
             position_error = position[axis] - p
             error = velocity[axis] - v + settings.position_pull * position_error
-            position[axis] = p + position_gain * position_error
-            velocity[axis] = v + velocity_gain * error
-            found[axis] = disturbance[axis] + disturbance_gain * error
+            position[axis] = p + gains.position * position_error
+            velocity[axis] = v + gains.velocity * error
+            found[axis] = disturbance[axis] + gains.disturbance * error
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
         self.disturbance = limited(found[0], found[1], settings.largest)
 

@@ -1,12 +1,21 @@
 """Corrects the autopilot's position ahead of the correction that its estimator will make."""
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, hypot, sqrt
 
 from companion.guidance.reference import Horizontal, VehicleMotion, limited
 
 _LONGEST = 0.5
 """Longest time between two positions from which a correction is computed, s."""
+_LONGEST_WINDOW = 0.1
+"""Time constant of each low-pass filter with noisy positions, s."""
+_WINDOW_PER_NOISE = 0.1
+"""Growth of that time constant with the noise of r, s per m/s."""
+_SMOOTH, _NOISY = 0.2, 0.6
+"""Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
+0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
+_NOISE_TIME = 1.0
+"""Time constant with which the noise of r is estimated, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +24,8 @@ class CorrectionSettings:
 
     Attributes:
         ahead: time constant of the estimator's correction, s: 1/(the estimator's position gain).
-        window: time constant of the two low-pass filters on the correction, s, positive.
+        window: time constant of the two low-pass filters on the correction with smooth positions,
+            s, positive.
         largest: largest anticipated correction, m.
         lateness: delay of the estimator's position that remains after its corrections, s.
     """
@@ -33,6 +43,9 @@ class PositionCorrection:
     part, r = ṗ − v, is the filter's gain times the distance to GPS, so ahead·r is that distance. If
     GPS is later than the filter assumes, the position also lags by lateness·v.
 
+    r is the difference of two positions over a short time, which amplifies their noise. Filters
+    delay the correction, so their time constant follows the noise of r.
+
     Args:
         settings: settings of the correction.
     """
@@ -45,8 +58,15 @@ class PositionCorrection:
         """Start again: the estimate has jumped."""
         self._time = 0.0
         self._before: VehicleMotion | None = None
-        self._unexplained: Horizontal = (0.0, 0.0)
+        self._raw: Horizontal = (0.0, 0.0)
+        self._filtered: Horizontal = (0.0, 0.0)
         self._correction: Horizontal = (0.0, 0.0)
+        self._noise = 0.0
+
+    @property
+    def smoothness(self) -> float:
+        """1 if the positions are smooth, 0 if they are noisy or rounded, else between."""
+        return min(max(0.0, (_NOISY - sqrt(self._noise)) / (_NOISY - _SMOOTH)), 1.0)
 
     def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its position corrected.
@@ -59,7 +79,7 @@ class PositionCorrection:
         before, dt = self._before, time - self._time
         self._time, self._before = time, measured
         if before is None or not 0.0 < dt < _LONGEST:
-            self._unexplained = self._correction = (0.0, 0.0)
+            self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
             self._take(before, measured, dt)
         (north, east, down), velocity = measured
@@ -73,16 +93,27 @@ class PositionCorrection:
         )
 
     def _take(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
-        """Filter the change of position since the last one that the velocity does not explain."""
+        """Filter r, the change of position per time that the velocity does not explain."""
         settings = self._settings
-        kept = exp(-dt / settings.window)
         (p_before, v_before), (p_now, v_now) = before, now
-        way, more = [0.0, 0.0], [0.0, 0.0]
+        raw, way, more = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         for axis in (0, 1):
-            explained = 0.5 * dt * (v_before[axis] + v_now[axis])
-            step = p_now[axis] - p_before[axis] - explained
-            way[axis] = kept * (self._unexplained[axis] + step)
-            wanted = settings.ahead / settings.window * way[axis]
+            explained = 0.5 * (v_before[axis] + v_now[axis])
+            raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
+        kept = exp(-dt / self._window(raw, dt))
+        for axis in (0, 1):
+            way[axis] = raw[axis] + kept * (self._filtered[axis] - raw[axis])
+            wanted = settings.ahead * way[axis]
             more[axis] = wanted + kept * (self._correction[axis] - wanted)
-        self._unexplained = limited(way[0], way[1], settings.largest)
+        self._raw = raw[0], raw[1]
+        most = settings.largest / settings.ahead if settings.ahead > 0.0 else 0.0
+        self._filtered = limited(way[0], way[1], most)
         self._correction = limited(more[0], more[1], settings.largest)
+
+    def _window(self, raw: list[float], dt: float) -> float:
+        """Time constant of the low-pass filters, s, from the changes of r between two positions."""
+        change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
+        kept = exp(-dt / _NOISE_TIME)
+        self._noise = change * change + kept * (self._noise - change * change)
+        shortest = self._settings.window
+        return min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), max(shortest, _LONGEST_WINDOW))

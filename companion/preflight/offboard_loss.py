@@ -92,8 +92,10 @@ def worst_reach(config: Config, maneuvers: ManeuverSequence, held: float, *, bra
     drag = least_drag(config)
     max_tilt_rate = limits.max_tilt_rate
     loss, worst = LossFailsafe(held, brakes, drag, max_tilt_rate, fence), Worst()
+    before: MotionAtLoss | None = None
     for time, flown in _flown(config, maneuvers, drag):
-        there = reach(flown, loss)
+        if flown != before:  # in a hover the motion stays the same
+            before, there = flown, reach(flown, loss)
         breach, at = worst.breach, worst.time
         if breach is None:
             breach, at = _breach(config, flown.offset, there, loss.fence), time

@@ -53,6 +53,7 @@ class Course:
         lockstep: whether the vehicle waited for us, so that no latency means anything.
         advice: each key to set that differs from what was measured, one sentence each.
         settings: these keys and what to set them to, as for `--set`.
+        changes: made in flight, each with `time_s`, `by` and `keys`: the values before and after.
     """
 
     began: float = 0.0
@@ -67,6 +68,7 @@ class Course:
     lockstep: bool = False
     advice: tuple[str, ...] = ()
     settings: dict[str, str] = field(default_factory=dict)
+    changes: tuple[dict[str, Any], ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -81,6 +83,7 @@ class Course:
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),
             "settings": self.settings,
+            "changes": list(self.changes),
         }
 
 

@@ -47,8 +47,8 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
         result=reason,
         phase=phase,
         planner=flight.get("planner", ""),
-        gain=float(flight.get("gain_per_s", "nan")),
-        counts=_counts(record, float(flight.get("deadline_s", "inf"))),
+        gain=float(flight.get("gain_per_s", "0")),
+        counts=_counts(record, float(flight.get("deadline_s", "0.004"))),
         link={
             name: int(resources[column][-1]) if len(resources) else 0
             for name, column in (("frames", "frames"), ("lost", "frames_lost"), ("sent", "sent"))
@@ -63,7 +63,7 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
             early_end=EarlyEnd(record.duration, None, phase),
             battery=(None, _last(thrust["battery_remaining"])),
             min_battery=float(flight.get("min_battery", "0")),
-            deadline=float(flight.get("deadline_s", "inf")),
+            deadline=float(flight.get("deadline_s", "0.004")),
             lockstep=flight.get("real_time") == "no",
         ),
     )

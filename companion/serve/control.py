@@ -5,6 +5,7 @@ import gc
 from typing import NamedTuple
 
 from companion.config import Config
+from companion.flight.changes import Changes
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
@@ -16,7 +17,7 @@ from companion.serve.network.client import Client
 from companion.serve.ownership import Ownership
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, Asked, ServedFlight
 from companion.serve.setpoints.approach import UnplannableError
-from companion.serve.setpoints.request import RefusedSetpoint, Request
+from companion.serve.setpoints.request import RefusedSetpoint, Request, climbs
 from companion.serve.setpoints.understand import SETPOINTS, Setpoints
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -49,6 +50,7 @@ class ServedControl:
         observer: is told of phases and events of each flight.
         environment: of the flights.
         records: makes their records.
+        changes: of the values that may change in flight.
     """
 
     def __init__(
@@ -60,21 +62,20 @@ class ServedControl:
         observer: Observer,
         environment: Environment,
         records: FlightRecords,
+        changes: Changes,
     ) -> None:
-        self._records = records
         self._config, self._link, self._component = config, link, component
         self._keeper, self._observer, self._environment = keeper, observer, environment
-        self._clock = asyncio.get_running_loop().time
-        serve = config.serve
-        self.ownership = Ownership(serve.setpoint_timeout, serve.hold_s)
+        self._clock, self._not_before = asyncio.get_running_loop().time, 0.0
+        self._records, self._changes = records, changes
+        self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self._newest: dict[_Owner, Request] = {}
         self._flight: ServedFlight | None = None
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
-        self._not_before = 0.0
-        settings = link.settings
-        self._autopilot = Address(settings.target_system, settings.target_component)
-        self._own = Address(settings.source_system, settings.source_component)
+        ids = link.settings
+        self._autopilot = Address(ids.target_system, ids.target_component)
+        self._own = Address(ids.source_system, ids.source_component)
 
     @property
     def in_control(self) -> bool:
@@ -189,20 +190,29 @@ class ServedControl:
             # A program may send commands and setpoints under two component ids.
             next((who for who in self._newest if who.client is client), _Owner(client, address)),
         )
-        refusal = self.ownership.ask(owner, now)
-        if refusal is None and not self._link.state.flying:
-            refusal = "take off first: control is taken over in the air"
+        refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
+        if refusal is None and self._flight is None and standing:
+            refusal = self._no_takeoff(self._newest[owner])
         if refusal is not None:
             if self._flight is None:
                 self.ownership.release()
             self._component.answer(client, f"control refused: {refusal}")
             self._answer(client, frame, REJECTED)
         elif self._flight is None:
-            self._begin(owner, Asked(client, frame))
+            self._begin(owner, Asked(client, frame), from_ground=standing)
         else:
             self._answer(client, frame, ACCEPTED if self.in_control else IN_PROGRESS)
 
-    def _begin(self, owner: _Owner, asked: Asked | None) -> None:
+    def _no_takeoff(self, request: Request) -> str | None:
+        """Why the vehicle does not take off for a client that asks for control on the ground."""
+        state, situation = self._link.state, self._keeper.situation()
+        if not state.landed or situation is None:
+            return "take off first: it is not known whether the vehicle stands on the ground"
+        if climbs(request, situation):
+            return None
+        return "command a height of 1 m or more above the ground, or take off first"
+
+    def _begin(self, owner: _Owner, asked: Asked | None, *, from_ground: bool = False) -> None:
         """Begin a flight under a client's control."""
         self._flight = flight = ServedFlight(
             str(owner),
@@ -213,6 +223,8 @@ class ServedControl:
             self._observer,
             self._environment,
             self._records,
+            self._changes,
+            from_ground=from_ground,
         )
         flight.give(self._newest[owner])
         self._task = task = asyncio.create_task(self._fly(flight, asked))

@@ -78,6 +78,11 @@ class Ownership:
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.before <= self._timeout
 
+    def begin(self, now: float) -> None:
+        """Control begins: an owner that fell silent in the takeover is held for from now on."""
+        stream = self._streams.setdefault(self.owner, _Stream())
+        stream.newest = max(stream.newest, now - self._timeout)
+
     def release(self) -> None:
         """Nobody is in control any more: the owner let go, or the vehicle left our mode."""
         self.owner = None

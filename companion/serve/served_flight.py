@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from companion.attitude.representation import heading
 from companion.config import Config
 from companion.flight.assembly import assemble
+from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer, decline_landing
@@ -58,6 +59,8 @@ class ServedFlight:
         observer: is told of phases and events.
         environment: of the flight.
         records: makes the record of the flight.
+        changes: of the values that may change in flight.
+        from_ground: whether the vehicle stands armed, and takes off first.
     """
 
     def __init__(
@@ -70,6 +73,9 @@ class ServedFlight:
         observer: Observer,
         environment: Environment,
         records: FlightRecords,
+        changes: Changes,
+        *,
+        from_ground: bool = False,
     ) -> None:
         self.let_go = False
         self._records, self._record = records, records.new()
@@ -80,15 +86,16 @@ class ServedFlight:
         self._clock = asyncio.get_running_loop().time
         settings = link.settings
         self._autopilot = Address(settings.target_system, settings.target_component)
-        self._source = ServedSource(name, _motion(config), ownership, self._heading)
+        self._source = ServedSource(name, _motion(changes.wanted), ownership, self._heading)
         self._assembled = assemble(
             config,
             link,
             self._recorder,
             decline_landing,
             self._record.folder,
-            TakeoverPlan(self._source),
+            TakeoverPlan(self._source, from_ground=from_ground),
             environment,
+            changes,
         )
         self._source.resets = self._assembled.context.loop.resets
 

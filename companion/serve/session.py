@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from companion import realtime
 from companion.config import Config
 from companion.flight.assembly import open_link, realtime_wishes
+from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, Silent, StateLogger
@@ -45,6 +46,7 @@ class ServeSession:
             None: nothing is recorded.
 
     Attributes:
+        changes: of the values that may change in flight; they last from one flight to the next.
         network: of the clients, once it is open.
         control: by clients' setpoints, if `serve.control` says so, once it is open.
     """
@@ -60,6 +62,8 @@ class ServeSession:
         self._config, self._note = config, note
         self._records = FlightRecords(config, directory, environment, note)
         self._observer, self._environment = observer or Silent(), environment
+        self.changes = Changes(config)
+        self.changes.note = note
         self._stop = asyncio.Event()
         self.network: Network | None = None
         self.control: ServedControl | None = None
@@ -113,6 +117,7 @@ class ServeSession:
                 self._observer,
                 self._environment,
                 self._records,
+                self.changes,
             )
             beside.append(keeper.keep_telemetry(self.control.needed_rates))
         gate = _Gate(

@@ -56,6 +56,7 @@ class ServedSource:
     def begin(self, now: float, pose: Pose) -> None:
         """Start from the pose that was held so far, with the newest request."""
         self.pose = pose
+        self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
         if self._waiting is not None:

@@ -61,7 +61,7 @@ class MockVehicle:
         delay_s: each datagram needs this long, s; without lockstep only.
         compiled: whether the physics are compiled by numba. The flight is the same to the bit. It
             pays from 2 minutes of flights in a process on: a process needs 0.6 s to load them, and
-            the first process on a computer 6 s to compile them.
+            the first process on a computer 10 s to compile them.
         settings: keys of the section `mock`, such as `wind`, `faults`, `parameters` or `seed`.
 
     Attributes:

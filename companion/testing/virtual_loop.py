@@ -76,3 +76,7 @@ class VirtualEventLoop(LockstepEventLoop):
     def __init__(self, clock: VirtualClock, world: World) -> None:
         self.clock, self.world = clock, world
         super().__init__(clock, _VirtualSelector(clock, world))
+
+    def time(self) -> float:
+        """The clock's time, s."""
+        return self.clock.now

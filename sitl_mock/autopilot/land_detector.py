@@ -49,14 +49,17 @@ class LandDetector:
     def _update(self, *, contact: bool) -> None:
         state = self._state
         state.contact = contact
-        # A NaN thrust, which means none, fails this comparison and counts as low.
-        pushing = state.armed and state.command.thrust > LOW_THRUST_SHARE * self._hover_thrust()
-        if not contact or pushing:
+        if not contact or self._pushing():
             self._quiet_since_us = state.time_us
             state.landed = False
             state.flown = state.flown or not contact
         elif not state.armed or state.time_us - self._quiet_since_us >= self._landed_after_us:
             state.landed = True
+
+    def _pushing(self) -> bool:
+        state = self._state
+        # A NaN thrust, which means none, fails this comparison and counts as low.
+        return state.armed and state.command.thrust > LOW_THRUST_SHARE * self._hover_thrust()
 
     def _landed_state(self) -> Landed:
         """Return EXTENDED_SYS_STATE.landed_state."""

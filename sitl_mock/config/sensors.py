@@ -39,6 +39,10 @@ class EkfConfig(Section):
     """Correlation time of the heading error, and time constant with which a turn changes it."""
     turn_yaw_ms: Finite = -4.0
     """Heading error in a turn, from delayed fixes: minus this times the turn rate of the course."""
+    compass_error_deg: Finite = 0.0
+    """Heading error that the compass causes in a calm; an acceleration reduces it within 1 s."""
+    yaw_rate_bias_deg_s: Finite = 0.0
+    """Error of the yaw rate in telemetry."""
     acceleration_lead_ms: Finite = 0.0
     """Lead of the integrated acceleration over the true one."""
     acceleration_scale: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
@@ -74,6 +78,8 @@ EKFS: dict[str, EkfConfig | None] = {
         tilt_noise_deg=0.006,
         yaw_error_deg=0.3,
         turn_yaw_ms=24.0,
+        compass_error_deg=1.3,
+        yaw_rate_bias_deg_s=0.05,
         acceleration_lead_ms=3.1,
         acceleration_scale=0.0019,
         height_offset_m=0.1,

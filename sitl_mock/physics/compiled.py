@@ -1,7 +1,7 @@
 """The vehicle's steps compiled by numba: the same source, and results that are equal to the bit.
 
 It pays for whole flights in one process. Importing this module takes half a second. Compiling takes
-six seconds, once for each version of the source on a computer. A compiled step costs a tenth of one
+ten seconds, once for each version of the source on a computer. A compiled step costs a tenth of one
 in Python.
 """
 

@@ -18,6 +18,10 @@ _SAG_S = 2.0
 """Time constant with which the height error follows the acceleration, s."""
 _SLOW = 0.5
 """Below this speed, m/s, the course does not correct the heading."""
+_COMPASS_S = 20.0
+"""Time constant with which the heading follows the compass in a calm, s."""
+_SHOWN = 0.15
+"""Rate at which an acceleration of 1 m/s^2 shows the true heading, 1/s; it grows as the square."""
 Errors = tuple[complex, complex, complex]
 """Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
 TrailRow = tuple[*Motion, *Vector, *Vector]
@@ -50,6 +54,8 @@ class FilterState(NamedTuple):
     level: TrackState
     upright: TrackState
     yaw: float  # heading error, rad
+    yaw_pending: float  # its change that the output does not yet contain, rad
+    compass: float  # part of the heading error that comes from the compass, rad
     sag: float  # of the height, m
     at: float  # fusion time of the fix, s
     corrected: float  # time of the fix, s
@@ -108,7 +114,7 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> 
         (place.real, place.imag, down.real),
         (speed.real, speed.imag, (sink - settled * pending[1]).real),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw),
+        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - settled * state.yaw_pending),
     )
 
 
@@ -141,7 +147,7 @@ class NavigationFilter:
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         level, upright = self._initial(1.0), self._initial(config.vertical_share)
         way, speed = complex(start[10], start[11]), complex(start[0], start[1])
-        self.state = FilterState(level, upright, yaw, 0.0, 0.0, 0.0, way, speed)
+        self.state = FilterState(level, upright, yaw, 0.0, 0.0, 0.0, 0.0, 0.0, way, speed)
 
     def _initial(self, share: float) -> TrackState:
         """Return the state after the first fix, whose noise becomes the error."""
@@ -181,19 +187,33 @@ class NavigationFilter:
         noise = self._next_noise(state.upright.noise, share)
         still = extrapolated(state.upright.errors, elapsed)
         upright = self._corrected_state(state.upright, still, noise, noise, settled, share * kick)
-        yaw = self._turned(speed, pull)
+        compass = self._rested_on_compass(abs(pull), elapsed)
+        yaw = self._turned(speed, pull) + compass
+        turned = settled * state.yaw_pending + yaw - state.yaw
         sag = config.height_sag_s4_per_m * abs(pull) ** 2
         sag = state.sag + (1.0 - exp(-elapsed / _SAG_S)) * (sag - state.sag)
         way = complex(delayed[10], delayed[11])
-        self.state = FilterState(level, upright, yaw, sag, at, now, way, speed)
+        self.state = FilterState(level, upright, yaw, turned, compass, sag, at, now, way, speed)
 
     def _turned(self, speed: complex, pull: complex) -> float:
-        """Return the next heading error: coloured noise about a mean that follows the turn rate."""
-        config, decay = self._config, self._yaw_decay
+        """Return the next heading error, apart from the compass's: noise that follows turns."""
+        config, decay, state = self._config, self._yaw_decay, self.state
         spread = radians(config.yaw_error_deg) * sqrt(1.0 - decay**2)
         turn_rate = (speed.conjugate() * pull).imag / max(abs(speed) ** 2, _SLOW**2)
         learned = -turn_rate * config.turn_yaw_ms * 1e-3
-        return learned + decay * (self.state.yaw - learned) + self._random.gauss(0.0, spread)
+        before = state.yaw - state.compass
+        return learned + decay * (before - learned) + self._random.gauss(0.0, spread)
+
+    def _rested_on_compass(self, pull: float, elapsed: float) -> float:
+        """Return the next heading error that comes from the compass, rad.
+
+        Only a horizontal acceleration (``pull``, m/s^2) shows the true heading, because the fixes
+        measure its direction.
+        """
+        slow = 1.0 / _COMPASS_S
+        rate = slow + _SHOWN * pull**2
+        rest = radians(self._config.compass_error_deg) * slow / rate
+        return rest + (self.state.compass - rest) * exp(-rate * elapsed)
 
     def _next_noise(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
         """Return the noise of the next fix."""

@@ -20,7 +20,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply,
 
 NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
-_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
+_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
 _DRAWN_TOGETHER = 16
 """Estimates for which noise is drawn at a time; even, because normal numbers come in pairs."""
 
@@ -33,7 +33,7 @@ class Estimate(NamedTuple):
     position_ned: Vector  # m
     velocity_ned: Vector  # m/s
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
-    gyro: Vector  # rad/s, what the (bias-free) gyro measures
+    gyro: Vector  # rad/s, what the gyro measures
 
 
 class SensorLaw(NamedTuple):
@@ -45,6 +45,7 @@ class SensorLaw(NamedTuple):
     dt: float  # length of a step, s
     filtered: bool  # whether there is a navigation filter, with the law that follows
     errors: ErrorLaw
+    yaw_rate_bias: float  # rad/s
 
 
 class SensorState(NamedTuple):
@@ -103,7 +104,8 @@ def estimate(
     q = (attitude[3], attitude[4], attitude[5], attitude[6])
     fx, fy, fz = to_body(q, (attitude[13], attitude[14], attitude[15] - law.gravity))
     tilted = rotated_estimate(state.yaw, error.rotation, q)
-    gyro = (attitude[7] + noise[3], attitude[8] + noise[4], attitude[9] + noise[5])
+    yaw_rate = attitude[9] + law.yaw_rate_bias + noise[5]
+    gyro = (attitude[7] + noise[3], attitude[8] + noise[4], yaw_rate)
     position, velocity, offset = error.position, error.velocity, state.offset
     estimated = Estimate(
         normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
@@ -175,6 +177,7 @@ class Estimator:
             dt,
             filter_ is not None,
             ErrorLaw(0.0, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
+            0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
         )
         horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
         self._behind = max(horizon, self.law.position_delay)

@@ -2,7 +2,7 @@
 
 import sys
 from importlib import invalidate_caches
-from math import hypot, nan
+from math import hypot, isfinite, nan
 
 import pytest
 
@@ -56,6 +56,12 @@ class Drifting(LinearGuidance):
             north, east, down = reference.position_ned
             return reference._replace(position_ned=(north + 3.0, east, down))
         return super().command(aside, time, inputs)
+
+class Broken(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        target, later, down = super().command(reference_at, time, inputs)
+        moving = inputs.now.position_ned[0] > 0.5
+        return (target, later, float("nan")) if moving else (target, later, down)
 """
 ENTRY_POINTS = """
 [companion.planners]
@@ -70,6 +76,7 @@ missing = theirs:not_there
 [companion.guidance]
 calm = theirs:Calm
 drifting = theirs:Drifting
+broken = theirs:Broken
 """
 
 
@@ -143,7 +150,7 @@ def test_guidance_of_another_package_flies_by_its_name():
     ("text", "message"),
     [
         ("planner: {name: their}", "unknown planner 'their'; known: auto, .*, lazy, mine"),
-        ("guidance: {kind: their}", "unknown guidance 'their'; known: linear, nmpc, calm"),
+        ("guidance: {kind: their}", "unknown guidance 'their'; known: linear, nmpc, broken, calm"),
     ],
 )
 def test_an_unknown_name_is_answered_with_those_that_are_installed(text, message):
@@ -179,3 +186,16 @@ def test_bad_planners_do_not(name, why):
 def test_guidance_that_strays_does_not_conform():
     with pytest.raises(AssertionError, match="away from its reference"):
         check_guidance("drifting")
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_guidance_that_is_not_finite_is_never_sent_and_the_vehicle_is_handed_back(autopilot):
+    """It begins to return NaN on its way along the circle."""
+    vehicle = MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+    flight = {"guidance": {"kind": "broken"}, "flight": {"maneuvers": ["circle"]}}
+    summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
+    assert summary.result == "guidance makes no commands any more"
+    assert vehicle.state()["mode"] == {"px4": "LOITER", "ardupilot": "BRAKE"}[autopilot]
+    assert not vehicle.state()["crashed"]
+    for setpoint in vehicle.setpoints:
+        assert all(map(isfinite, (*setpoint.rates, setpoint.thrust)))

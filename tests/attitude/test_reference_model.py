@@ -75,11 +75,11 @@ def test_what_a_second_order_is_sent_is_smooth_and_moves_it_along(square):
     """Led by τ and σ its rates keep the limit, and their slopes are what they become."""
     lag, dt = 0.0745, 0.004
     model = placed(START, Limits(None, W_M), lag, square=square)
-    rates, slopes = [np.array(model.rates()[:2])], [np.array(model.rate_slopes())]
+    rates, slopes = [np.array(model.rates()[:2])], [np.array(model.rate_slopes(*model.rates()[:2]))]
     for _ in range(300):
         model.advance(Target(*GOAL, 0.3), dt)
         rates.append(np.array(model.rates()[:2]))
-        slopes.append(np.array(model.rate_slopes()))
+        slopes.append(np.array(model.rate_slopes(*rates[-1])))
     rates, slopes = np.array(rates), np.array(slopes)
     mean = 0.5 * (slopes[1:] + slopes[:-1])
     assert np.diff(rates, axis=0) / dt == pytest.approx(mean, abs=0.15)

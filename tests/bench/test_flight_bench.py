@@ -2,14 +2,18 @@
 
 import json
 
+import pytest
+
+from companion.batch import can_compile
 from companion.bench import flight
+from companion.bench.profile import PARTS
 from companion.cli.main import main
 
 
 def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
     monkeypatch.setattr(flight, "FILES", {"px4": flight.FILES["px4"]})
     monkeypatch.setattr(flight, "_FLIGHTS", 1)
-    assert main(["bench", "flight", "--seconds", "0.2", "--json"]) == 0
+    assert main(["bench", "flight", "--seconds", "0.2", "--json", "--profile"]) == 0
     figures = json.loads(capsys.readouterr().out)
     for clocks in figures.values():
         assert set(clocks) == {"lockstep", "free"}
@@ -17,3 +21,7 @@ def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
             assert flown["vehicle_s"] > 5.0
             assert flown["setpoints"] > 100
             assert flown["times_real_time"] == flown["vehicle_s"] / flown["cpu_s"] > 2.0
+            assert flown["compiled"] == can_compile()
+            assert sum(flown["shares"].values()) == pytest.approx(1.0)
+            assert set(flown["shares"]) >= set(PARTS) - {"recording"}
+            assert flown["shares"].get("rest", 0.0) < 0.02

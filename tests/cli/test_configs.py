@@ -98,7 +98,8 @@ def test_what_a_file_changes_is_printed_as_yaml_that_means_the_same(path, capsys
 def test_a_file_is_printed_whole(path, capsys):
     assert main(["config", str(path)]) == 0
     out = capsys.readouterr().out
-    assert "max_tilt_deg: 25.0  # °, at least 1, at most 60; default: 35.0" in out
+    in_flight = "changeable in flight up to its value at the start"
+    assert f"max_tilt_deg: 25.0  # °, at least 1, at most 60, {in_flight}; default: 35.0" in out
 
 
 def test_one_key_or_one_section_is_printed(capsys):

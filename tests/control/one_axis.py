@@ -24,12 +24,16 @@ _GUIDANCE, _POSITION, _POSITION_LATE = 5, 5, 3
 
 
 class Airframe(NamedTuple):
-    """The true vehicle: s, s, 1/s; `strength` multiplies the acceleration by tilt."""
+    """The true vehicle: s, s, 1/s.
+
+    `strength` multiplies the acceleration by tilt, `rate_gain` the commanded body rate.
+    """
 
     lag: float
     dead_time: float
     drag: float = 0.5
     strength: float = 1.0
+    rate_gain: float = 1.0
 
 
 def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0.0), seed=0):
@@ -67,7 +71,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             held = Reference((0.0, 0.0, -5.0))
             target, later, down = guidance.command(lambda _, held=held: held, time, inputs)
             command = GuidanceCommand(target, down, time, later=later, period=_GUIDANCE * DT)
-        asked.append(law.rates(q, command.target_at(time), DT, rates).roll)
+        asked.append(vehicle.rate_gain * law.rates(q, command.target_at(time), DT, rates).roll)
         rate = asked[0] + fade * (rate - asked[0])
         roll += DT * rate
         if abs(roll) > 1.2:

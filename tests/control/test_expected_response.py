@@ -9,8 +9,9 @@ from companion.attitude import Coefficients, Target, attitude, coefficients
 from companion.config import Config
 from companion.config.files import changed
 from companion.control.expected_response import expectations, expected_response
+from companion.control.hold_settings import hold_gains
 from companion.control.inner_loop import planner
-from companion.control.outer_loop import hold_gains, linear_settings
+from companion.control.outer_loop import linear_settings
 from companion.study.lag_loop import LagLoop
 
 PX4 = {"lag_ms": 47, "dead_time_ms": 40}

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from companion.config import Config
-from companion.control.outer_loop import attitude_delay, disturbance_bandwidth, hold_weights
+from companion.control.hold_settings import (
+    attitude_delay,
+    correction_settings,
+    disturbance_bandwidth,
+    hold_weights,
+    observer_settings,
+)
 from companion.files import bounded_yaml
 from companion.files.yaml_file import parse
 from tests.control.one_axis import Airframe, hold, settled
@@ -57,6 +63,17 @@ def test_the_weights_follow_from_the_delay_and_explicit_ones_win():
     weights = hold_weights(told)
     assert (weights.position, weights.velocity) == (150.0, 8.0)
     assert disturbance_bandwidth(told) == 7.0
+
+
+def test_only_a_quick_rate_loop_has_a_quick_observer():
+    quick, usual, heavy = (believed(*vehicle) for vehicle in VEHICLES)
+    assert observer_settings(quick).sharpening == pytest.approx(0.6)
+    assert observer_settings(usual).sharpening == observer_settings(heavy).sharpening == 0.0
+    assert correction_settings(quick).window < correction_settings(usual).window
+    told = observer_settings(believed(*VEHICLES[0], disturbance_bandwidth_rad_s=7.0))
+    assert (told.bandwidth, told.sharpening) == (7.0, 0.0)
+    nobody_knows = parse("{}", "test", Config)
+    assert observer_settings(nobody_knows).sharpening == 0.0
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)

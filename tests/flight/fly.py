@@ -66,6 +66,16 @@ def quick_vehicle(autopilot, settings):
     return merged(quick, settings)
 
 
+class QuickVehicle(testing.MockVehicle):
+    """A mock vehicle that boots, climbs and lands quickly; else as its file and settings say."""
+
+    def __init__(self, autopilot=None, *, config=None, **settings):
+        told = {} if config is None else bounded_yaml.parse(config.read_text("utf-8"))["mock"]
+        autopilot = autopilot or told.get("autopilot", "px4")
+        known = merged(merged(told, settings), {"autopilot": autopilot})
+        super().__init__(**merged(quick_vehicle(autopilot, {}), known))
+
+
 def quick_flight(autopilot, changes, **link):
     """The configuration of a short hover of such a vehicle, with changes."""
     flight = merged(QUICK_FLIGHT, OTHER_VEHICLES.get(autopilot, {}))

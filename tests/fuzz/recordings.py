@@ -1,11 +1,12 @@
 """Files of others: recordings, undo files, tables of figures. Refused in a sentence, or read.
 
-The commands `identify --log` and `plot` are called as a user calls them.
+The commands `identify --log`, `plot` and `export` are called as a user calls them.
 """
 
 import contextlib
 import io
 import struct
+import tempfile
 import warnings
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,19 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError, load
 from companion.preflight.parameter_fixes import Undo
+from companion.recording.mcap_file import cdr
+from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.writer import McapWriter
 from tests.fuzz.configuration import one_sentence
 from tests.fuzz.target import Case, Target
-from tests.fuzz.texts import folder_of, mutated, numbers, scalars
+from tests.fuzz.texts import folder_of, mutated, scalars
 
 _RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 
 
 def _check(case: Case) -> None:
-    files = {name: text for name, text in case.items() if name != "tlog"}
+    files = {name: text for name, text in case.items() if name not in ("tlog", "mcap")}
     with folder_of(files) as folder:
         if "tlog" in case:
             (folder / "flight.tlog").write_bytes(bytes.fromhex(case["tlog"]))
@@ -32,8 +37,10 @@ def _check(case: Case) -> None:
         if "undo.yaml" in case:
             with contextlib.suppress(ConfigError):
                 load(folder / "undo.yaml", Undo)
-        if "response.csv" in case or "tracking.csv" in case:
+        if "mcap" in case:
+            (folder / "flight.mcap").write_bytes(bytes.fromhex(case["mcap"]))
             _command("plot", folder)
+            _command("export", folder, "--csv")
 
 
 def _command(*arguments: Any) -> None:
@@ -61,7 +68,12 @@ _TLOGS = [path.read_bytes()[:12_000] for path in sorted(_RECORDINGS.glob("*.tlog
 
 @st.composite
 def _mutated_tlog(draw: Any) -> bytes:
-    data = bytearray(draw(st.sampled_from(_TLOGS)))
+    return _damaged(draw, draw(st.sampled_from(_TLOGS)))
+
+
+def _damaged(draw: Any, whole: bytes) -> bytes:
+    """Bytes that are cut off, changed, left out or inserted."""
+    data = bytearray(whole)
     del data[draw(st.integers(0, len(data))) :]
     for _ in range(draw(st.integers(0, 6))):
         at = draw(st.integers(0, max(0, len(data) - 1)))
@@ -123,38 +135,48 @@ def _undo_text(draw: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
+_SUMMARIES = st.sampled_from(
+    (
+        '{"gain_per_s": 5.0}',
+        "[]",
+        "{}",
+        "{",
+        '{"gain_per_s": 5.0, "phases": 3, "maneuvers": []}',
+        '{"phases": [], "maneuvers": [], "early_end": {"time_s": 1e999}, "result": ""}',
+        '{"gain_per_s": 5.0, "phases": [{"time_s": 1, "name": "$a"}], "result": "$_{",'
+        ' "maneuvers": [{"name": "", "begin_s": 2, "duration_s": -1, "open_loop": 1}],'
+        ' "early_end": {"time_s": 1e8}}',
+    )
+)
+
+
+def _record(rows: list[list[float]], gain: str) -> bytes:
+    """A `flight.mcap` whose channels of numbers have these rows, as far as they are wide."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "flight.mcap"
+        writer = McapWriter(path)
+        writer.metadata("flight", {"began_s": "0.0", "epoch_s": "0.0", "gain_per_s": gain})
+        writer.message("/phase", 0, cdr.words_message((0.0,), ("connect", "a heartbeat")))
+        for number, row in enumerate(rows):
+            for channel in CHANNELS:
+                values = (row * len(channel.numbers))[: len(channel.numbers)]
+                data = channel.packing.pack(CDR, *values, *(number % 2,) * len(channel.codes))
+                writer.message(channel.topic, number, data)
+        writer.close()
+        return path.read_bytes()
+
+
 @st.composite
-def _figures(draw: Any, columns: int = 7) -> str:
-    """A table of numbers under a header, such as a flight writes."""
-    width = draw(st.sampled_from((columns, columns, columns, 1, 3, 9)))
-    row = st.lists(st.one_of(numbers, st.floats(-1.0, 1.0)), min_size=width, max_size=width)
-    rows = draw(st.lists(row, max_size=4)) * draw(st.sampled_from((1, 1, 5)))
-    step = draw(st.sampled_from((0.004, 0.1, 0.0, -0.1, 1.0)))
-    lines = [",".join(map(repr, (step * k, *row[1:]))) for k, row in enumerate(rows)]
-    return draw(st.sampled_from(("a,b\n", "", "time,x\n\n"))) + "\n".join(lines) + "\n"
+def _records(draw: Any) -> bytes:
+    """A recorded flight with odd numbers, or one whose bytes are damaged."""
+    row = st.lists(st.one_of(_floats, st.floats(-1.0, 1.0)), min_size=1, max_size=9)
+    gain = draw(st.sampled_from(("5.0", "0", "nan", "", "1e999")))
+    data = _record(draw(st.lists(row, max_size=4)) * draw(st.sampled_from((1, 1, 5))), gain)
+    return _damaged(draw, data) if draw(st.booleans()) else data
 
 
 _tables = st.fixed_dictionaries(
-    {"tracking.csv": st.one_of(_figures(), mutated(_figures()))},
-    optional={
-        "response.csv": _figures(),
-        "motion.csv": _figures(6),
-        "summary.json": st.sampled_from(
-            (
-                '{"gain_per_s": 5.0}',
-                '{"gain_per_s": 0}',
-                "[]",
-                "{}",
-                '{"gain_per_s": NaN}',
-                "{",
-                '{"gain_per_s": 5.0, "phases": 3, "maneuvers": []}',
-                '{"phases": [], "maneuvers": [], "early_end": {"time_s": 1e999}, "result": ""}',
-                '{"gain_per_s": 5.0, "phases": [{"time_s": 1, "name": "$a"}], "result": "$_{",'
-                ' "maneuvers": [{"name": "", "begin_s": 2, "duration_s": -1, "open_loop": 1}],'
-                ' "early_end": {"time_s": 1e8}}',
-            )
-        ),
-    },
+    {"mcap": _records().map(bytes.hex)}, optional={"summary.json": _SUMMARIES}
 )
 _tlogs = st.one_of(_flown_tlog(), _flown_tlog(), _mutated_tlog(), st.binary(max_size=100))
 _cases = st.one_of(

@@ -1,6 +1,7 @@
 """The correction against an estimator that follows its GPS too slowly, integrated independently."""
 
 from math import cos, hypot, isfinite, sin
+from random import Random
 
 import pytest
 from hypothesis import given
@@ -75,6 +76,26 @@ def test_a_gap_and_a_reset_begin_anew():
     correction.corrected(5.0 + DT, VehicleMotion((2.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     correction.reset()
     assert correction.corrected(5.0 + 2.0 * DT, away) == away
+
+
+def noisy(metres, seconds=20.0, seed=3):
+    """The correction at rest, and the errors it adds (m), with white noise of the position."""
+    quick = CorrectionSettings(ahead=0.65, window=0.04, largest=0.2, lateness=0.0)
+    correction, random, added = PositionCorrection(quick), Random(seed), []
+    for n in range(round(seconds / DT)):
+        north = random.gauss(0.0, metres)
+        found = correction.corrected(n * DT, VehicleMotion((north, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        added.append(abs(found.position_ned[0] - north))
+    return correction, added
+
+
+def test_noise_of_the_positions_lengthens_the_filters():
+    smooth, little = noisy(1e-4)
+    assert smooth.smoothness == 1.0
+    assert max(little) <= 2e-3
+    rough, added = noisy(0.02)
+    assert rough.smoothness == 0.0
+    assert max(added[50:]) <= 0.12  # unfiltered: 0.65 s · √2·0.02 m / 0.02 s, about 0.9 m rms
 
 
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), pairs, pairs), min_size=1, max_size=30))

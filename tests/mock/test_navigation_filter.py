@@ -80,6 +80,7 @@ def without_noise(name, yaw_deg):
             "tilt_noise_deg": 0.0,
             "yaw_time_s": 1e12,
             "yaw_error_deg": 1.0,
+            "compass_error_deg": 0.0,
         }
     )
     drawn = NavigationFilter(config, standing(0.0), 1).state.yaw
@@ -118,6 +119,21 @@ def test_a_turn_teaches_a_wrong_heading():
     assert abs(share(rows, 1, way, 0, 1.0) - (-0.0155 + 0.0040j)) < 0.0055
     rows = errors(quiet("ardupilot"), eight(3.1, 1.179), 60.0)
     assert abs(np.degrees(rows[:, 9]).mean()) < 0.3
+
+
+def test_after_a_calm_an_acceleration_corrects_the_heading():
+    """Measured on ArduPilot: from 0.75 to -0.5 degrees within a second, after 20 s of hover."""
+
+    def start(t):
+        flown = max(0.0, t - SETTLED_S - 5.0)
+        motion = (6.0 * flown, 0.0, 0.0, *LEVEL)
+        return (*motion, 3.0 * flown**2, 0.0, -5.0, 6.0 * (flown > 0.0), 0.0, 0.0)
+
+    heading = np.degrees(errors(quiet("ardupilot"), start, 7.0)[:, 9])
+    calm, a_second_later = heading[round(5.0 / DT)], heading[round(6.0 / DT)]
+    assert calm == pytest.approx(1.3 * (1.0 - np.exp(-2.25)), abs=0.02)
+    assert a_second_later < 0.4
+    assert np.abs(np.diff(heading)).max() < 0.1
 
 
 @pytest.mark.parametrize(("speed", "lower"), [(5.0, 0.050), (8.0, 0.154)])

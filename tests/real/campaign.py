@@ -11,7 +11,6 @@ import multiprocessing
 import sys
 import time
 from collections import Counter
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -67,9 +66,8 @@ def main() -> int:
         return 2
     # The mock vehicle first: beside the real ones it would load the computer.
     mocks = [] if options.no_mock else [f"mock-{name}" for name in flown]
-    with multiprocessing.get_context("spawn").Pool(len(flown)) as pool:
-        for vehicles in (mocks, flown):
-            pool.map(partial(_campaign, options=options), vehicles, chunksize=1)
+    for vehicles in (mocks, flown):
+        _fly_side_by_side(vehicles, options)
     rows = table.read([options.out])
     (options.out / "rows.json").write_text(json.dumps(rows, indent=1))
     text = table.markdown(rows)
@@ -95,6 +93,21 @@ def _options() -> argparse.Namespace:
         parser.error(f"--sets: no {', '.join(sorted(unknown))}; there are {', '.join(SETS)}")
     options.until = time.monotonic() + 60.0 * options.minutes
     return options
+
+
+def _fly_side_by_side(vehicles: list[str], options: argparse.Namespace) -> None:
+    """Fly on these vehicles at the same time; if one fails to start, the others still fly."""
+    context = multiprocessing.get_context("spawn")
+    processes = [context.Process(target=_campaign, args=(name, options)) for name in vehicles]
+    for process in processes:
+        process.start()
+    try:
+        for process in processes:
+            process.join()
+    except KeyboardInterrupt:  # they got it, too, and stop their simulators
+        for process in processes:
+            process.join()
+        raise
 
 
 def _campaign(vehicle: str, options: argparse.Namespace) -> None:

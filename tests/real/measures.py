@@ -14,7 +14,15 @@ import numpy as np
 
 from companion.attitude import coefficients, heading
 from companion.recording.response import measure_response
-from tests.real.truth import Floats, Truth, continuous, require_cover
+from tests.real.truth import (
+    Floats,
+    Truth,
+    conjugated,
+    continuous,
+    multiplied,
+    require_cover,
+    turned,
+)
 
 _NEAR = 0.01
 """A true attitude without a sample of telemetry so near to it says nothing of a step, s."""
@@ -213,29 +221,6 @@ def rms(error: Floats) -> float:
 def mean_angle(angles) -> float:
     """Mean direction, rad."""
     return atan2(float(np.mean(np.sin(angles))), float(np.mean(np.cos(angles))))
-
-
-def turned(q: Floats, angle: float) -> Floats:
-    """The attitudes, turned about the vertical by `angle` (clockwise from above), rad."""
-    return multiplied(np.array([[np.cos(angle / 2.0), 0.0, 0.0, np.sin(angle / 2.0)]]), q)
-
-
-def multiplied(a: Floats, b: Floats) -> Floats:
-    """Quaternion products, row by row."""
-    (aw, ax, ay, az), (bw, bx, by, bz) = a.T, b.T
-    return np.column_stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ]
-    )
-
-
-def conjugated(q: Floats) -> Floats:
-    """The inverse rotations."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def _runs(chosen, time: Floats, pause: float = _PAUSE) -> list[slice]:

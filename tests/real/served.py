@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from companion.recording.flight_record import read_flight
+from companion.recording.recorded_summary import trace_of
 from tests.real.build import REAL, ROOT
 from tests.real.measures import rms
 from tests.real.stamps import stamp_offset
@@ -35,25 +37,27 @@ def main() -> int:
     parser.add_argument("autopilot", choices=["px4", "ardupilot"])
     parser.add_argument("program", help="a file of tests/serve")
     parser.add_argument("--direct", action="store_true", help="without `companion serve`")
+    parser.add_argument("--ground", action="store_true", help="ask for control on the ground")
     parser.add_argument("--wind", action="store_true", help="3 m/s of it")
     parser.add_argument("--start", action="append", help="arguments of `start`, one each")
     options = parser.parse_args()
     arguments = options.start or ARGUMENTS[options.autopilot]
     with real_vehicle(options.autopilot, *arguments, relayed=False) as vehicle:
         vehicle.blow(options.wind)
-        row = (direct if options.direct else through_us)(vehicle, options.program)
+        more = ["ground"] if options.ground else []
+        row = (direct if options.direct else through_us)(vehicle, options.program, more)
         vehicle.bring_down()
         load = vehicle.load()
     print(json.dumps({"autopilot": options.autopilot, **vars(options), "load": load, **row}))
     return int("error" in row)
 
 
-def direct(vehicle, program: str) -> dict:
+def direct(vehicle, program: str, more: list[str]) -> dict:
     """The program on the autopilot itself."""
-    return run(program, vehicle.autopilot, DIRECT[vehicle.autopilot])
+    return run(program, vehicle.autopilot, DIRECT[vehicle.autopilot], more)
 
 
-def through_us(vehicle, program: str) -> dict:
+def through_us(vehicle, program: str, more: list[str]) -> dict:
     """The program through `companion serve`; the circle is measured by truth."""
     folder = Path(tempfile.mkdtemp(prefix="served-")) / "serve"
     include = {"include": str(ROOT / "configs" / f"vehicle-{vehicle.autopilot}.yaml")}
@@ -62,7 +66,7 @@ def through_us(vehicle, program: str) -> dict:
         merged(TUNED[vehicle.autopilot], serve) | include, command="serve", folder=folder
     )
     arrival = time.monotonic()
-    row = run(program, vehicle.autopilot, f"udpout://{OURS}")
+    row = run(program, vehicle.autopilot, f"udpout://{OURS}", more)
     serving.send(2)
     row["counters"] = serving.finish()
     flights = [each for each in sorted(folder.iterdir()) if (each / "summary.json").exists()]
@@ -74,12 +78,12 @@ def through_us(vehicle, program: str) -> dict:
     return row
 
 
-def run(program: str, autopilot: str, endpoint: str) -> dict:
+def run(program: str, autopilot: str, endpoint: str, more: list[str]) -> dict:
     """Run a program; what it reported, or its error."""
     path = ROOT / "tests" / "serve" / program
     try:
         ended = subprocess.run(
-            [sys.executable, path, endpoint, *PROGRAM_ARGUMENTS[autopilot]],
+            [sys.executable, path, endpoint, *PROGRAM_ARGUMENTS[autopilot], *more],
             capture_output=True, text=True, timeout=_LONGEST_S, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -93,8 +97,9 @@ def measured(vehicle, folder: Path, arrival: float) -> dict:
     """The summary of a recorded flight, and the errors on its circle at full speed, RMS in m."""
     summary = json.loads((folder / "summary.json").read_text())
     out = {"result": summary["result"], "latency_us": summary["latency_us"]}
-    tracking = _rows(folder / "tracking.csv")
-    tracking[:, 0] += stamp_offset(_rows(folder / "rates.csv"), folder / "flight.tlog")
+    trace = trace_of(read_flight(folder))
+    tracking = trace.tracking.rows().copy()
+    tracking[:, 0] += stamp_offset(trace.rates.rows(), folder / "flight.tlog")
     speed = np.linalg.norm(np.gradient(tracking[:, 1:4], tracking[:, 0], axis=0), axis=1)
     circle = tracking[abs(speed - SPEED) < _NEAR_SPEED]
     if len(circle) < _LEAST_ROWS:
@@ -108,10 +113,6 @@ def measured(vehicle, folder: Path, arrival: float) -> dict:
         shift = (circle[:, 4:7] - true).mean(axis=0)
         out["circle_truth_m"] = rms(true + shift - reference)
     return out
-
-
-def _rows(path: Path):
-    return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
 
 
 if __name__ == "__main__":

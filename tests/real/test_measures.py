@@ -5,8 +5,8 @@ import pytest
 
 from companion.attitude import attitude
 from companion.attitude.types import Coefficients
-from tests.real.measures import maneuvers, multiplied, split_error, straightness, tracking_errors
-from tests.real.truth import NoTruthError, Truth, truth_from
+from tests.real.measures import maneuvers, split_error, straightness, tracking_errors
+from tests.real.truth import NoTruthError, Truth, multiplied, truth_from
 
 RADIUS, SPEED, RAMP, LAP = 5.0, 5.0, 5.0, 2.0 * np.pi
 """m, m/s, s, s."""

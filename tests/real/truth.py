@@ -83,6 +83,29 @@ def continuous(q: Floats) -> Floats:
     return q * sign[:, None]
 
 
+def turned(q: Floats, angle: float) -> Floats:
+    """The attitudes, turned about the vertical by `angle` (clockwise from above), rad."""
+    return multiplied(np.array([[np.cos(angle / 2.0), 0.0, 0.0, np.sin(angle / 2.0)]]), q)
+
+
+def multiplied(a: Floats, b: Floats) -> Floats:
+    """Quaternion products, row by row."""
+    (aw, ax, ay, az), (bw, bx, by, bz) = a.T, b.T
+    return np.column_stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ]
+    )
+
+
+def conjugated(q: Floats) -> Floats:
+    """The inverse rotations."""
+    return q * np.array([1.0, -1.0, -1.0, -1.0])
+
+
 def north_east(
     latitude: float, longitude: float, origin: tuple[float, float]
 ) -> tuple[float, float]:

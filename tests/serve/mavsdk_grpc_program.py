@@ -17,6 +17,8 @@ from offboard_scene import Program, first, main
 
 
 class Grpc(Program):
+    refusal = ActionError
+
     def __init__(self, system):
         self._system, self._offboard = system, system.offboard
         self._following = asyncio.ensure_future(self._follow())
@@ -33,14 +35,12 @@ class Grpc(Program):
     async def parameter(self, name):
         return await self._system.param.get_param_float(name)
 
-    async def takes_off(self, height):
-        try:
-            await self._system.action.set_takeoff_altitude(height)
-            await self._system.action.arm()
-            await self._system.action.takeoff()
-        except ActionError:
-            return False
-        return True
+    async def arm(self):
+        await self._system.action.arm()
+
+    async def take_off(self, height):
+        await self._system.action.set_takeoff_altitude(height)
+        await self._system.action.takeoff()
 
     async def climbed(self, height):
         places = self._system.telemetry.position()
@@ -93,11 +93,11 @@ def free_port():
         return opened.getsockname()[1]
 
 
-async def run(endpoint, hover, parameter):
+async def run(endpoint, fly):
     system = System(port=free_port())
     await system.connect(system_address=endpoint)
     await first(system.core.connection_state(), lambda state: state.is_connected)
-    return await Grpc(system).fly(hover, parameter)
+    return await fly(Grpc(system))
 
 
 if __name__ == "__main__":

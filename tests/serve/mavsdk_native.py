@@ -31,6 +31,8 @@ def acceleration(north, east, down):
 
 
 class Native(Program):
+    refusal = ActionError
+
     def __init__(self, system):
         self._action, self._offboard = ActionAsync(system), offboard.OffboardAsync(system)
         self._telemetry, self._param = TelemetryAsync(system), ParamAsync(system)
@@ -48,14 +50,12 @@ class Native(Program):
     async def parameter(self, name):
         return await self._param.get_param_float(name)
 
-    async def takes_off(self, height):
-        try:
-            await self._action.set_takeoff_altitude(height)
-            await self._action.arm()
-            await self._action.takeoff()
-        except ActionError:
-            return False
-        return True
+    async def arm(self):
+        await self._action.arm()
+
+    async def take_off(self, height):
+        await self._action.set_takeoff_altitude(height)
+        await self._action.takeoff()
 
     async def climbed(self, height):
         places = self._telemetry.subscribe_position()
@@ -110,11 +110,11 @@ class Native(Program):
         await self._offboard.set_attitude(level)
 
 
-async def run(endpoint, hover, parameter):
+async def run(endpoint, fly):
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
     async with Mavsdk(configuration) as mavsdk:
         await mavsdk.add_any_connection(endpoint)
-        return await Native(await mavsdk.first_autopilot(timeout_s=15)).fly(hover, parameter)
+        return await fly(Native(await mavsdk.first_autopilot(timeout_s=15)))
 
 
 if __name__ == "__main__":

@@ -7,8 +7,9 @@ import sys
 from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionItem, MissionRawAsync
+from mavsdk.asyncio.plugins.offboard import OffboardAsync, VelocityBodyYawspeed
 from mavsdk.asyncio.plugins.param import ParamAsync
-from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.asyncio.plugins.telemetry import FlightMode, TelemetryAsync
 from mavsdk.component_type import ComponentType
 
 
@@ -48,10 +49,24 @@ async def main(endpoint: str) -> dict[str, object]:
         await action.arm()
         await first(telemetry.subscribe_armed(), bool)
         await action.takeoff()
-        await first(telemetry.subscribe_position(), lambda place: place.relative_altitude_m > 1.0)
-        await action.land()
-        await first(telemetry.subscribe_armed(), lambda armed: not armed)
+        await first(telemetry.subscribe_position(), lambda place: place.relative_altitude_m > 2.2)
+        await asyncio.sleep(2.0)
+        await hover(OffboardAsync(system), telemetry, report)
         return report
+
+
+async def hover(offboard, telemetry, report):
+    """Hold by setpoints, 20 a second, until another station changes the mode."""
+    setpoint = VelocityBodyYawspeed()
+    setpoint.forward_m_s = setpoint.right_m_s = setpoint.down_m_s = setpoint.yawspeed_deg_s = 0.0
+    await offboard.set_velocity_body(setpoint)
+    await offboard.start()
+    await first(telemetry.subscribe_flight_mode(), lambda mode: mode is FlightMode.OFFBOARD)
+    print("IN CONTROL", flush=True)
+    mode = await first(
+        telemetry.subscribe_flight_mode(), lambda mode: mode is not FlightMode.OFFBOARD
+    )
+    report["lost_to"] = mode.name
 
 
 if __name__ == "__main__":

@@ -40,6 +40,7 @@ class Program:
     """One package's way to say each thing; places and speeds NED, m and m/s.
 
     Attributes:
+        refusal: the package's exception for a refused command.
         place, speed: the newest by telemetry, or None.
     """
 
@@ -73,18 +74,42 @@ class Program:
             await asyncio.sleep(0.02)
         return max(errors)
 
-    async def fly(self, hover, parameter):
+    async def takes_off(self, height):
+        """Whether the autopilot arms and takes off; refused until it is ready."""
+        try:
+            await self.arm()
+            await self.take_off(height)
+        except self.refusal:
+            return False
+        return True
+
+    async def starts_on_ground(self, height):
+        """Arm, command a height, and ask for control: the vehicle takes off by itself."""
+        while not self.place:  # noqa: ASYNC110
+            await asyncio.sleep(0.1)
+        try:
+            await self.arm()
+        except self.refusal:
+            return False
+        await self.position(*self.place[:2], -height)
+        await self.start()
+        await self.position(*self.place[:2], -height)
+        return True
+
+    async def fly(self, hover, parameter, *, from_ground=False):
         """Fly; returns what was seen."""
         report = {"armable": await self.armable(), "parameter": await self.parameter(parameter)}
         async with asyncio.timeout(90.0):  # ArduPilot is ready after 40 s
-            while not await self.takes_off(5.0):  # noqa: ASYNC110
+            begin = self.starts_on_ground if from_ground else self.takes_off
+            while not await begin(5.0):  # noqa: ASYNC110
                 await asyncio.sleep(1.0)
         await self.climbed(4.6)
         await asyncio.sleep(3.0)
         start = self.place
         await self.position(*start)
         began = time.monotonic()
-        await self.start()
+        if not from_ground:
+            await self.start()
         report["start_s"] = time.monotonic() - began
         report["active"] = await self.active()
         report["position"] = await self.settle((start[0] + 3.0, start[1], start[2]), 5.0)
@@ -113,6 +138,10 @@ class Program:
 
 
 def main(run):
-    """Run `run(endpoint)` with the hover thrust and a parameter's name; print the report."""
-    endpoint, hover, parameter = sys.argv[1], float(sys.argv[2]), sys.argv[3]
-    print("REPORT " + json.dumps(asyncio.run(run(endpoint, hover, parameter))), flush=True)
+    """Run `run(endpoint, fly)`; the further arguments are those of `Program.fly`."""
+    endpoint, hover, parameter, *ground = sys.argv[1:]
+
+    def fly(program):
+        return program.fly(float(hover), parameter, from_ground=bool(ground))
+
+    print("REPORT " + json.dumps(asyncio.run(run(endpoint, fly))), flush=True)

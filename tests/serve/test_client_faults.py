@@ -402,6 +402,7 @@ def documented():
     return dict(re.findall(r"^\| (.+?) \| (.+?) \|", table, re.MULTILINE))
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_every_fault_of_a_client_ends_in_its_documented_state(autopilot):
     vehicle = mock(autopilot)

@@ -10,6 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config.files import load
+from companion.recording.flight_record import read_flight
+from companion.replay.replay import Replay
 from tests.serve.virtual import (
     ALL,
     POSITION,
@@ -178,7 +180,11 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorde
         assert load(folder / "config.yaml").limits.max_tilt_deg == 45.0
         sent = sent_rates(folder / "flight.tlog")
         assert len(sent) == summary["setpoints"]
-        assert {name.name for name in folder.glob("*.csv")} >= {"tracking.csv", "rates.csv"}
+        replay = Replay(read_flight(folder), load(folder / "config.yaml"))
+        assert replay.follows_record
+        samples = replay.run()
+        assert sum(each.replayed is not None for each in samples) == summary["setpoints"]
+        assert [each for each in samples if not each.same] == []
 
     fly("px4", scene, directory=tmp_path)
 
@@ -193,23 +199,83 @@ def test_a_single_setpoint_in_guided_gives_no_control():
     fly("ardupilot", scene)
 
 
-@BOTH
-def test_on_the_ground_control_is_refused_in_words(autopilot):
-    vehicle = mock(autopilot)
+def test_on_the_ground_ardupilot_s_setpoints_are_refused_in_words():
+    vehicle = mock("ardupilot")
 
     async def whole():
-        async with serving(vehicle, autopilot) as session:
+        async with serving(vehicle, "ardupilot") as session:
             script = MemoryClient().connect(session)
-            await asyncio.sleep(60.0 if autopilot == "ardupilot" else 12.0)
-            if autopilot == "ardupilot":
-                script.command(176, 1, 4)
+            await asyncio.sleep(6.0)
+            script.command(176, 1, 4)
             await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
-            if autopilot == "px4":
-                assert await script.offboard() == REJECTED
             assert "take off first" in " ".join(script.texts())
             assert not vehicle.setpoints
 
     testing.run(vehicle, whole())
+
+
+def test_px4_takes_off_for_a_client_that_asks_for_offboard_on_the_ground(tmp_path):
+    """As MAVSDK: its stream stops 3 s after it has asked, and goes on when it is answered."""
+    vehicle = mock("px4")
+    up = (0.0, 0.0, -5.0)
+
+    async def whole():
+        async with serving(vehicle, "px4", directory=tmp_path) as session:
+            script = MemoryClient().connect(session)
+            await asyncio.sleep(10.0)
+            await stream(0.5, lambda _: script.local(POSITION, up))
+            assert await script.offboard() == REJECTED
+            assert "arm it first" in " ".join(script.texts())
+            script.command(400, 1)
+            await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, 0.0)))
+            assert await script.offboard() == REJECTED
+            assert "command a height" in " ".join(script.texts())
+            assert not vehicle.setpoints
+            await stream(0.3, lambda _: script.local(POSITION, up))
+            asked = asyncio.ensure_future(script.offboard())
+            await stream(3.0, lambda _: script.local(POSITION, up))
+            assert await asked == dialect.MAV_RESULT_ACCEPTED
+            assert vehicle.state()["mode"] == "OFFBOARD"
+            assert -vehicle.state()["position"][2] > 1.5, "no setpoint of ours on the ground"
+            await asyncio.sleep(1.0)
+            assert session.control.in_control, "held until it goes on"
+            await stream(5.0, lambda _: script.local(POSITION, up), 0.1)
+            assert math.dist(vehicle.state()["position"], up) < 0.3
+
+    testing.run(vehicle, whole())
+    assert min(setpoint.thrust for setpoint in vehicle.setpoints) > 0.1, "none is idle"
+    (folder,) = tmp_path.iterdir()
+    phases = [one["name"] for one in json.loads((folder / "summary.json").read_text())["phases"]]
+    assert phases == ["connect", "checks", "takeoff", "offboard", "control", "hand back"]
+
+
+def test_what_stops_the_takeoff_for_a_client_ends_it():
+    """A station that commands hold in the climb wins; a vehicle disarmed before it stays down."""
+    vehicle = mock("px4")
+
+    async def whole():
+        async with serving(vehicle, "px4") as session:
+            script = MemoryClient().connect(session)
+            station = MemoryClient("station", (255, 190)).connect(session)
+            await asyncio.sleep(10.0)
+            hold = lambda _: script.local(POSITION, (0.0, 0.0, -8.0))  # noqa: E731
+            for stop, height in (((400, 0), 0.0), ((176, 1, 4, 3), 0.8)):
+                script.command(400, 1)
+                await stream(0.2, hold)
+                asked = asyncio.ensure_future(script.offboard())
+                await stream(1.5, hold)
+                while -vehicle.state()["position"][2] < height:
+                    await stream(0.1, hold)
+                station.command(*stop)
+                while not asked.done():
+                    await stream(0.1, hold)
+                assert asked.result() == REJECTED
+                await stream(1.0, hold)
+                assert not session.control.in_control
+            assert vehicle.state()["mode"] == "LOITER"
+
+    testing.run(vehicle, whole())
+    assert not vehicle.setpoints
 
 
 def test_setpoints_for_another_vehicle_behind_a_client_are_passed_to_it():

@@ -48,29 +48,33 @@ def check_report(report, said):
 
 
 @pytest.mark.timeout(180)
-def test_mavsdk_flies_and_mavproxy_uploads_a_mission_at_the_same_time(tmp_path):
+def test_mavsdk_flies_by_setpoints_and_mavproxy_uploads_a_mission_and_wins(tmp_path):
     vehicle, station, program = free_ports(3)
+    endpoints = f"udpout://127.0.0.1:{station}", f"udpin://127.0.0.1:{program}"
+    settings = [f"recording.directory={tmp_path / 'flights'}"]
     with (
-        mock(vehicle, "--speed", 2),
-        serving(vehicle, f"udpout://127.0.0.1:{station}", f"udpin://127.0.0.1:{program}") as served,
+        mock(vehicle),
+        serving(vehicle, *endpoints, settings=settings) as served,
         mavproxy(station, tmp_path) as proxy,
-    ):
-        run = subprocess.Popen(
+        subprocess.Popen(
             [sys.executable, MAVSDK, f"udpout://127.0.0.1:{program}"],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+        ) as run,
+    ):  # fmt: skip
         said = read_until(proxy, "parameters\n")
         received = next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
-        out, errors = run.communicate(timeout=120)
-        assert run.returncode == 0, out + errors
-        report = json.loads(out.split("REPORT ")[1].splitlines()[0])
+        assert run.stdout.readline() == "IN CONTROL\n", run.communicate()[1]
         (tmp_path / "plan.txt").write_text(PLAN)
         proxy.stdin.write(f"wp load {tmp_path / 'plan.txt'}\n")
         read_until(proxy, "MISSION_ACK: TYPE_MISSION: ACCEPTED")
-        # Not LAND, which MAVSDK commanded: MAVProxy tells a mode that it told last only once.
         proxy.stdin.write("long DO_SET_MODE 1 4 5\n")
         read_until(proxy, "Mode RTL")
+        out, errors = run.communicate(timeout=60)
+        assert run.returncode == 0, out + errors
+    report = json.loads(out.split("REPORT ")[1].splitlines()[0])
     assert report["mission"] == 3
+    assert report["lost_to"] == "RETURN_TO_LAUNCH"
+    assert "took over: mode AUTO.RTL" in served.said
     assert received >= PARAMETERS
     counters = served.counters
     assert counters["routing"]["looped"] == counters["uplink"]["dropped"] == 0
@@ -127,5 +131,5 @@ def test_a_mavsdk_offboard_program_flies_through_us(autopilot, program, tmp_path
         report = run_program(program, f"udpout://127.0.0.1:{port}", *HOVER_AND_PARAMETER[autopilot])
     check_report(report, served.said)
     assert report["circle_rms_m"] < 0.15, "as MAVSDK's telemetry tells it, late by itself"
-    (folder,) = tmp_path.iterdir()
-    assert json.loads((folder / "summary.json").read_text())["tracking"]["position_rms_m"] < 0.15
+    (summary,) = tmp_path.glob("*/summary.json")
+    assert json.loads(summary.read_text())["tracking"]["position_rms_m"] < 0.15

@@ -14,15 +14,14 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
+from tests.flight.fly import QuickVehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
 
 
 def mock(autopilot, **settings):
-    return testing.MockVehicle(
-        autopilot, lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings
-    )
+    return QuickVehicle(lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
 
 
 class MemoryClient(Client):
@@ -180,19 +179,21 @@ async def airborne(session, vehicle, autopilot, height=5.0):
                 await asyncio.sleep(0.5)
             ground.command(400, 1)
             await asyncio.sleep(1.5)
-            if session.control._link.state.armed:
+            if vehicle.state()["armed"]:
                 break
         if autopilot == "px4":
-            altitude = session.control._link.state.home
-            ground.command(22, 0, 0, 0, math.nan, math.nan, math.nan,
-                           altitude.altitude_m + height)  # fmt: skip
+            altitude = ground.of("GLOBAL_POSITION_INT")[-1].alt * 1e-3
+            ground.command(22, 0, 0, 0, math.nan, math.nan, math.nan, altitude + height)
         else:
             ground.command(22, 0, 0, 0, 0, 0, 0, height)
         while True:
-            state = session.control._link.state
-            position = state.position
-            near = state.height is not None and state.height > height - 0.4
-            if near and abs(position.velocity_ned[2]) < 0.2 and not state.taking_off:
+            true = vehicle.state()
+            above = -true["position"][2]
+            if (
+                above > height - 0.4
+                and abs(true["velocity"][2]) < 0.2
+                and true["mode"] != "TAKEOFF"
+            ):
                 break
             await asyncio.sleep(0.2)
     return ground

@@ -14,7 +14,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.testing import MockVehicle, UnseenError, environment, fly, open_wire, run, session
 from companion.vehicle.link import Link
 from sitl_mock.config.section import ConfigError as MockConfigError
-from tests.flight.fly import quick_flight, quick_vehicle
+from tests.flight.fly import QUICK_PARAMETERS, quick_flight, quick_vehicle
 
 CONFIG = Path(__file__).parents[2] / "configs" / "mock-px4.yaml"
 BOTH_WAYS = pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "free"])
@@ -119,7 +119,7 @@ def test_a_clock_that_slips_and_runs_in_bursts_is_met_as_over_udp():
 def test_the_configuration_may_be_a_file_or_the_keys_that_differ(tmp_path):
     file = tmp_path / "my.yaml"
     file.write_text("flight: {arm: true, maneuvers: [hover]}\nhover: {duration_s: 1}\n")
-    hot = MockVehicle(config=CONFIG, prearm_delay_s=0.2)
+    hot = MockVehicle(config=CONFIG, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS["px4"])
     assert fly(file, hot).result == "ok"
     cold = vehicle()
     assert fly(str(file), cold, tmp_path / "log").log == tmp_path / "log"

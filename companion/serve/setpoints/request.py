@@ -88,6 +88,20 @@ class Situation(NamedTuple):
     origin: "Origin | None" = None
 
 
+_LEAST_HEIGHT, _LEAST_CLIMB = 1.0, 0.1
+"""A setpoint this far above the vehicle (m), or upwards this fast (m/s), asks for a take-off."""
+
+
+def climbs(request: Request, situation: Situation) -> bool:
+    """Whether a request leads a vehicle on the ground into the air; attitudes and rates do not."""
+    if not isinstance(request, MotionRequest):
+        return False
+    position, velocity, _ = request.vertical
+    if position is not None:
+        return position[0] < situation.position_ned[2] - _LEAST_HEIGHT
+    return velocity is not None and velocity[0] < -_LEAST_CLIMB
+
+
 class Origin(NamedTuple):
     """Where the local frame begins, WGS84.
 

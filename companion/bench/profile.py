@@ -1,0 +1,90 @@
+"""Which part of the program and of the mock vehicle uses how much processor time, by sampling."""
+
+import signal
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+
+EVERY_S = 0.001
+"""Processor time between two samples, s."""
+PARTS = {
+    "event loop and wire": (
+        "companion/testing/",
+        "companion/mavlink/lockstep.py",
+        "companion/mavlink/loop.py",
+    ),
+    "vehicle: physics, estimate": ("sitl_mock/physics/",),
+    "vehicle: messages": ("sitl_mock/link/", "sitl_mock/exchange.py"),
+    "vehicle: autopilot": ("sitl_mock/",),
+    "link: frames, messages, state": ("companion/mavlink/", "companion/vehicle/"),
+    "planner": ("companion/attitude/",),
+    "control loop": (
+        "companion/control/control_loop.py",
+        "companion/control/planner_runner.py",
+        "companion/control/estimator_resets.py",
+        "companion/control/loop_record.py",
+    ),
+    "guidance": ("companion/guidance/", "companion/control/"),
+    "safety, phases, checks": (
+        "companion/safety/",
+        "companion/flight/",
+        "companion/preflight/",
+        "companion/api/",
+    ),
+    "recording": ("companion/recording/",),
+}
+"""Parts, and the files of each; the first part that names a file has it."""
+_REST = "rest"
+_ROOTS = tuple(
+    f"{Path(spec.origin).parents[1]}/"
+    for spec in map(find_spec, ("companion", "sitl_mock"))
+    if spec is not None and spec.origin is not None
+)
+
+
+@contextmanager
+def sampled() -> Iterator[Counter[str]]:
+    """Count samples by part while the block runs, in the main thread.
+
+    A function of another package counts for the part that called it.
+    """
+    counts: Counter[str] = Counter()
+    parts: dict[str, str | None] = {}
+
+    def take(_signal: int, frame: FrameType | None) -> None:
+        while frame is not None:
+            file = frame.f_code.co_filename
+            if file not in parts:
+                parts[file] = _part_of(file)
+            if part := parts[file]:
+                counts[part] += 1
+                return
+            frame = frame.f_back
+        counts[_REST] += 1
+
+    before = signal.signal(signal.SIGPROF, take)
+    signal.setitimer(signal.ITIMER_PROF, EVERY_S, EVERY_S)
+    try:
+        yield counts
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def shares(counts: Counter[str]) -> dict[str, float]:
+    """Share of each part, largest first; together they are 1."""
+    total = counts.total()
+    return {part: count / total for part, count in counts.most_common()}
+
+
+def _part_of(file: str) -> str | None:
+    """Part of a source file; `None`: a file of another package."""
+    for root in _ROOTS:
+        name = file.removeprefix(root)
+        for part, prefixes in PARTS.items():
+            if name.startswith(prefixes):
+                return part
+    return None

@@ -1,0 +1,170 @@
+"""`companion tune`: propose gain, weights and bandwidth for an identified vehicle."""
+
+import argparse
+import json
+import os
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.config import Config
+from companion.config.files import changed, load
+from companion.config.known_drag import drag_prior
+from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
+from companion.recording.learned_file import newest
+from companion.tuning import Disturbances, Proposal, propose
+from companion.tuning.flights import COURSES, Flown, autopilot_like, flown
+from companion.tuning.noise import measured_disturbances
+from companion.tuning.writing import proposal_text, summary_lines
+
+_VEHICLE, _CONFIG, _LOG = "vehicle.yaml", "config.yaml", "flight.tlog"
+_OUTPUT = "tuned.yaml"
+_SECTIONS = ("vehicle", "thrust")
+"""Sections that a vehicle file writes."""
+
+
+def tune(options: argparse.Namespace) -> int:
+    """Propose, fly the proposal on the mock vehicle, and write it."""
+    console = Console(stderr=options.json, highlight=False, soft_wrap=True)
+    source: Path = options.vehicle
+    vehicle = source / _VEHICLE if source.is_dir() else source
+    output = options.output or vehicle.with_name(_OUTPUT)
+    _check_output(output, options.force)
+    config, included = _configuration(source, vehicle, options.config)
+    config = _with_learned_drag(config, source)
+    log = source / _LOG
+    disturbances = Disturbances()
+    if source.is_dir() and log.exists():
+        disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
+    proposal = propose(config, disturbances)
+    flights = {} if options.no_flights else _flights(proposal, console)
+    include = _relative(vehicle, output) if included else None
+    write_whole(output, proposal_text(proposal, include, flights, source.name))
+    load(output)
+    console.print("\n".join(summary_lines(proposal, flights)))
+    keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
+    console.print(
+        f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
+        "from your own file: its own keys would win."
+    )
+    good = all(after.ok for _, after in flights.values())
+    if options.json:
+        print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
+    return EXIT_OK if good else EXIT_FLIGHT
+
+
+def _check_output(output: Path, force: bool) -> None:
+    """Refuse a file that cannot be written, before the flights.
+
+    Raises:
+        ConfigError: why.
+    """
+    if output.is_dir():
+        raise ConfigError(f"{output} is a folder; name a file in it with --output")
+    if output.exists() and not force:
+        raise ConfigError(
+            f"{output} exists; name another with --output, or replace it with --force"
+        )
+    if not output.parent.is_dir():
+        raise ConfigError(f"{output}: there is no folder {output.parent}")
+
+
+def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
+    """The configuration to tune, and whether the vehicle comes from a vehicle file.
+
+    Raises:
+        ConfigError: a file cannot be read, or does not say how the vehicle responds.
+    """
+    recorded = source / _CONFIG
+    if base is None and source.is_dir() and recorded.exists():
+        base = recorded
+    if not vehicle.exists():
+        if base is None or source.is_file() or not source.exists():
+            raise ConfigError(
+                f"{vehicle} does not exist; name the file or the flight folder that `companion "
+                "identify` wrote"
+            )
+        return _flyable(load(base)), False
+    identified = load(vehicle)
+    if base is None:
+        return _flyable(identified), True
+    told = identified.model_dump(exclude_unset=True, include=set(_SECTIONS))
+    return _flyable(changed(load(base), told, str(vehicle))), True
+
+
+def _with_learned_drag(config: Config, source: Path) -> Config:
+    """The configuration with the drag that the flights beside a flight folder have learned."""
+    learned = newest(source.resolve().parent) if source.is_dir() else None
+    if config.guidance.drag is not None or learned is None:
+        return config
+    drag = {
+        "drag_per_s": learned.drag.linear,
+        "quadratic_drag_per_m": learned.drag.quadratic,
+    }
+    return changed(config, {"guidance": drag}, str(learned.path))
+
+
+def _flyable(config: Config) -> Config:
+    """The configuration with `planner.name` auto: `identify` flies with another planner."""
+    return changed(
+        config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
+    )
+
+
+def _relative(vehicle: Path, output: Path) -> Path:
+    return Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
+
+
+def _flights(proposal: Proposal, console: Console) -> dict[str, tuple[Flown, Flown]]:
+    """Fly each course with the configuration before and with the proposal."""
+    autopilot = autopilot_like(proposal.tuned)
+    flights = {}
+    for course in COURSES:
+        console.print(f"flying the {course.name} on the {autopilot} mock vehicle…")
+        flights[course.name] = (
+            flown(proposal.untuned, course, autopilot),
+            flown(proposal.tuned, course, autopilot),
+        )
+    return flights
+
+
+def _figures(
+    proposal: Proposal, flights: dict[str, tuple[Flown, Flown]], output: Path
+) -> dict[str, Any]:
+    """What `--json` prints; a value that a failed flight did not measure is null."""
+    expected = {}
+    for name, each in (("before", proposal.before), ("after", proposal.after)):
+        found = each.margins
+        expected[name] = {
+            "gain_margin_db": round(found.gain_db, 2),
+            "phase_margin_deg": round(found.phase_deg, 1),
+            "delay_margin_ms": round(1e3 * found.delay, 1),
+            "error_by_gusts_m": round(each.errors.gusts, 4),
+            "error_on_a_path_m": round(each.errors.path, 4),
+            "error_by_noise_m": round(each.errors.noise, 4),
+            "settling_s": round(each.settling, 2),
+        }
+    flown_figures = {
+        name: {
+            when: {key: _rounded(value) for key, value in asdict(flight).items()}
+            for when, flight in zip(("before", "after"), pair, strict=True)
+        }
+        for name, pair in flights.items()
+    }
+    return {
+        "file": str(output),
+        "proposed": proposal.changes,
+        "expected": expected,
+        "flights": flown_figures,
+    }
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return round(value, 4) if isfinite(value) else None
+    return value

@@ -1,0 +1,104 @@
+"""Which keys may change in flight: each says so itself, by a marker in its section."""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
+
+from companion.config.files import changed
+from companion.config.markers import IN_FLIGHT, UP_TO_START
+from companion.config.reference import sections
+from companion.config.root import Config
+from companion.files.yaml_file import ConfigError
+
+Values = Mapping[str, Mapping[str, Any]]
+"""New values by section and key, as in a configuration file."""
+
+
+class Difference(NamedTuple):
+    """A key with two values.
+
+    Attributes:
+        section: of the key.
+        key: its name.
+        before: its value before.
+        after: its value after.
+    """
+
+    section: str
+    key: str
+    before: Any
+    after: Any
+
+    @property
+    def name(self) -> str:
+        """The key with its section."""
+        return f"{self.section}.{self.key}".rstrip(".")
+
+    def __str__(self) -> str:
+        return f"{self.name} from {shown(self.before)} to {shown(self.after)}"
+
+
+def shown(value: Any) -> str:
+    """A value as YAML writes it, numbers without trailing zeros."""
+    return "null" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@cache
+def changeable() -> dict[tuple[str, str], str]:
+    """The keys that may change in flight, by section and key → how far, in words."""
+    return {
+        (section, key): str(extra[IN_FLIGHT])
+        for section, model in sections().items()
+        for key, field in model.model_fields.items()
+        if isinstance(extra := field.json_schema_extra, dict) and IN_FLIGHT in extra
+    }
+
+
+def differences(before: Config, after: Config) -> Iterator[Difference]:
+    """The keys with different values; a section without keys of its own counts as one key."""
+    for section in Config.model_fields:
+        old, new = getattr(before, section), getattr(after, section)
+        if not (isinstance(old, BaseModel) and isinstance(new, BaseModel)):
+            if old != new:
+                yield Difference(section, "", old, new)
+            continue
+        for key in type(old).model_fields:
+            if getattr(old, key) != getattr(new, key):
+                yield Difference(section, key, getattr(old, key), getattr(new, key))
+
+
+def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> Config:
+    """The configuration `now` with new values.
+
+    Args:
+        start: the configuration with which the flight began.
+        now: the present one.
+        values: the new values.
+        name: names the change in error messages.
+
+    Raises:
+        ConfigError: a key must not change in flight, or the result is not valid.
+    """
+    for section, keys in values.items():
+        for key in keys:
+            full, model = f"{section}.{key}".rstrip("."), sections().get(section)
+            known = section in Config.model_fields if model is None else key in model.model_fields
+            if not known:
+                raise ConfigError(f"{name}: there is no key `{full}`")
+            if (section, key) not in changeable():
+                raise ConfigError(
+                    f"{name}: {full} must not change in flight; it counts from the next flight on"
+                )
+    wanted = changed(now, values, name)
+    for section, keys in values.items():
+        for key in keys:
+            first, new = (getattr(getattr(config, section), key) for config in (start, wanted))
+            if changeable()[section, key] == UP_TO_START and new > first:
+                raise ConfigError(
+                    f"{name}: {section}.{key} {new:g} is more than {first:g}, with which the "
+                    "vehicle was checked before take-off; in flight it may be lowered, and raised "
+                    "again up to that"
+                )
+    return wanted

@@ -1,0 +1,139 @@
+"""Gains of the position hold and of its observer, from what is known of the rate loop."""
+
+from math import inf
+
+from companion.config import Config
+from companion.config.known_drag import drag_prior
+from companion.control.inner_loop import slower_tilt, tilt_response
+from companion.guidance import ObserverSettings, Weights, chain_gains
+from companion.guidance.feedback import ChainGains
+from companion.guidance.position_correction import CorrectionSettings
+
+_CALM = Weights(position=1.0, velocity=1.5)
+"""Low weights of the hold between doublets, so that its commands do not disturb `identify`."""
+_USUAL_RATE_LOOP = 0.12
+"""Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
+_HOLD_RANGE = 0.065, 0.08
+"""Range over which the hold changes from stiff to normal: dead time, plus half the lag, plus half
+the time in which the rate loop slews to the largest roll-pitch rate, s."""
+_OBSERVER_RANGE = 0.035, 0.06
+"""Range over which the observer changes from quick to normal: dead time plus half the lag, s."""
+_SHARPENING = 0.6
+"""Relative increase of the observer's bandwidth with a quick rate loop."""
+_CALM_BANDWIDTH = 1.0
+"""Bandwidth of the disturbance estimate while the vehicle is identified, rad/s."""
+_POSITION_TIME = 0.1
+"""Time constant with which the estimated position follows the measured one, s."""
+_POSITION_PULL = 4.0, 8.0
+"""Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
+is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
+_CORRECTS_WITHIN = 0.65
+"""Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
+_CORRECTION_WINDOW = 0.1, 0.04
+"""Time constant of the two low-pass filters on the position correction, with a normal and a quick
+observer, s."""
+_LARGEST_CORRECTION = 0.2
+"""Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
+
+
+def hold_weights(config: Config) -> Weights:
+    """The weights of the position hold; those not configured follow from the delay T.
+
+    T is the delay of the attitude behind its target (`attitude_delay`).
+
+    The weights 1/T⁴ and 1/T² place the poles of the hold at 1/T. A quick rate loop allows twice the
+    position weight. `tests/control/test_margins.py` checks the stability margins against errors of
+    T and of the thrust.
+    """
+    guidance, delay = config.guidance, attitude_delay(config)
+    position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
+    return Weights(
+        (1.0 + _hold_quickness(config)) / delay**4 if position is None else position,
+        1.0 / delay**2 if velocity is None else velocity,
+    )
+
+
+def _quickness(late: float, quick_and_slow: tuple[float, float]) -> float:
+    """1 for rate loops that are at most `quick` s late; 0 from `slow` s on, linear between."""
+    quick, slow = quick_and_slow
+    return min(max(0.0, (slow - late) / (slow - quick)), 1.0)
+
+
+def _hold_quickness(config: Config) -> float:
+    """1 if the rate loop allows a stiff hold, 0 if not.
+
+    A rate loop that slews slowly is late in large motions only: a stiff hold would swing on after
+    them for good, as on the ArduPilot mock at 200 °/s.
+    """
+    limits = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
+    slews = [axis.acceleration_limit for axis in limits if axis.acceleration_limit is not None]
+    slewing = config.limits.max_tilt_rate / min(slews) if slews else 0.0
+    return _quickness(_lateness(config) + 0.5 * slewing, _HOLD_RANGE)
+
+
+def _lateness(config: Config) -> float:
+    """Dead time plus half the lag of the rate loop, s; infinite if it is not identified."""
+    lag, dead_time = slower_tilt(config)
+    return dead_time + 0.5 * lag if config.vehicle.known else inf
+
+
+def observer_quickness(config: Config) -> float:
+    """1 if the rate loop allows a quick observer of the motion, 0 if not.
+
+    A quick observer follows the corrected position, so errors of the autopilot's velocity matter
+    less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
+    """
+    if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
+        return 0.0
+    return _quickness(_lateness(config), _OBSERVER_RANGE)
+
+
+def observer_settings(config: Config) -> ObserverSettings:
+    """The settings of the motion observer."""
+    slow, quick = _POSITION_PULL
+    return ObserverSettings(
+        _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
+        _POSITION_TIME,
+        slow + _quickness(_lateness(config), _HOLD_RANGE) * (quick - slow),
+        config.guidance.max_disturbance_m_s2,
+        _SHARPENING * observer_quickness(config),
+    )
+
+
+def correction_settings(config: Config) -> CorrectionSettings:
+    """The settings of the position correction."""
+    slow, quick = _CORRECTION_WINDOW
+    return CorrectionSettings(
+        _CORRECTS_WITHIN,
+        slow + observer_quickness(config) * (quick - slow),
+        _LARGEST_CORRECTION,
+        config.guidance.position_lateness,
+    )
+
+
+def disturbance_bandwidth(config: Config) -> float:
+    """Bandwidth of the wind estimate, rad/s: as configured, or 1.5 times that of the hold."""
+    configured = config.guidance.disturbance_bandwidth_rad_s
+    return 1.5 / attitude_delay(config) if configured is None else configured
+
+
+def attitude_delay(config: Config) -> float:
+    """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified."""
+    delay = feedback_delay(config)
+    return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
+
+
+def feedback_delay(config: Config) -> float:
+    """Delay of the attitude plus half a guidance period, the mean delay of the feedback, s."""
+    return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
+
+
+def hold_gains(config: Config) -> ChainGains:
+    """The gains of the position hold that follow from its weights."""
+    weights = _CALM if flies_identify(config) else hold_weights(config)
+    return chain_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
+
+
+def flies_identify(config: Config) -> bool:
+    """Whether the flight identifies the vehicle, which wants a hold with low gains."""
+    return "identify" in config.flight.maneuvers

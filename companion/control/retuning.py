@@ -1,0 +1,139 @@
+"""Changes gains, weights and limits of the loops while they fly."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import exp, log
+from typing import Any, NamedTuple
+
+from companion.attitude import PLANNER_NAMES, Constants, Limits
+from companion.config import Config
+from companion.config.guidance import LINEAR
+from companion.config.in_flight import Difference, differences
+from companion.control.control_loop import ControlLoop
+from companion.control.guidance_loop import GuidanceLoop
+from companion.control.hold_settings import (
+    disturbance_bandwidth,
+    hold_weights,
+    observer_settings,
+)
+from companion.control.inner_loop import law_constants, rate_limits
+from companion.control.outer_loop import linear_settings
+from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
+
+
+class Tuning(NamedTuple):
+    """What the loops take from a configuration, of that which may change in flight.
+
+    Attributes:
+        guidance: settings of linear guidance.
+        observer: settings of the motion observer.
+        constants: gains and limits of the planner.
+        limits: limits of body rates that guidance commands.
+        max_tilt: largest tilt in open loop, rad.
+    """
+
+    guidance: LinearSettings
+    observer: ObserverSettings
+    constants: Constants
+    limits: Limits
+    max_tilt: float
+
+
+def tuning(config: Config) -> Tuning:
+    """The values of a configuration that may change in flight, as the loops take them.
+
+    Raises:
+        ValueError: gains cannot be computed from them.
+    """
+    return Tuning(
+        linear_settings(config),
+        observer_settings(config),
+        law_constants(config),
+        rate_limits(config),
+        config.limits.max_tilt,
+    )
+
+
+class Retuning:
+    """Gives the values of a configuration to the loops of a flight.
+
+    Only the keys that may change in flight have an effect; see `companion.config.in_flight`.
+
+    Args:
+        loop: the control loop.
+        guidance_loop: the guidance loop.
+    """
+
+    def __init__(self, loop: ControlLoop, guidance_loop: GuidanceLoop) -> None:
+        self._loop, self._guidance_loop = loop, guidance_loop
+
+    @contextmanager
+    def stepped_by(self, step: Callable[[float], None]) -> Iterator[None]:
+        """Call `step` at the beginning of each guidance step while the block runs."""
+        self._guidance_loop.before_step = step
+        try:
+            yield
+        finally:
+            self._guidance_loop.before_step = lambda _: None
+
+    def apply(self, values: Tuning) -> None:
+        """Use these values from the next sample and the next step on.
+
+        Raises:
+            TypeError: planner or guidance is of another package and cannot change.
+        """
+        guidance_loop = self._guidance_loop
+        if not isinstance(guidance_loop.guidance, LinearGuidance):
+            raise TypeError(f"{type(guidance_loop.guidance).__name__} cannot be retuned")
+        self._loop.retune(values.constants, values.limits)
+        guidance_loop.guidance.retune(values.guidance)
+        guidance_loop.estimate.retune(values.observer)
+        guidance_loop.max_tilt = values.max_tilt
+
+
+def fixed_because(config: Config) -> str | None:
+    """Why nothing may change in flight with this configuration, as a sentence; None: it may."""
+    if config.guidance.kind != LINEAR:
+        return f"guidance.kind {config.guidance.kind} keeps the values with which the flight began"
+    if config.planner_name not in PLANNER_NAMES:
+        return f"planner.name {config.planner_name} keeps the values with which the flight began"
+    return None
+
+
+def between(before: Config, after: Config, share: float) -> Config:
+    """A configuration on the way from one to another, in the keys that differ.
+
+    Positive values move by the same factor in equal times, others by the same amount. A value that
+    follows from others (null) counts as what it comes to.
+
+    Args:
+        before: where the way begins; its differences from `after` may change in flight.
+        after: where it ends.
+        share: from 0 to 1.
+    """
+    if share >= 1.0:
+        return after
+    middle: dict[str, dict[str, Any]] = {}
+    for each in differences(before, after):
+        first, last = _number(before, each, each.before), _number(after, each, each.after)
+        if first > 0.0 and last > 0.0:
+            value = exp((1.0 - share) * log(first) + share * log(last))
+        else:
+            value = (1.0 - share) * first + share * last
+        middle.setdefault(each.section, {})[each.key] = value
+    sections = {
+        name: getattr(after, name).model_copy(update=values) for name, values in middle.items()
+    }
+    return after.model_copy(update=sections)
+
+
+def _number(config: Config, difference: Difference, value: float | None) -> float:
+    """The value, or what null comes to in `config`."""
+    if value is not None:
+        return value
+    comes_to = {
+        "guidance.position_weight_per_s4": lambda: hold_weights(config).position,
+        "guidance.velocity_weight_per_s2": lambda: hold_weights(config).velocity,
+        "guidance.disturbance_bandwidth_rad_s": lambda: disturbance_bandwidth(config),
+    }
+    return comes_to[difference.name]()

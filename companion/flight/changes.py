@@ -1,0 +1,178 @@
+"""Changes of gains, weights and limits in flight: checked, slewed, undone, recorded."""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from companion.config import Config
+from companion.config.in_flight import (
+    Difference,
+    Values,
+    changed_in_flight,
+    differences,
+)
+from companion.control.retuning import Retuning, between, fixed_because, tuning
+from companion.files.yaml_file import ConfigError
+from companion.safety.actions import internal
+
+SLEW = 0.7
+"""Time over which a change takes effect, s."""
+_PERIOD = 0.035
+"""Shortest time between two steps of a change, s; each computes the gains again."""
+_MOST = 200
+"""Number of changes that can be undone; older ones are kept."""
+
+
+class ChangeRefusedError(Exception):
+    """A change is not made; the message is a sentence for the user."""
+
+
+class Change(NamedTuple):
+    """A change that was made.
+
+    Attributes:
+        time: when it began, s on our clock.
+        by: who made it, such as "the live page".
+        keys: what it changed.
+    """
+
+    time: float
+    by: str
+    keys: tuple[Difference, ...]
+
+    def __str__(self) -> str:
+        return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
+
+    def as_dict(self, began: float) -> dict[str, Any]:
+        """For JSON; its time counts from `began`, s on our clock."""
+        keys = {each.name: [each.before, each.after] for each in self.keys}
+        return {"time_s": round(self.time - began, 3), "by": self.by, "keys": keys}
+
+
+class Changes:
+    """The values that may change in flight: with which the flight began, and as they are now.
+
+    A change passes the checks that the configuration passed at the start. It takes effect in small
+    steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
+
+    Attributes:
+        wanted: the configuration after the newest change.
+        made: all changes, in order.
+        note: shows a change while no flight goes on.
+        on_change: called with `wanted` after each change.
+
+    Args:
+        start: the configuration with which the flight begins.
+    """
+
+    def __init__(self, start: Config) -> None:
+        self.wanted = start
+        self.made: list[Change] = []
+        self.note: Callable[[str], None] = lambda _: None
+        self.on_change: Callable[[Config], None] = lambda _: None
+        self._start = self._now = self._from = start
+        self._earlier: list[Config] = []
+        self._retuning: Retuning | None = None
+        self._began: float | None = None
+        self._stepped = 0.0
+
+    @property
+    def start(self) -> Config:
+        """The configuration with which the flight began."""
+        return self._start
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a change to undo."""
+        return bool(self._earlier)
+
+    def change(self, values: Values, by: str) -> str:
+        """Begin to change to these values; returns what changes, in words.
+
+        Raises:
+            ChangeRefusedError: a key must not change in flight, or a value is not valid. Nothing
+                has changed.
+        """
+        try:
+            wanted = changed_in_flight(self._start, self.wanted, values, by)
+        except ConfigError as error:
+            raise ChangeRefusedError(str(error)) from error
+        before = self.wanted
+        told = self._begin(wanted, by)
+        self._earlier = [*self._earlier, before][-_MOST:]
+        self.on_change(wanted)
+        return told
+
+    def undo(self, by: str) -> str:
+        """Begin to go back to the values before the newest change; returns what changes, in words.
+
+        Raises:
+            ChangeRefusedError: nothing was changed.
+        """
+        if not self._earlier:
+            raise ChangeRefusedError(f"{by}: there is no change to undo")
+        told = self._begin(self._earlier[-1], by)
+        self._earlier.pop()
+        self.on_change(self.wanted)
+        return told
+
+    @contextmanager
+    def applied_by(self, retuning: Retuning, note: Callable[[str], None]) -> Iterator[None]:
+        """Let changes take effect in these loops while the block runs, those before it at once.
+
+        Args:
+            retuning: of the loops.
+            note: records and shows a change.
+        """
+        if self.wanted is not self._start:
+            self._now = self.wanted
+            retuning.apply(tuning(self._now))
+        self._retuning = retuning
+        outside, self.note = self.note, note
+        try:
+            with retuning.stepped_by(self.step):
+                yield
+        finally:
+            self._retuning = self._began = None
+            self._now, self.note = self.wanted, outside
+
+    def step(self, now: float) -> None:
+        """Go on with a change that is under way; the guidance loop calls this at each step."""
+        if self._began is None or now - self._stepped < _PERIOD or self._retuning is None:
+            return
+        self._stepped = now
+        share = (now - self._began) / SLEW
+        try:
+            self._now = between(self._from, self.wanted, share)
+            self._retuning.apply(tuning(self._now))
+        except Exception as error:  # the flight goes on with the values it has
+            self._began = None
+            self.note(internal(error))
+        if share >= 1.0:
+            self._began = None
+
+    def _begin(self, wanted: Config, by: str) -> str:
+        """Begin the way from the present values to `wanted`.
+
+        Raises:
+            ChangeRefusedError: these loops cannot change, or nothing differs.
+        """
+        fixed = fixed_because(self._start)
+        if fixed is not None:
+            raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
+        keys = tuple(differences(self.wanted, wanted))
+        if not keys:
+            raise ChangeRefusedError(f"{by}: the values are so already; nothing has changed")
+        try:
+            tuning(wanted)
+        except ValueError as error:
+            raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
+        now = asyncio.get_running_loop().time()
+        self._from, self.wanted, self._began = self._now, wanted, now
+        if self._retuning is None:
+            self._now, self._began = wanted, None
+        change = Change(now, by, keys)
+        self.made.append(change)
+        self.note(str(change))
+        return str(change)

@@ -1,0 +1,81 @@
+"""What a flight looks like at one time: for the live page, in the columns of `flight.mcap`."""
+
+from math import isfinite, sqrt
+from typing import Any
+
+from companion.attitude import coefficients
+from companion.flight.context import FlightContext
+from companion.guidance.reference import GRAVITY, Reference
+
+_AXES = ("north", "east", "down")
+_RATES = ("roll", "pitch", "yaw")
+
+
+def view(context: FlightContext, now: float) -> dict[str, Any]:
+    """The newest values, with the names and units of `companion.recording.mcap_file.channels`.
+
+    Values that are not known are left out.
+    """
+    loop, guidance_loop, state = context.loop, context.guidance_loop, context.link.state
+    shown: dict[str, float | None] = {}
+    sample, command, motion = loop.resets.newest, loop.command, guidance_loop.motion
+    if sample is not None:
+        north, east = coefficients(sample.q)
+        shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
+        shown.update(measured_north=north, measured_east=east)
+        shown.update(_named("measured", sample.body_rates, "rad_s", _RATES))
+    if command is not None and loop.on:
+        target = command.target_at(now)
+        shown.update(target_north=target.north, target_east=target.east)
+        shown.update(target_heading_rad=target.heading, thrust=loop.record.thrust)
+    if motion is not None:
+        shown.update(_named("estimated", motion.position_ned, "m"))
+        shown.update(_named("estimated", motion.velocity_ned, "m_s"))
+        reference = _reference(context, now)
+        if reference is not None:
+            shown.update(_named("reference", reference.position_ned, "m"))
+            north, east, down = reference.acceleration_ned
+            thrust = sqrt(north * north + east * east + (GRAVITY - down) ** 2)
+            shown.update(reference_north=north / thrust, reference_east=east / thrust)
+            if state.height is not None:
+                above = motion.position_ned[2] - reference.position_ned[2]
+                shown.update(reference_height_m=state.height + above)
+    origin = context.snapshot_builder.origin_ned
+    if origin is not None:
+        shown.update(_named("fence", origin, "m"))
+    wind = guidance_loop.estimate.disturbance
+    stats, round_trip = context.link.stats, context.link.timesync.round_trip_s
+    shown.update(
+        wind_north_m_s2=wind[0],
+        wind_east_m_s2=wind[1],
+        height_m=state.height,
+        hover_thrust=guidance_loop.learning.hover,
+        frames=stats.frames,
+        frames_lost=stats.lost,
+        round_trip_ms=None if round_trip is None else 1e3 * round_trip,
+        setpoints=loop.record.setpoints,
+        unanswered=sum(loop.record.unanswered.values()),
+        offboard_active=loop.offboard_active,
+    )
+    known = ((name, value) for name, value in shown.items() if value is not None)
+    return {
+        name: round(value, 5) if isinstance(value, float) else value
+        for name, value in known
+        if isfinite(value)
+    }
+
+
+def _reference(context: FlightContext, now: float) -> Reference | None:
+    """The reference that is flown, if the autopilot obeys us and there is one."""
+    guidance_loop = context.guidance_loop
+    flown, motion = guidance_loop.flown, guidance_loop.motion
+    if not context.loop.offboard_active or flown.pose is None or motion is None:
+        return None
+    return flown.reference(now, motion, 0.0)(now)
+
+
+def _named(
+    prefix: str, values: tuple[float, ...], unit: str, axes: tuple[str, ...] = _AXES
+) -> dict[str, float]:
+    names = (f"{prefix}_{axis}_{unit}" for axis in axes)
+    return dict(zip(names, values, strict=True))

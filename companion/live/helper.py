@@ -1,0 +1,194 @@
+"""The flight's side of the helper process: tells it what happens, and makes the changes it asks."""
+
+import asyncio
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from companion.config import Config
+from companion.flight.changes import ChangeRefusedError, Changes
+from companion.flight.status import FlightStatus
+from companion.live.channel import Channel, Message
+from companion.live.door import Door
+
+T = TypeVar("T")
+
+_MOST_A_TURN = 10
+"""Messages handled in one turn of the event loop: samples come between the turns."""
+
+
+class Wishes(NamedTuple):
+    """What the helper process is to do.
+
+    Attributes:
+        watch: file whose edits are applied, or None.
+        door: of the live page, or None.
+        follows: whether the flight flies the maneuvers of its configuration.
+        folder: of the flight; takes `live.log` and saved values; None: there is none.
+    """
+
+    watch: Path | None
+    door: Door | None
+    follows: bool
+    folder: Path | None
+
+
+class Helper:
+    """An observer that passes all on to the helper process. Its methods return at once.
+
+    Args:
+        wishes: what the process is to do.
+        config: of the flight.
+
+    Attributes:
+        changes: are made when the process asks for them; set before the flight begins.
+        note: takes what the process has to say.
+
+    Raises:
+        OSError: the process cannot be started.
+    """
+
+    def __init__(self, wishes: Wishes, config: Config) -> None:
+        self.changes = Changes(config)
+        self.note: Callable[[str], None] = lambda _: None
+        self._what = "the live page" if wishes.door is not None else "the watch of the file"
+        self._channel, theirs = Channel.pair()
+        descriptors = [theirs.fileno()]
+        if wishes.door is not None:
+            descriptors.append(wishes.door.listening.fileno())
+        self._process = _started(descriptors, theirs, wishes.folder)
+        self._send("start", **_first(wishes, config))
+
+    @property
+    def dropped(self) -> int:
+        """Messages that the process did not take in time."""
+        return self._channel.dropped
+
+    async def serve_beside(self, work: Coroutine[Any, Any, T]) -> T:
+        """Run `work`, and serve the process meanwhile."""
+        loop = asyncio.get_running_loop()
+        self.changes.on_change = self._tell_change
+        loop.add_reader(self._channel.fileno(), self._on_readable)
+        try:
+            return await work
+        finally:
+            loop.remove_reader(self._channel.fileno())
+
+    def close(self, words: str) -> None:
+        """Tell how the flight ended; the live page stays for those who have it open."""
+        self._send("end", text=words)
+        self._channel.close()
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Pass a phase on."""
+        self._send("phase", name=name, waits_for=waits_for)
+
+    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+        """Ignore it: the status says the same."""
+
+    def status(self, status: FlightStatus) -> None:
+        """Pass the state of the flight on."""
+        battery = status.battery
+        self._send(
+            "status",
+            time_s=round(status.time, 3),
+            phase=status.phase,
+            detail=status.detail,
+            maneuver=status.maneuver,
+            maneuver_elapsed_s=round(status.maneuver_elapsed, 1),
+            maneuver_duration_s=status.maneuver_duration,
+            airborne_s=status.airborne,
+            speed_m_s=status.speed,
+            tilt_rad=status.tilt,
+            error_m=status.error,
+            rate_hz=status.rate,
+            latency_us=None if status.latency is None else 1e6 * status.latency,
+            missed_deadlines=status.missed,
+            battery_remaining=None if battery is None else battery.remaining,
+            battery_v=None if battery is None else battery.voltage_v,
+            alarms=list(status.alarms),
+            monitored=status.monitored,
+            dropped=self._channel.dropped,
+            **status.view,
+        )
+
+    def event(self, time: float, text: str) -> None:
+        """Pass an event on."""
+        self._send("event", time_s=round(time, 3), text=text)
+
+    def _send(self, kind: str, **content: Any) -> None:
+        was_open = self._channel.open
+        self._channel.send({"kind": kind, **content})
+        if was_open and not self._channel.open and kind != "end":
+            self.note(f"{self._what} has ended by itself; the flight goes on without it")
+
+    def _tell_change(self, config: Config) -> None:
+        made = str(self.changes.made[-1])
+        self._send("config", config=_plain(config), can_undo=self.changes.can_undo, text=made)
+
+    def _on_readable(self) -> None:
+        """Handle what the process asks for."""
+        for _ in range(_MOST_A_TURN):
+            try:
+                message = self._channel.receive()
+            except BlockingIOError:
+                return
+            if message is None:
+                asyncio.get_running_loop().remove_reader(self._channel.fileno())
+                self.note(f"{self._what} has ended by itself; the flight goes on without it")
+                return
+            self._handle(message)
+
+    def _handle(self, message: Message) -> None:
+        kind, by = message.get("kind"), str(message.get("by", self._what))
+        if kind == "note":
+            self.note(str(message.get("text")))
+            return
+        try:
+            if kind == "undo":
+                told = self.changes.undo(by)
+            else:
+                told = self.changes.change(message.get("values") or {}, by)
+        except ChangeRefusedError as refused:
+            self._send("answer", id=message.get("id"), refusal=str(refused))
+        else:
+            self._send("answer", id=message.get("id"), refusal=None, text=told)
+
+
+def _started(
+    descriptors: list[int], theirs: socket.socket, folder: Path | None
+) -> "subprocess.Popen[bytes]":
+    """Start the process. It outlives a Ctrl-C, and a flight whose page somebody has open."""
+    command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
+    log = Path("/dev/null") if folder is None else folder / "live.log"
+    with log.open("ab") as words, theirs:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=words,
+            stderr=words,
+            pass_fds=descriptors,
+            start_new_session=True,
+        )
+
+
+def _first(wishes: Wishes, config: Config) -> Message:
+    door = wishes.door
+    return {
+        "config": _plain(config),
+        "follows": wishes.follows,
+        "watch": None if wishes.watch is None else str(wishes.watch.absolute()),
+        "folder": None if wishes.folder is None else str(wishes.folder.absolute()),
+        "token": None if door is None else door.token,
+        "host": None if door is None else door.host,
+        "port": None if door is None else door.port,
+    }
+
+
+def _plain(config: Config) -> Message:
+    plain: Message = json.loads(config.model_dump_json())
+    return plain

@@ -1,0 +1,153 @@
+"""The helper process: watches the edited file, and serves the live page if that is asked for."""
+
+import asyncio
+import os
+import socket
+import sys
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from companion.config.in_flight import Values
+from companion.files.yaml_file import ConfigError
+from companion.flight.changes import ChangeRefusedError
+from companion.live.channel import Channel, Message
+from companion.live.checks import ChangeChecks
+from companion.live.watched_file import WatchedFile
+
+_LOOK_PERIOD = 0.06
+"""The watched file is looked at this often, s; three looks make an edit."""
+_ANSWER = 3.0
+"""Time allowed for the flight to answer, s."""
+_NICE = 5
+"""The process gives way to the flight."""
+
+
+class Relay:
+    """The process's end of the channel.
+
+    Attributes:
+        first: the first message of the flight.
+        checks: of changes.
+        over: set when the flight has ended.
+
+    Args:
+        channel: to the flight.
+        first: see above.
+    """
+
+    def __init__(self, channel: Channel, first: Message) -> None:
+        self.first, self.checks = first, ChangeChecks.of(first)
+        self.over = asyncio.Event()
+        self._channel = channel
+        self._ids = count()
+        self._asked: dict[int, asyncio.Future[Message]] = {}
+        self._listeners: list[Any] = []
+        asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
+
+    def listen(self, take: Any) -> None:
+        """Call `take` with each message of the flight from now on."""
+        self._listeners.append(take)
+
+    async def change(self, values: Values, by: str) -> str:
+        """Check new values and have the flight change to them; returns what changes, in words.
+
+        Raises:
+            ConfigError: the values cannot be used.
+            ChangeRefusedError: the flight refuses them, or has ended.
+        """
+        await asyncio.to_thread(self.checks.check, values, by)
+        return await self.ask({"kind": "change", "values": values, "by": by})
+
+    async def ask(self, message: Message) -> str:
+        """Send a request and wait for the answer, in words.
+
+        Raises:
+            ChangeRefusedError: the flight refuses it, or has ended.
+        """
+        number = next(self._ids)
+        answer = self._asked[number] = asyncio.get_running_loop().create_future()
+        try:
+            if self.over.is_set() or not self._channel.send({**message, "id": number}):
+                raise ChangeRefusedError("the flight has ended; nothing has changed")
+            async with asyncio.timeout(_ANSWER):
+                told = await answer
+        except TimeoutError as error:
+            raise ChangeRefusedError("the flight does not answer; look at its values") from error
+        finally:
+            del self._asked[number]
+        if told.get("refusal") is not None:
+            raise ChangeRefusedError(str(told["refusal"]))
+        return str(told.get("text"))
+
+    def note(self, text: str) -> None:
+        """Have the flight record and show a sentence."""
+        self._channel.send({"kind": "note", "text": text})
+
+    def _on_readable(self) -> None:
+        while True:
+            try:
+                message = self._channel.receive()
+            except BlockingIOError:
+                return
+            if message is None:
+                asyncio.get_running_loop().remove_reader(self._channel.fileno())
+                self.over.set()
+                return
+            self._take(message)
+
+    def _take(self, message: Message) -> None:
+        if message["kind"] == "config":
+            self.checks.note(message)
+        answered = self._asked.get(message.get("id", -1))
+        if answered is not None and not answered.done():
+            answered.set_result(message)
+        for take in self._listeners:
+            take(message)
+
+
+async def watch(relay: Relay, path: Path) -> None:
+    """Apply the edits of a file until the flight ends."""
+    try:
+        watched = WatchedFile(path, relay.checks.check)
+    except ConfigError as error:
+        relay.note(f"{path.name} is not watched: {error}")
+        return
+    relay.note(f"edits of {path.name} are applied from now on")
+    while not relay.over.is_set():
+        edit = await asyncio.to_thread(watched.look)
+        if edit is not None and edit.refusal is not None:
+            relay.note(edit.refusal)
+        elif edit is not None:
+            message = {"kind": "change", "values": edit.values, "by": path.name}
+            try:
+                await relay.ask(message)
+                watched.accept()
+            except ChangeRefusedError as refused:
+                relay.note(f"{path.name} is not applied: {refused}")
+        await asyncio.sleep(_LOOK_PERIOD)
+
+
+async def _help(descriptor: int, listening: int | None) -> None:
+    channel = Channel(socket.socket(fileno=descriptor))
+    first = channel.receive()
+    if first is None:
+        return
+    os.set_blocking(descriptor, False)
+    relay, tasks = Relay(channel, first), []
+    if first["watch"] is not None:
+        tasks.append(asyncio.create_task(watch(relay, Path(first["watch"]))))
+    if listening is None:
+        await relay.over.wait()
+    else:
+        from companion.live.page.server import serve_page  # noqa: PLC0415  needs the extra
+
+        await serve_page(relay, socket.socket(fileno=listening))
+    for task in tasks:
+        task.cancel()
+
+
+if __name__ == "__main__":
+    os.nice(_NICE)
+    _channel, *_listening = map(int, sys.argv[1:])
+    asyncio.run(_help(_channel, _listening[0] if _listening else None))

@@ -1,0 +1,1 @@
+"""The live page: served by the helper process, drawn in the browser."""

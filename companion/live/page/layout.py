@@ -1,0 +1,102 @@
+"""The layout of the live page; `live.js` draws into it."""
+
+import json
+from pathlib import Path
+
+from nicegui import Client, app, ui
+
+from companion.live.helper_process import Relay
+from companion.live.page.guard import Guard
+from companion.live.page.panel import Panel
+from companion.live.page.store import Store
+
+_HERE = Path(__file__).parent
+_PUSH_PERIOD = 0.2
+"""New states go to the browsers this often, s."""
+
+_CELLS = (
+    ("phase", "phase"),
+    ("maneuver", "maneuver"),
+    ("height_m", "height"),
+    ("speed_m_s", "speed"),
+    ("tilt_rad", "tilt"),
+    ("error_m", "error"),
+    ("rate_hz", "setpoints"),
+    ("latency_us", "latency"),
+    ("frames_lost", "link"),
+    ("battery_remaining", "battery"),
+    ("alarms", "safety"),
+)
+_PLOTS = (
+    ("height", "height and reference, m"),
+    ("error", "distance from the reference, m"),
+    ("north", "coefficient north: target, measured"),
+    ("east", "coefficient east: target, measured"),
+    ("speed", "speed, m/s"),
+    ("latency", "latency, ms"),
+)
+
+
+def add_page(relay: Relay, store: Store, guard: Guard) -> None:
+    """Add the page, and send new states to all who have it open."""
+    shared = f"<style>{_text('live.css')}</style><script>{_text('live.js')}</script>"
+    ui.add_head_html(shared, shared=True)
+    sent: dict[str, tuple[int, int]] = {}
+
+    @ui.page("/")
+    def page(client: Client, token: str = "") -> None:
+        _drawings()
+        Panel(relay, store, guard, unlocked=guard.knows(token))
+        state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
+        sent[client.id] = store.count, store.event_count
+        client.run_javascript(f"live.begin({json.dumps(state)})")
+
+    async def push() -> None:
+        for client in list(Client.instances.values()):
+            known = sent.get(client.id)
+            if known is None or not client.has_socket_connection:
+                continue
+            new = {
+                "frames": store.since(known[0]),
+                "events": store.events_since(known[1]),
+                "fence": store.fence(),
+                "over": store.over,
+            }
+            sent[client.id] = store.count, store.event_count
+            client.run_javascript(f"live.push({json.dumps(new)})")
+        for gone in sent.keys() - Client.instances.keys():
+            del sent[gone]
+
+    app.timer(_PUSH_PERIOD, push)
+
+
+def _drawings() -> None:
+    with ui.element("header").classes("live-cells"):
+        for name, label in _CELLS:
+            with ui.element("div").classes("live-cell"):
+                ui.html(label, sanitize=False).classes("live-label")
+                ui.html(f'<span data-live="{name}">–</span>', sanitize=False).classes("live-value")
+    ui.html('<div id="live-over" hidden></div>', sanitize=False).classes("live-wide")
+    with ui.element("div").classes("live-grid"):
+        for name, label in (
+            ("horizon", "attitude"),
+            ("disc", "tilt: ● measured, ○ target, + reference"),
+            ("map", "plan: ● vehicle, + reference, dashed: fence"),
+        ):
+            _canvas(name, label, "live-square")
+    with ui.element("div").classes("live-grid"):
+        for name, label in _PLOTS:
+            _canvas(name, label, "live-plot")
+    ui.html('<ol id="live-events"></ol>', sanitize=False).classes("live-wide")
+
+
+def _canvas(name: str, label: str, shape: str) -> None:
+    ui.html(
+        f'<figure class="{shape}"><figcaption>{label}</figcaption>'
+        f'<canvas id="live-{name}"></canvas></figure>',
+        sanitize=False,
+    )
+
+
+def _text(name: str) -> str:
+    return (_HERE / name).read_text(encoding="utf-8")

@@ -1,0 +1,139 @@
+"""The part of the live page that changes limits, gains and weights."""
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from companion.config.in_flight import shown
+from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
+from companion.flight.changes import ChangeRefusedError
+from companion.live.helper_process import Relay
+from companion.live.page.guard import Guard
+from companion.live.page.store import Store
+
+_BY = "the live page"
+_FILE = "changed.yaml"
+_WRONG = 1.0
+"""A wrong token is answered after this long, s."""
+
+
+class Panel:
+    """One tab's inputs and buttons; each tab is unlocked for itself.
+
+    Args:
+        relay: to the flight.
+        store: knows the values now.
+        guard: knows the token.
+        unlocked: whether the tab was opened with the token.
+    """
+
+    def __init__(self, relay: Relay, store: Store, guard: Guard, *, unlocked: bool) -> None:
+        self._relay, self._store, self._guard = relay, store, guard
+        self._unlocked = unlocked
+        self._inputs: dict[tuple[str, str], ui.input] = {}
+        self._shown: dict[tuple[str, str], str] = {}
+        with ui.expansion("Change values in flight").classes("live-wide").props("id=live-panel"):
+            self._lock()
+            with ui.element("div").classes("live-values"):
+                for key in store.values():
+                    name = key.section, key.name
+                    self._shown[name] = shown(key.value)
+                    self._inputs[name] = ui.input(
+                        f"{key.section}.{key.name}", value=self._shown[name]
+                    ).props(f'dense suffix="{key.unit}" hint="{_range(key.allowed)}"')
+            with ui.row():
+                ui.button("Apply", on_click=self._apply).props("id=live-apply")
+                self._undo = ui.button("Undo", on_click=self._undo_last).props("id=live-undo")
+                ui.button("Save as YAML", on_click=self._save).props("id=live-save outline")
+            self._said = ui.label().props("id=live-said role=status")
+        ui.timer(0.5, self._follow)
+
+    def _lock(self) -> None:
+        with ui.row().bind_visibility_from(self, "_unlocked", value=False):
+            token = ui.input("token, as shown at the start").props("dense")
+
+            async def unlock() -> None:
+                if self._guard.knows(str(token.value or "").strip()):
+                    self._unlocked = True
+                    self._say("values can be changed in this tab now")
+                else:
+                    await asyncio.sleep(_WRONG)
+                    self._say("this is not the token; the program showed it when it started")
+
+            ui.button("Unlock", on_click=unlock).props("id=live-unlock")
+
+    async def _apply(self) -> None:
+        values: dict[str, dict[str, Any]] = {}
+        for (section, key), field in self._inputs.items():
+            text = str(field.value or "").strip()
+            if text != self._shown[section, key]:
+                values.setdefault(section, {})[key] = _typed(text)
+        if not values:
+            self._say("no value differs from what is flown")
+            return
+        await self._ask(self._relay.change(values, _BY))
+
+    async def _undo_last(self) -> None:
+        await self._ask(self._relay.ask({"kind": "undo", "by": _BY}))
+
+    async def _ask(self, request: Any) -> None:
+        if not self._unlocked:
+            request.close()
+            self._say("refused: give the token first")
+            return
+        try:
+            self._say(await request)
+        except (ConfigError, ChangeRefusedError) as refused:
+            self._say(f"refused: {refused}")
+
+    async def _save(self) -> None:
+        """Give the changed values to the browser, and write them into the flight's folder."""
+        text = self._store.changed_yaml()
+        ui.download.content(text, _FILE)
+        folder = self._relay.first["folder"]
+        if folder is None or not self._unlocked:
+            self._say("saved where the browser saves files")
+            return
+        path = Path(folder, _FILE)
+        try:
+            await asyncio.to_thread(write_whole, path, text)
+        except OSError as error:
+            self._say(f"{path} was not written: {error.strerror}")
+        else:
+            self._say(f"saved as {path}")
+
+    def _follow(self) -> None:
+        """Show values that somebody has changed, unless the user is typing another one."""
+        for key in self._store.values():
+            name, value = (key.section, key.name), shown(key.value)
+            field = self._inputs[name]
+            if value != self._shown[name]:
+                if str(field.value or "").strip() == self._shown[name] or field.value is None:
+                    field.value = value
+                self._shown[name] = value
+        self._undo.set_enabled(self._store.can_undo and self._store.over is None)
+
+    def _say(self, text: str) -> None:
+        self._said.set_text(text)
+
+
+def _range(allowed: str) -> str:
+    """The range of a key, without the words that hold for all of them."""
+    return (
+        allowed.replace("changeable in flight within its range", "")
+        .strip(", ")
+        .replace("changeable in flight ", "")
+    )
+
+
+def _typed(text: str) -> Any:
+    """A number, or null where the field is empty; other words stay as they are, to be refused."""
+    if text in ("", "null"):
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,101 @@
+"""A configuration file that somebody edits while it flies."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from companion.config import Config
+from companion.config.files import load
+from companion.config.in_flight import Values, differences
+from companion.files.yaml_file import ConfigError
+
+_LONGEST = 400
+"""Largest length of an explanation, characters."""
+_SETTLED = 3
+"""A file that does not change over this many looks is whole; editors remove it for a moment."""
+
+Signature = tuple[tuple[int, int, int] | None, ...]
+"""Inode, size and time of the file and of those it includes; None: it is not there."""
+
+
+class Edit:
+    """What an edit of the file asks for.
+
+    Attributes:
+        values: the values that it changes.
+        refusal: why it cannot be used, one sentence; None: it can.
+    """
+
+    def __init__(self, values: Values, refusal: str | None = None) -> None:
+        self.values, self.refusal = values, refusal
+
+
+class WatchedFile:
+    """Looks at a file again and again, and tells what an edit changes.
+
+    An edit counts from the last accepted contents on. So a bad edit has no effect, also later.
+
+    Args:
+        path: of the file.
+        check: raises ConfigError if the values cannot be used; called with the name of the file.
+
+    Raises:
+        ConfigError: the file cannot be read now.
+    """
+
+    def __init__(self, path: Path, check: Callable[[Values, str], None]) -> None:
+        self._path, self._check = path, check
+        self._accepted = self._offered = load(path)
+        self._seen = self._judged = self._signature()
+        self._looks = 0
+
+    def look(self) -> Edit | None:
+        """What a new edit asks for; None: there is none, or the file is being written."""
+        signature = self._signature()
+        if signature != self._seen:
+            self._seen, self._looks = signature, 0
+        self._looks += 1
+        if self._looks < _SETTLED or signature == self._judged:
+            return None
+        self._judged = signature
+        return self._edit()
+
+    def accept(self) -> None:
+        """The newest edit is applied: later edits count from it on."""
+        self._accepted = self._offered
+
+    def _edit(self) -> Edit | None:
+        name = self._path.name
+        try:
+            self._offered = load(self._path)
+            values = _values(self._accepted, self._offered)
+            if not values:
+                return None
+            self._check(values, name)
+        except ConfigError as error:
+            text = " ".join(str(error).split())
+            text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+            return Edit({}, f"{name} is not applied, and nothing has changed: {text}")
+        return Edit(values)
+
+    def _signature(self) -> Signature:
+        included = self._accepted.include
+        names = (included,) if isinstance(included, str) else included
+        return tuple(map(_stamp, (self._path, *(self._path.parent / name for name in names))))
+
+
+def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
+    """The values that differ, by section and key; how a file includes others does not count."""
+    values: dict[str, dict[str, Any]] = {}
+    for each in differences(before, after):
+        if each.section != "include":
+            values.setdefault(each.section, {})[each.key] = each.after
+    return values
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    try:
+        stat = path.stat()
+    except (OSError, ValueError):
+        return None
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns

@@ -1,0 +1,188 @@
+"""What to expect of a configuration: margins, tracking error, rates and settling."""
+
+from dataclasses import dataclass
+from math import hypot, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config import Config
+from companion.tuning.feedback import Complex
+from companion.tuning.loop import EXACT, Loop, ModelError, control_loop
+from companion.tuning.margins import Margins, frequencies, margins, smaller
+
+Floats = NDArray[np.float64]
+
+_SETTLED = 0.05
+"""The response to a gust has settled below this share of its peak."""
+_LONGEST = 10.0
+_STEP = 0.01
+"""Duration and step of the response to a gust, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbances:
+    """What disturbs the vehicle, on each horizontal axis; the densities are one-sided.
+
+    Attributes:
+        gust: standard deviation of the wind's speed, m/s; drag makes an acceleration of it.
+        gust_time: correlation time of the gusts, s.
+        velocity_error: slow error of the estimated velocity on a path, m/s, standard deviation.
+        push: slow error of the predicted acceleration on a path, m/s², standard deviation.
+        path_time: correlation time of these two, s.
+        wander: density of the velocity error in hover, m/s/√Hz.
+        shake: density of the acceleration that tilt and drag do not explain, m/s²/√Hz.
+        position_noise: noise of a single position, m.
+        velocity_noise: noise of a single velocity, m/s.
+        source: from where the last four are known, for the user.
+    """
+
+    gust: float = 0.5
+    gust_time: float = 2.0
+    velocity_error: float = 0.03
+    push: float = 0.1
+    path_time: float = 1.0
+    wander: float = 0.01
+    shake: float = 0.02
+    position_noise: float = 0.003
+    velocity_noise: float = 0.005
+    source: str = "usual ones of PX4 and ArduPilot"
+
+
+class Errors(NamedTuple):
+    """Expected standard deviations, horizontal.
+
+    Attributes:
+        gusts: position error by gusts, m.
+        path: position error on a path at 5 m/s, m.
+        noise: position error by the noise of the estimate, m.
+        rate: roll and pitch rate commanded because of all of them, rad/s.
+    """
+
+    gusts: float
+    path: float
+    noise: float
+    rate: float
+
+    @property
+    def position(self) -> float:
+        """Position error by all of them, m."""
+        return hypot(self.gusts, self.path, self.noise)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """What to expect of a configuration.
+
+    Attributes:
+        whole: margins of the whole loop, opened at the commanded body rate.
+        outer: margins opened at the commanded acceleration.
+        errors: tracking error and rate use.
+        peak: largest position error after a gust that changes the velocity by 1 m/s at once, m.
+        settling: time until this error stays below a twentieth of its peak, s.
+    """
+
+    whole: Margins
+    outer: Margins
+    errors: Errors
+    peak: float
+    settling: float
+
+    @property
+    def margins(self) -> Margins:
+        """The smaller margins of both openings."""
+        return smaller(self.whole, self.outer)
+
+
+def stability(config: Config, error: ModelError = EXACT) -> Margins:
+    """The smaller margins of both openings of the loop.
+
+    Raises:
+        ConfigError: as `control_loop`.
+    """
+    s = frequencies()
+    loop = control_loop(config, s, error)
+    return smaller(margins(s, loop.whole), margins(s, loop.outer))
+
+
+def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Errors:
+    """The expected errors of a loop.
+
+    Args:
+        loop: at `frequencies`.
+        disturbances: what disturbs.
+        period: time between two positions, s.
+    """
+    omega, told = loop.s.imag, disturbances
+    push, speed = loop.by_acceleration(), loop.by_velocity_error()
+    place = loop.by_position_error()
+    gusts = ((push, _slow(omega, told.gust * loop.drag, told.gust_time)),)
+    path = (
+        (speed, _slow(omega, told.velocity_error, told.path_time)),
+        (push, _slow(omega, told.push, told.path_time)),
+    )
+    noise = (
+        (speed, told.wander**2 + 2.0 * period * told.velocity_noise**2),
+        (push, told.shake**2),
+        (place, 2.0 * period * told.position_noise**2),
+    )
+    parts = (gusts, path, noise)
+    # Both axes are disturbed independently, therefore the factor 2.
+    by_gusts, on_path, by_noise = (
+        sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in part))
+        for part in parts
+    )
+    turned = sum(2.0 * _variance(omega, r[1], density) for part in parts for r, density in part)
+    return Errors(by_gusts, on_path, by_noise, sqrt(turned))
+
+
+def _slow(omega: Floats, deviation: float, time: float) -> Floats:
+    """One-sided density per Hz of first-order noise of this standard deviation."""
+    density: Floats = 4.0 * deviation**2 * time / (1.0 + (omega * time) ** 2)
+    return density
+
+
+def expectation(config: Config, disturbances: Disturbances) -> Expectation:
+    """What to expect of a configuration.
+
+    Raises:
+        ConfigError: as `control_loop`.
+    """
+    s = frequencies()
+    loop = control_loop(config, s)
+    peak, settling = _after_gust(config)
+    return Expectation(
+        margins(s, loop.whole),
+        margins(s, loop.outer),
+        expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz),
+        peak,
+        settling,
+    )
+
+
+def _variance(omega: Floats, response: Complex, density: Floats | float) -> float:
+    """Variance of a response to noise of a one-sided density per Hz."""
+    return float(np.trapezoid(np.abs(response) ** 2 * density, omega) / (2.0 * pi))
+
+
+def _after_gust(config: Config) -> tuple[float, float]:
+    """Peak (m) and settling time (s) of the position after an impulse of 1 m/s."""
+    offset = 0.1  # 1/s; the frequencies are shifted by it, as for `frequencies`
+    omega = np.arange(0.0, 60.0, 0.05)
+    s = np.asarray(offset + 1j * omega, dtype=np.complex128)
+    place, _ = control_loop(config, s).by_acceleration()
+    time = np.arange(0.0, _LONGEST, _STEP)
+    terms = np.real(np.exp(1j * np.outer(time, omega)) @ (place * _trapezoid(omega)))
+    response = np.abs(np.exp(offset * time) * terms / pi)
+    peak = float(response.max())
+    beyond = np.flatnonzero(response > _SETTLED * peak)
+    return peak, float(time[beyond[-1]]) + _STEP
+
+
+def _trapezoid(omega: Floats) -> Floats:
+    """Weights of the trapezoidal rule at equally spaced points."""
+    weights = np.full_like(omega, omega[1] - omega[0])
+    weights[0] *= 0.5
+    weights[-1] *= 0.5
+    return weights

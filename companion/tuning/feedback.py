@@ -1,0 +1,111 @@
+"""Frequency response of guidance: motion observer, prediction and feedback gains on one axis."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.guidance import GRAVITY
+from companion.guidance.linear import LinearSettings
+from companion.guidance.motion_observer import ObserverSettings
+
+Complex = NDArray[np.complex128]
+
+
+class Feedback(NamedTuple):
+    """Responses of the commanded coefficient to what is measured, up to the sign.
+
+    The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
+
+    Attributes:
+        tilt: (n,), per coefficient.
+        velocity: (n,), per m/s.
+        position: (n,), per m.
+    """
+
+    tilt: Complex
+    velocity: Complex
+    position: Complex
+
+
+def hold_element(s: Complex, period: float) -> Complex:
+    """Response (n,) of a value that is held for `period` seconds, at the frequencies `s`, rad/s."""
+    held: Complex = (1.0 - np.exp(-s * period)) / (s * period)
+    return held
+
+
+def guidance_feedback(
+    s: Complex,
+    guidance: LinearSettings,
+    observer: ObserverSettings,
+    drag: float,
+    position_period: float,
+) -> Feedback:
+    """The feedback of `LinearGuidance` with the states of `MotionObserver`.
+
+    Both are linear while no limit is reached. A position is used from 0 to one period after it was
+    measured, on average half a period; the prediction covers this time.
+
+    Args:
+        s: (n,), frequencies, rad/s, none of them 0.
+        guidance: gains, response of the tilt and period of guidance.
+        observer: settings of the motion observer.
+        drag: linear drag that the program assumes, 1/s.
+        position_period: time between two positions, s.
+    """
+    by_acceleration, by_position, by_velocity = _states(s, observer, position_period)
+    age = 0.5 * position_period
+    late = np.exp(-s * age)[:, None]
+    ahead = guidance.tilt.dead_time + 0.5 * guidance.period
+    # The known acceleration is g·c − drag·v; between two positions its newest value is used.
+    sources = (
+        (GRAVITY * by_acceleration, GRAVITY),
+        (by_velocity - drag * by_acceleration, -drag),
+        (by_position, 0.0),
+    )
+    terms = []
+    for states, known in sources:
+        place, speed, disturbance = (late * states).T
+        speed_now = speed + age * (disturbance + known)
+        speed_then = speed + (age + ahead) * (disturbance + known)
+        span = age + ahead
+        place_then = place + span * speed + 0.5 * span * span * (disturbance + known)
+        pull = max(known, 0.0)  # the measured velocity enters by the observed one
+        acceleration = pull - drag * speed_now + disturbance
+        gains = guidance.gains
+        wanted = (
+            gains.position * place_then
+            + gains.velocity * speed_then
+            + gains.acceleration * acceleration
+            + disturbance
+        )
+        terms.append(wanted / GRAVITY)
+    return Feedback(*terms)
+
+
+def _states(
+    s: Complex, observer: ObserverSettings, period: float
+) -> tuple[Complex, Complex, Complex]:
+    """Responses (n, 3) of observed position, velocity and disturbance.
+
+    To the known acceleration, the measured position and the measured velocity, from
+    z·x = (I − K·C)·(A·x + B·a) + K·y.
+    """
+    gains = observer.gains(period, smoothness=1.0)  # as an autopilot's estimate
+    pull = observer.position_pull
+    a = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
+    b = np.array([0.5 * period**2, period, 0.0])
+    c = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    k = np.array(
+        [
+            [gains.position, 0.0],
+            [gains.velocity * pull, gains.velocity],
+            [gains.disturbance * pull, gains.disturbance],
+        ]
+    )
+    kept = np.eye(3) - k @ c
+    z = np.exp(s * period)
+    advanced = np.linalg.inv(z[:, None, None] * np.eye(3) - kept @ a) * z[:, None, None]
+    by_acceleration = (advanced @ (kept @ b)) * hold_element(s, period)[:, None]
+    by_measured = advanced @ k
+    return by_acceleration, by_measured[:, :, 0], by_measured[:, :, 1]

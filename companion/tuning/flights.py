@@ -1,0 +1,182 @@
+"""Flies a configuration on the mock vehicle, in this process, and measures how it tracks."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import hypot, nan
+from typing import Any
+
+import numpy as np
+
+from companion.config import Config
+from companion.config.files import changed, load, shipped
+from companion.testing import MockVehicle, fly
+
+GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
+"""Wind of the flights in gusts, m/s: mean and standard deviation."""
+_MAX_TILT, _MAX_TILT_RATE, _MAX_THRUST = 54.0, 135.0, 0.95
+"""Limits that the figure-eight needs at least, °, °/s and normalised thrust."""
+_FENCE = 50.0
+_WIRE_S = 0.0005
+_TRUTH_EVERY = 5
+"""Steps of the mock vehicle between two true positions."""
+_QUICK = {
+    "px4": {"MPC_TKO_RAMP_T": 0.3, "MPC_TKO_SPEED": 3.0, "MPC_LAND_SPEED": 3.0},
+    "ardupilot": {"LAND_SPEED": 150.0},
+}
+"""Parameters that shorten take-off and landing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What is flown.
+
+    Attributes:
+        name: for the user.
+        trajectory: file in `configs/trajectories`.
+        wind: section `wind` of the mock vehicle.
+    """
+
+    name: str
+    trajectory: str
+    wind: Mapping[str, float]
+
+
+CIRCLE = Course("circle at 5 m/s", "circle5.yaml", {})
+EIGHT = Course("figure-eight at 5 m/s", "figure8.yaml", {})
+CIRCLE_IN_GUSTS = Course("circle in gusts", "circle5.yaml", GUSTS)
+EIGHT_IN_GUSTS = Course("figure-eight in gusts", "figure8.yaml", GUSTS)
+COURSES = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """How a course was tracked; NaN if the flight failed.
+
+    Attributes:
+        result: "ok", or why the flight ended.
+        reported: horizontal distance of the estimated position from the reference, m, RMS.
+        true: the same of the true position.
+        estimate: distance between true and estimated position, m, RMS: no setting reduces it.
+        rate: commanded roll and pitch rate, rad/s, RMS.
+        rate_limited: share of the setpoints at the rate limit.
+    """
+
+    result: str
+    reported: float = nan
+    true: float = nan
+    estimate: float = nan
+    rate: float = nan
+    rate_limited: float = nan
+
+    @property
+    def ok(self) -> bool:
+        """Whether the course was flown to its end."""
+        return self.result == "ok"
+
+
+def autopilot_like(config: Config) -> str:
+    """The personality of the mock vehicle that is nearest: ArduPilot limits the slew."""
+    slews = [axis.acceleration_limit for axis in config.vehicle.axes.values()]
+    return "px4" if slews[0] is None else "ardupilot"
+
+
+def flown(config: Config, course: Course, autopilot: str, seed: int = 3) -> Flown:
+    """Fly a course on the mock vehicle, with this configuration's gains and vehicle times.
+
+    Link, thrust, take-off and limits are those of the mock vehicle and the course.
+
+    Args:
+        config: the configuration.
+        course: what is flown.
+        autopilot: personality of the mock vehicle: "px4" or "ardupilot".
+        seed: of the noise and the gusts.
+
+    Raises:
+        ConfigError: the configuration cannot be flown on the mock vehicle.
+    """
+    mock = load(shipped(f"mock-{autopilot}.yaml"))
+    parameters = (mock.mock or {}).get("parameters", {})
+    vehicle = MockVehicle(
+        autopilot,
+        lockstep=False,
+        delay_s=_WIRE_S,
+        prearm_delay_s=0.2,
+        seed=seed,
+        wind=dict(course.wind),
+        parameters={**parameters, **_QUICK[autopilot]},
+    )
+    told = _configured(config, course, mock)
+    with _truth(vehicle) as rows:
+        summary = fly(told, vehicle)
+    if summary.result != "ok":
+        return Flown(summary.result)
+    tracking, truth = summary.trace.tracking_rows(), np.array(rows)
+    time, reference = tracking[:, 0], tracking[:, 1:3]
+    speed = np.hypot(*np.gradient(reference, time, axis=0).T)
+    moving = np.flatnonzero(speed > 0.05)
+    part = slice(moving[0], moving[-1] + 1)
+    true = np.column_stack([np.interp(time, truth[:, 0], each) for each in truth[:, 1:].T])
+    during = [
+        hypot(*each.rates[:2])
+        for each in vehicle.setpoints
+        if time[moving[0]] <= each.time <= time[moving[-1]]
+    ]
+    rates, limit = np.array(during), told.limits.max_tilt_rate
+    return Flown(
+        "ok",
+        _rms(tracking[part, 4:6] - reference[part]),
+        _rms(true[part] - reference[part]),
+        _rms(true[part] - tracking[part, 4:6]),
+        float(np.sqrt(np.mean(rates**2))),
+        float(np.mean(rates > 0.99 * limit)),
+    )
+
+
+def _rms(offsets: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
+
+
+@contextmanager
+def _truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
+    """Rows of time and true position north and east, filled while the vehicle flies."""
+    rows: list[tuple[float, float, float]] = []
+    steps = 0
+
+    def note() -> None:
+        nonlocal steps
+        steps += 1
+        if steps % _TRUTH_EVERY == 0:
+            north, east, _ = vehicle.state()["position"]
+            rows.append((vehicle.time, north, east))
+
+    vehicle.after_step.append(note)
+    yield rows
+    vehicle.after_step.remove(note)
+
+
+def _configured(config: Config, course: Course, mock: Config) -> Config:
+    """The configuration for a flight of the mock vehicle."""
+    limits = config.limits
+    return changed(
+        config,
+        {
+            "link": {"signing_key_file": None},
+            "thrust": mock.thrust.model_dump(),
+            "limits": {
+                "max_tilt_deg": max(limits.max_tilt_deg, _MAX_TILT),
+                "max_tilt_rate_deg_s": max(limits.max_tilt_rate_deg_s, _MAX_TILT_RATE),
+                "max_thrust": _MAX_THRUST,
+                "fence_radius_m": _FENCE,
+                "fence_ceiling_m": _FENCE,
+                "fence_floor_m": 1.0,
+            },
+            "flight": {
+                "arm": True,
+                "maneuvers": ("trajectory",),
+                "trajectory": shipped(f"trajectories/{course.trajectory}"),
+                "takeoff_height_m": 5.0,
+            },
+        },
+        "the flight on the mock vehicle",
+    )

@@ -1,0 +1,164 @@
+"""The whole control loop on one horizontal axis as a linear model, built from the configuration.
+
+Planner, rate loop, tilt, motion and guidance, as they are near hover and while no limit is reached.
+`tests/tuning/test_loop.py` compares it with the program's own code.
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from companion.attitude import PLANNER_NAMES
+from companion.attitude.planner import MODEL_FOLLOWING
+from companion.attitude.rate_response import AxisResponse, feedback_gain
+from companion.attitude.reference_model import braking_lead, model_lag
+from companion.config import Config
+from companion.config.guidance import LINEAR
+from companion.config.known_drag import drag_prior
+from companion.control.hold_settings import observer_settings
+from companion.control.inner_loop import slower_tilt
+from companion.control.outer_loop import linear_settings
+from companion.files.yaml_file import ConfigError
+from companion.guidance import GRAVITY
+from companion.tuning.feedback import Complex, guidance_feedback, hold_element
+
+POSITION_LATENESS = 0.010
+"""Delay of the autopilot's position that its time stamp does not show, s."""
+_USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
+"""Rate loop of a heavy vehicle, s, as `hold_settings` assumes it if none is identified."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelError:
+    """How the real rate loop differs from what the configuration says of it.
+
+    Attributes:
+        slower: factor on lag and dead time.
+        delay: additional dead time, s.
+        gain: factor on the body rates.
+    """
+
+    slower: float = 1.0
+    delay: float = 0.0
+    gain: float = 1.0
+
+
+EXACT = ModelError()
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """Frequency responses of the loop, each (n,), and what is needed of its parts.
+
+    Attributes:
+        s: frequencies, rad/s.
+        whole: loop gain, opened at the commanded body rate: all feedback is in it.
+        outer: loop gain, opened at the commanded acceleration: the attitude loop stays closed.
+        rates: coefficient per commanded body rate, s.
+        command: coefficient per coefficient that guidance commands, without feedback.
+        velocity: command of guidance per m/s of measured velocity.
+        position: command of guidance per m of measured position.
+        drag: linear drag, 1/s.
+    """
+
+    s: Complex
+    whole: Complex
+    outer: Complex
+    rates: Complex
+    command: Complex
+    velocity: Complex
+    position: Complex
+    drag: float
+
+    def by_acceleration(self) -> tuple[Complex, Complex]:
+        """Position (m) and commanded body rate (rad/s) per disturbing acceleration, m/s²."""
+        to_velocity = 1.0 / (self.s + self.drag)
+        tilt = self._tilt((self.velocity + self.position / self.s) * to_velocity)
+        return (GRAVITY * tilt + 1.0) * to_velocity / self.s, tilt / self.rates
+
+    def by_position_error(self) -> tuple[Complex, Complex]:
+        """Position (m) and commanded body rate (rad/s) per error of the position, m."""
+        tilt = self._tilt(self.position)
+        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
+
+    def by_velocity_error(self) -> tuple[Complex, Complex]:
+        """Position (m) and commanded body rate (rad/s) per error of the velocity, m/s."""
+        tilt = self._tilt(self.velocity)
+        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
+
+    def _tilt(self, asked: Complex) -> Complex:
+        """Closed-loop coefficient if guidance is disturbed by `asked`."""
+        return -self.command * asked / (1.0 + self.whole)
+
+
+def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
+    """The loop at the frequencies `s`.
+
+    Args:
+        config: gains, weights and the believed vehicle.
+        s: (n,), rad/s, none of them 0.
+        error: how the real rate loop differs.
+
+    Raises:
+        ConfigError: the configured planner or guidance is not one that this model knows.
+    """
+    if config.planner_name not in PLANNER_NAMES or config.guidance.kind != LINEAR:
+        raise ConfigError(
+            f"planner {config.planner_name} with guidance {config.guidance.kind} cannot be "
+            "analysed; set planner.name: auto and guidance.kind: linear"
+        )
+    guidance, drag = linear_settings(config), drag_prior(config).drag.linear
+    forward, back = _planner(config, s)
+    axis, slower = _believed(config), error.slower
+    late = np.exp(-s * (slower * axis.dead_time + error.delay))
+    rates = error.gain * late / (1.0 + slower * s * (axis.lag + slower * s * axis.square)) / s
+    held = hold_element(s, 1.0 / config.link.attitude_rate_hz)
+    measured = guidance_feedback(
+        s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
+    )
+    command = rates * forward * hold_element(s, guidance.period)
+    attitude = rates * held * back
+    unstamped = np.exp(-s * POSITION_LATENESS)
+    velocity, position = measured.velocity * unstamped, measured.position * unstamped
+    to_velocity = GRAVITY / (s + drag)
+    fed_back = command * (measured.tilt + to_velocity * (velocity + position / s))
+    return Loop(
+        s=s,
+        whole=attitude + fed_back,
+        outer=fed_back / (1.0 + attitude),
+        rates=rates,
+        command=command,
+        velocity=velocity,
+        position=position,
+        drag=drag,
+    )
+
+
+def _believed(config: Config) -> AxisResponse:
+    """The slower of roll and pitch, as configured; a usual one if nothing is."""
+    if not config.vehicle.known:
+        return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
+    lag, dead_time = slower_tilt(config)
+    axes = config.vehicle.axes
+    dampings = [axes[name].damping for name in ("roll", "pitch")]
+    return AxisResponse(lag, dead_time, damping=min(d or inf for d in dampings))
+
+
+def _planner(config: Config, s: Complex) -> tuple[Complex, float]:
+    """Body rate per target coefficient, and per measured coefficient (1/s), up to the sign.
+
+    `model-following` sends the rates that compensate the lag of its model of the motion, and feeds
+    back the difference from this model, one dead time later. All other planners feed back p times
+    the error.
+    """
+    gain = config.planner.gain_per_s
+    if config.planner_name != MODEL_FOLLOWING:
+        return np.full_like(s, gain), gain
+    axis = _believed(config)
+    back, slowest = feedback_gain(gain, axis), model_lag(gain, axis.lag)
+    braking = 1.0 + gain * braking_lead(gain, slowest)
+    model = gain / (s * (braking + s * (slowest + s * axis.square)) + gain)
+    led = s * (1.0 + s * (axis.lag + s * axis.square))
+    forward = (led + back * np.exp(-s * axis.dead_time)) * model
+    return forward, back

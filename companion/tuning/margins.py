@@ -1,0 +1,85 @@
+"""Stability margins of a loop from its frequency response (Nyquist)."""
+
+from math import degrees, inf, log10
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.tuning.feedback import Complex
+
+_OFFSET = 1e-2
+"""Real part of the frequencies, 1/s: the integrators of the loop lie to the left of them."""
+_UP_TO = 150.0
+"""Highest frequency, rad/s: that of guidance's sampling is half as high again."""
+_POINTS = 120
+
+
+def frequencies() -> Complex:
+    """Frequencies (n,) for margins and errors, rad/s, from 0 upwards, densest around 10 rad/s."""
+    low = np.geomspace(1e-3, 0.05, 12)[:-1]
+    high = np.geomspace(0.05, _UP_TO, _POINTS)
+    s: Complex = _OFFSET + 1j * np.concatenate([[0.0], low, high])
+    return s
+
+
+class Margins(NamedTuple):
+    """Margins of one loop.
+
+    Attributes:
+        gain_db: by how much the gain may rise, or fall if that is less, dB.
+        phase_deg: by how much the phase may fall, degrees.
+        delay: dead time that may be added, s.
+        stable: whether the closed loop is stable; the other values mean nothing if not.
+    """
+
+    gain_db: float
+    phase_deg: float
+    delay: float
+    stable: bool
+
+    def sentence(self) -> str:
+        """For the user."""
+        if not self.stable:
+            return "unstable"
+        delay = 1e3 * self.delay
+        return f"{self.gain_db:.1f} dB, {self.phase_deg:.0f}°, {delay:.0f} ms of added delay"
+
+
+def margins(s: Complex, loop_gain: Complex) -> Margins:
+    """The margins of a loop that is stable when it is opened.
+
+    The closed loop is stable if 1 + L does not encircle 0. L is real at the first frequency.
+
+    Args:
+        s: as `frequencies`.
+        loop_gain: (n,), loop gain L at `s`.
+    """
+    omega, size = s.imag, np.abs(loop_gain)
+    phase = np.unwrap(np.angle(loop_gain))
+    difference = np.unwrap(np.angle(1.0 + loop_gain))
+    stable = abs(difference[-1] - difference[0]) < 1.0 and loop_gain[0].real > -1.0
+    gain_db, phase_margin, delay = inf, inf, inf
+    turns = (phase + np.pi) / (2.0 * np.pi)
+    for k in np.flatnonzero(np.floor(turns[1:]) != np.floor(turns[:-1])):
+        whole = max(np.floor(turns[k]), np.floor(turns[k + 1]))
+        share = (whole - turns[k]) / (turns[k + 1] - turns[k])
+        there = (1.0 - share) * log10(size[k]) + share * log10(size[k + 1])
+        gain_db = min(gain_db, abs(20.0 * there))
+    for k in np.flatnonzero((size[1:] > 1.0) != (size[:-1] > 1.0)):
+        share = log10(size[k]) / log10(size[k] / size[k + 1])
+        crossed = phase[k] + share * (phase[k + 1] - phase[k])
+        frequency = omega[k] + share * (omega[k + 1] - omega[k])
+        left = (crossed + np.pi) % (2.0 * np.pi)
+        delay = min(delay, left / frequency)
+        phase_margin = min(phase_margin, left, 2.0 * np.pi - left)
+    return Margins(gain_db, degrees(phase_margin), delay, bool(stable))
+
+
+def smaller(one: Margins, other: Margins) -> Margins:
+    """The smaller of each margin of two loops."""
+    return Margins(
+        min(one.gain_db, other.gain_db),
+        min(one.phase_deg, other.phase_deg),
+        min(one.delay, other.delay),
+        one.stable and other.stable,
+    )

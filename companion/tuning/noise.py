@@ -1,0 +1,127 @@
+"""What disturbed a recorded flight: errors of the estimate and gusts, from its telemetry."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.attitude.kinematics import tilt_products
+from companion.guidance import GRAVITY
+from companion.mavlink.tlog_file import messages
+from companion.tuning.expectation import Disturbances
+from companion.vehicle.registry import AUTOPILOTS
+
+Floats = NDArray[np.float64]
+
+_BAND = 0.15, 1.5
+"""Frequencies at which the hold answers disturbances, Hz."""
+_WHITE = 0.6
+"""Share of half the telemetry rate above which only the noise of single messages is left."""
+_SEGMENT = 8.0
+"""Duration of one piece of the record whose spectrum is computed, s."""
+_LEAST_HEIGHT = 1.0
+"""Samples closer to the ground than this are left out, m."""
+_AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
+
+
+def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Disturbances:
+    """The disturbances in a `.tlog`, in the air.
+
+    The velocity explains most of the change of the position: the rest is `wander`. Tilt and drag
+    explain most of the change of the velocity: the rest is `shake`, gusts included.
+
+    Args:
+        log: a `.tlog` of this or another program.
+        drag: linear drag of the vehicle, 1/s.
+        usual: its gusts are kept, and all of it if the flight is too short.
+
+    Raises:
+        LogError: the file cannot be read or is not a `.tlog`.
+    """
+    motion, slopes = _telemetry(log)
+    if len(motion) < 2 or len(slopes) < 2:
+        return usual
+    time, place, speed = motion[:, 0], motion[:, 1:3], motion[:, 3:5]
+    step = np.diff(time)[:, None]
+    mean_slope = np.diff(_integral(time, slopes), axis=0) / step
+    mean_speed = 0.5 * (speed[1:] + speed[:-1])
+    unexplained_speed = np.diff(place, axis=0) / step - mean_speed
+    pushed = np.diff(speed, axis=0) / step - GRAVITY * mean_slope + drag * mean_speed
+    wander, place_noise = _densities(time[1:], unexplained_speed)
+    shake, speed_noise = _densities(time[1:], pushed)
+    if not np.isfinite([wander, shake]).all():
+        return usual
+    return replace(
+        usual,
+        wander=wander,
+        shake=shake,
+        position_noise=place_noise,
+        velocity_noise=speed_noise,
+        source=log.parent.name or log.name,
+    )
+
+
+def _telemetry(log: Path) -> tuple[Floats, Floats]:
+    """Motion (n, 5): time, north, east, velocities; slopes (m, 3): time, north, east."""
+    vehicle: tuple[int, int] | None = None
+    motion: list[tuple[float, ...]] = []
+    slopes: list[tuple[float, ...]] = []
+    home = None
+    for frame, message in messages(log, {"HEARTBEAT", "LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"}):
+        source, kind = (frame.system, frame.component), message.get_type()
+        if kind == "HEARTBEAT":
+            if vehicle is None and message.autopilot in _AUTOPILOTS:
+                vehicle = source
+            continue
+        if source != vehicle:
+            continue
+        time = 1e-3 * message.time_boot_ms
+        if kind == "ATTITUDE_QUATERNION":
+            square, ax, ay = tilt_products(message.q1, message.q2, message.q3, message.q4)
+            cosine = max(2.0 * square - 1.0, 0.2)
+            slopes.append((time, -2.0 * ay / cosine, 2.0 * ax / cosine))
+            continue
+        home = message.z if home is None else home
+        if home - message.z > _LEAST_HEIGHT and (not motion or time > motion[-1][0]):
+            motion.append((time, message.x, message.y, message.vx, message.vy))
+    return np.array(motion).reshape(-1, 5), np.array(slopes).reshape(-1, 3)
+
+
+def _integral(time: Floats, slopes: Floats) -> Floats:
+    """Integral (n, 2) of the slopes up to each time."""
+    steps = np.diff(slopes[:, 0], prepend=slopes[0, 0])[:, None]
+    sums = np.cumsum(steps * slopes[:, 1:], axis=0)
+    return np.column_stack([np.interp(time, slopes[:, 0], each) for each in sums.T])
+
+
+def _densities(time: Floats, rest: Floats) -> tuple[float, float]:
+    """Density in the band per √Hz, and the noise of one measurement whose difference `rest` is.
+
+    Args:
+        time: (n,), s.
+        rest: (n, 2), north and east.
+    """
+    period = float(np.median(np.diff(time)))
+    length = round(_SEGMENT / period)
+    gaps = np.flatnonzero(np.diff(time) > 3.0 * period)
+    inside, fast = [], []
+    for part in np.split(rest, gaps + 1):
+        for begin in range(0, len(part) - length + 1, max(1, length // 2)):
+            piece = part[begin : begin + length]
+            window = np.hanning(length)[:, None]
+            spectrum = np.abs(np.fft.rfft((piece - piece.mean(axis=0)) * window, axis=0)) ** 2
+            density = 2.0 * period * spectrum / np.sum(window**2)
+            hertz = np.fft.rfftfreq(length, period)
+            inside.append(density[(hertz >= _BAND[0]) & (hertz <= _BAND[1])].mean())
+            upper = hertz >= _WHITE * hertz[-1]
+            # A difference of white noise over a period has this density.
+            gain = (2.0 * np.sin(np.pi * hertz[upper] * period) / period) ** 2
+            fast.append((density[upper].mean(axis=1) / gain).mean())
+    if not inside:
+        return float("nan"), float("nan")
+    white = float(np.median(fast))
+    # The noise of single messages belongs to the measurement, not to the motion.
+    middle = 0.5 * (_BAND[0] + _BAND[1])
+    slow = max(float(np.median(inside)) - white * (2.0 * np.pi * middle) ** 2, 0.0)
+    return float(np.sqrt(slow)), float(np.sqrt(white / (2.0 * period)))

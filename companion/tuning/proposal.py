@@ -1,0 +1,100 @@
+"""Proposes gain, weights and bandwidth for an identified vehicle."""
+
+from dataclasses import dataclass
+
+from companion.config import Config
+from companion.files.yaml_file import ConfigError
+from companion.tuning.expectation import Disturbances, Expectation, expectation, stability
+from companion.tuning.loop import ModelError
+from companion.tuning.margins import Margins
+from companion.tuning.search import Aims, Design, errors_to_bear, searched
+
+_ANALYSED = ("hover",)
+"""Maneuvers of the analysed configuration: `identify` is flown with low gains of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A proposed configuration, and what it changes.
+
+    Attributes:
+        untuned: the configuration before.
+        tuned: the configuration with the proposal.
+        design: the proposed values.
+        before: what to expect of `untuned`.
+        after: what to expect of `tuned`.
+        with_errors: margins of `tuned` if the vehicle's times differ from the identified ones.
+        disturbances: what disturbs the vehicle.
+        aims: what the proposal keeps.
+    """
+
+    untuned: Config
+    tuned: Config
+    design: Design
+    before: Expectation
+    after: Expectation
+    with_errors: tuple[tuple[ModelError, Margins], ...]
+    disturbances: Disturbances
+    aims: Aims
+
+    @property
+    def changes(self) -> dict[str, dict[str, float]]:
+        """The proposed keys by section, as `companion.config.files.changed` takes them.
+
+        A known drag is among them: the feedforward needs it, and the analysis counted on it.
+        """
+        design, drag = self.design, self.tuned.guidance.drag
+        known = {}
+        if drag is not None:
+            known = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
+        return {
+            "planner": {"gain_per_s": design.gain},
+            "guidance": {
+                "position_weight_per_s4": design.position,
+                "velocity_weight_per_s2": design.velocity,
+                "disturbance_bandwidth_rad_s": design.bandwidth,
+                **known,
+            },
+        }
+
+
+def propose(
+    config: Config,
+    disturbances: Disturbances | None = None,
+    aims: Aims | None = None,
+) -> Proposal:
+    """Propose values with the smallest expected position error within the stability margins.
+
+    Args:
+        config: the configuration to tune; `vehicle` must be identified.
+        disturbances: what disturbs the vehicle; None: the usual ones.
+        aims: margins to keep; None: the default ones.
+
+    Raises:
+        ConfigError: lag and dead time are not known, the planner or guidance is not one of ours, or
+            no values keep the margins.
+    """
+    if not config.vehicle.known:
+        raise ConfigError(
+            "vehicle.lag_ms and vehicle.dead_time_ms are not known; run `companion identify`, and "
+            "tune with the file that it writes"
+        )
+    disturbances, aims = disturbances or Disturbances(), aims or Aims()
+    flight = config.flight.model_copy(update={"maneuvers": _ANALYSED})
+    untuned = config.model_copy(update={"flight": flight})
+    before = expectation(untuned, disturbances)
+    design = searched(untuned, disturbances, aims)
+    tuned = design.applied(untuned)
+    after = expectation(tuned, disturbances)
+    found = after.margins
+    # The values are rounded after the search, which costs up to a twentieth of a margin.
+    if (
+        not found.stable
+        or min(found.gain_db / aims.gain_db, found.phase_deg / aims.phase_deg) < 0.95
+    ):
+        raise ConfigError(
+            f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
+            "vehicle; look at its lag and dead time"
+        )
+    errors = tuple((error, stability(tuned, error)) for error in errors_to_bear(tuned, aims))
+    return Proposal(untuned, tuned, design, before, after, errors, disturbances, aims)

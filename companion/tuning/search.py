@@ -1,0 +1,195 @@
+"""Searches gain, weights and bandwidth with the smallest expected error within the margins."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import exp, inf, log
+from typing import NamedTuple
+
+from companion.config import Config
+from companion.control.expected_response import LARGEST_PRODUCT
+from companion.control.hold_settings import attitude_delay
+from companion.control.inner_loop import slower_tilt
+from companion.tuning.expectation import Disturbances, expected_errors
+from companion.tuning.loop import ModelError, control_loop
+from companion.tuning.margins import Margins, frequencies, margins, smaller
+
+_FIRST_STEP, _LAST_STEP = 0.4, 0.08
+"""First and last step of the search, in natural logarithms of the values."""
+_PENALTY = 30.0
+"""Cost per unit of a violated aim, in natural logarithms of the error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Aims:
+    """What a proposal must keep.
+
+    Attributes:
+        gain_db: smallest gain margin, dB.
+        phase_deg: smallest phase margin, degrees.
+        slower: factor by which lag and dead time may be larger than believed, or smaller.
+        slower_gain_db: gain margin that remains then, dB.
+        slower_phase_deg: phase margin that remains then, degrees.
+        rate_share: largest share of the rate limit that three standard deviations of the commanded
+            roll and pitch rates may take.
+    """
+
+    gain_db: float = 7.0
+    phase_deg: float = 31.0
+    slower: float = 1.3
+    slower_gain_db: float = 3.0
+    slower_phase_deg: float = 15.0
+    rate_share: float = 1.0
+
+
+class Design(NamedTuple):
+    """The values that are searched.
+
+    Attributes:
+        gain: p, 1/s.
+        position: weight of the position, 1/s⁴.
+        velocity: weight of the velocity, 1/s².
+        bandwidth: of the motion observer, rad/s.
+    """
+
+    gain: float
+    position: float
+    velocity: float
+    bandwidth: float
+
+    def applied(self, config: Config) -> Config:
+        """The configuration with these values."""
+        planner = config.planner.model_copy(update={"gain_per_s": self.gain})
+        weights = {
+            "position_weight_per_s4": self.position,
+            "velocity_weight_per_s2": self.velocity,
+            "disturbance_bandwidth_rad_s": self.bandwidth,
+        }
+        guidance = config.guidance.model_copy(update=weights)
+        return config.model_copy(update={"planner": planner, "guidance": guidance})
+
+    def rounded(self) -> "Design":
+        """Three digits, as they are written."""
+        return Design(*(float(f"{value:.3g}") for value in self))
+
+
+_LARGEST = Design(20.0, 10000.0, 10000.0, 14.0)
+_SMALLEST = Design(1.0, 0.01, 0.01, 0.3)
+"""Bounds that the configuration allows, and below."""
+
+
+def slewing_delay(config: Config) -> float:
+    """Additional delay of the rate loop while it slews to the largest roll-pitch rate, s.
+
+    It is half the time for which the rate loop slews, as in `hold_settings.hold_weights`.
+    """
+    axes = config.vehicle.axes
+    slews = [axes[name].acceleration_limit for name in ("roll", "pitch")]
+    known = [slew for slew in slews if slew is not None]
+    return 0.5 * config.limits.max_tilt_rate / min(known) if known else 0.0
+
+
+def largest_gain(config: Config) -> float:
+    """The quickest sensible planner gain, as `companion check-config` states it, 1/s."""
+    delay = sum(slower_tilt(config))
+    return min(_LARGEST.gain, LARGEST_PRODUCT / delay) if delay > 0.0 else _LARGEST.gain
+
+
+def searched(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
+    """The design with the smallest expected error that keeps the aims, by a pattern search.
+
+    Args:
+        config: a configuration with an identified vehicle.
+        disturbances: what disturbs the hold.
+        aims: what to keep.
+
+    Raises:
+        ConfigError: as `control_loop`.
+    """
+    found = [_improved(config, start, disturbances, aims) for start in _starts(config)]
+    return min(found)[1].rounded()
+
+
+def _improved(
+    config: Config, start: Design, disturbances: Disturbances, aims: Aims
+) -> tuple[float, Design]:
+    """The best design near `start`, and its cost."""
+    best, step = start, _FIRST_STEP
+    cost = _cost(config, best, disturbances, aims)
+    while step >= _LAST_STEP:
+        for design in _neighbours(best, step, largest_gain(config)):
+            other = _cost(config, design, disturbances, aims, cost)
+            if other < cost:
+                best, cost = design, other
+                break
+        else:
+            step *= 0.5
+    return cost, best
+
+
+def _starts(config: Config) -> Iterator[Design]:
+    """Designs like those of the program's rule (`hold_settings.hold_weights`), but calmer.
+
+    The pattern search finds only the nearest minimum, therefore it has three starts.
+    """
+    for share, position, velocity, bandwidth in (
+        (1.0, 1.0, 0.5, 2.0),
+        (1.0, 0.9, 0.1, 2.7),
+        (0.8, 1.4, 0.12, 3.5),
+    ):
+        gain = share * largest_gain(config)
+        planner = config.planner.model_copy(update={"gain_per_s": gain})
+        delay = attitude_delay(config.model_copy(update={"planner": planner}))
+        yield Design(gain, position / delay**4, velocity / delay**2, bandwidth / delay)
+
+
+def _neighbours(design: Design, step: float, largest_gain: float) -> Iterator[Design]:
+    """Designs a step away in one value, or in two of them, within the bounds."""
+    up, down = exp(step), exp(-step)
+    scales = [
+        *((1.0,) * k + (factor,) + (1.0,) * (3 - k) for k in range(4) for factor in (up, down)),
+        (1.0, up, 1.0, down), (1.0, down, 1.0, up), (up, down, 1.0, 1.0), (down, up, 1.0, 1.0),
+        (up, 1.0, 1.0, down), (down, 1.0, 1.0, up),
+    ]  # fmt: skip
+    for scale in scales:
+        moved = Design(*(value * by for value, by in zip(design, scale, strict=True)))
+        bounded = Design(*map(max, _SMALLEST, map(min, _LARGEST, moved)))
+        yield bounded._replace(gain=min(bounded.gain, largest_gain))
+
+
+def _cost(
+    config: Config, design: Design, disturbances: Disturbances, aims: Aims, most: float = inf
+) -> float:
+    """Logarithm of the expected error, raised where an aim is missed.
+
+    Above `most` the result is a lower bound of it: the rest need not be computed.
+    """
+    tried = design.applied(config)
+    s = frequencies()
+    loop = control_loop(tried, s)
+    expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
+    exact = smaller(margins(s, loop.whole), margins(s, loop.outer))
+    missed = _missed(exact, aims.gain_db, aims.phase_deg)
+    missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
+    cost = log(expected.position) + _PENALTY * missed
+    for error in errors_to_bear(tried, aims):
+        if cost >= most:
+            break
+        loop = control_loop(tried, s, error)
+        needed = (0.0, 0.0) if error.delay else (aims.slower_gain_db, aims.slower_phase_deg)
+        cost += _PENALTY * _missed(margins(s, loop.whole), *needed)
+    return cost
+
+
+def errors_to_bear(config: Config, aims: Aims) -> list[ModelError]:
+    """The errors of the vehicle's times with which the loop must stay stable."""
+    errors = [ModelError(slower=aims.slower), ModelError(slower=1.0 / aims.slower)]
+    delay = slewing_delay(config)
+    return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
+
+
+def _missed(found: Margins, gain_db: float, phase_deg: float) -> float:
+    """By how much margins are missed, in 6 dB and 30°; an unstable loop misses by its own."""
+    if not found.stable:
+        return 1.0 + found.gain_db / 6.0 + found.phase_deg / 30.0
+    short = max(0.0, gain_db - found.gain_db) / 6.0
+    return short + max(0.0, phase_deg - found.phase_deg) / 30.0

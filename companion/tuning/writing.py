@@ -1,0 +1,120 @@
+"""Writes a proposal as YAML with its reasons, for a configuration to include."""
+
+from collections.abc import Mapping
+from math import degrees
+from pathlib import Path
+
+from companion.control.hold_settings import disturbance_bandwidth, hold_weights
+from companion.files import bounded_yaml
+from companion.tuning.expectation import Expectation
+from companion.tuning.flights import Flown
+from companion.tuning.loop import ModelError
+from companion.tuning.proposal import Proposal
+from companion.tuning.search import largest_gain, slewing_delay
+
+Flights = Mapping[str, tuple[Flown, Flown]]
+"""Flights with the configuration before and with the proposal, by the name of the course."""
+
+
+def proposal_text(proposal: Proposal, vehicle: Path | None, flights: Flights, where: str) -> str:
+    """The file's text: what was analysed, what to expect, and the keys with their reasons.
+
+    Args:
+        proposal: what is proposed.
+        vehicle: vehicle file to include, relative to the file; None: none is included.
+        flights: flights on the mock vehicle; empty if none was flown.
+        where: from what the vehicle is known, for the reader.
+    """
+    lines = [f"# Proposed by `companion tune` for {where}.", "#"]
+    lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
+    if vehicle is not None:
+        lines += ["", f"include: {bounded_yaml.dump_value(str(vehicle))}  # the identified vehicle"]
+    reasons = _reasons(proposal)
+    for section, keys in proposal.changes.items():
+        lines += ["", f"{section}:"]
+        for key, value in keys.items():
+            lines += [f"  # {reasons[key]}", f"  {key}: {value:g}"]
+    return "\n".join(lines) + "\n"
+
+
+def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
+    """What to expect before and after, and what the proposal costs, for the user."""
+    before, after, aims = proposal.before, proposal.after, proposal.aims
+    limit = degrees(proposal.tuned.limits.max_tilt_rate)
+    lines = [
+        "Expected by linear analysis, before -> after:",
+        *_compared(before, after),
+        f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
+        f"{proposal.disturbances.source}",
+        f"aims: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°, and the margins below",
+    ]
+    lines += [
+        f"margin {_error(error)}: {found.sentence()}" for error, found in proposal.with_errors
+    ]
+    used = 3.0 * degrees(after.errors.rate)
+    lines.append(
+        f"cost: these disturbances command up to {used:.0f}°/s (3 standard deviations) of the "
+        f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows, before "
+        f"{3.0 * degrees(before.errors.rate):.0f}°/s"
+    )
+    if flights:
+        lines += ["", "Flown on the mock vehicle, RMS in m, before -> after:"]
+        lines += [_flight_line(name, *pair) for name, pair in flights.items()]
+    return lines
+
+
+def _compared(before: Expectation, after: Expectation) -> list[str]:
+    old, new = before.errors, after.errors
+    return [
+        f"whole loop: {before.whole.sentence()} -> {after.whole.sentence()}",
+        f"outer loop: {before.outer.sentence()} -> {after.outer.sentence()}",
+        f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
+        f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",
+        f"after a gust that adds 1 m/s: {before.peak:.2f} -> {after.peak:.2f} m off, settled after "
+        f"{before.settling:.1f} -> {after.settling:.1f} s",
+    ]
+
+
+def _error(error: ModelError) -> str:
+    if error.delay:
+        return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
+    return f"with lag and dead time {error.slower - 1.0:+.0%}"
+
+
+def _flight_line(name: str, before: Flown, after: Flown) -> str:
+    if not (before.ok and after.ok):
+        return f"{name}: {before.result} -> {after.result}"
+    return (
+        f"{name}: reported {before.reported:.3f} -> {after.reported:.3f}, true "
+        f"{before.true:.3f} -> {after.true:.3f} (estimate off by {after.estimate:.3f}), "
+        f"rates {degrees(before.rate):.0f} -> {degrees(after.rate):.0f} °/s"
+    )
+
+
+def _reasons(proposal: Proposal) -> dict[str, str]:
+    """Why each key has its value."""
+    untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
+    limit, weights = largest_gain(untuned), hold_weights(untuned)
+    capped = design.gain > 0.97 * limit
+    slewing = slewing_delay(tuned)
+    if capped:
+        why = f"the quickest sensible gain, 0.45 / (lag + dead time) = {limit:.2f}"
+    elif slewing:
+        why = (
+            f"below {limit:.1f}, the quickest sensible gain: the rate loop slews for "
+            f"{2e3 * slewing:.0f} ms to limits.max_tilt_rate_deg_s; tune again after a change of it"
+        )
+    else:
+        why = f"below {limit:.2f}, the quickest sensible gain, for the margins"
+    drag = "as configured, or learned in an earlier flight of this vehicle"
+    return {
+        "drag_per_s": drag,
+        "quadratic_drag_per_m": drag,
+        "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {why}",
+        "position_weight_per_s4": f"before {weights.position:.3g}; a stiffer hold tracks better, "
+        "until the margins are used up",
+        "velocity_weight_per_s2": f"before {weights.velocity:.3g}; a larger one brings errors of "
+        "the estimated velocity into the position",
+        "disturbance_bandwidth_rad_s": f"before {disturbance_bandwidth(untuned):.3g}; a quicker "
+        "observer sees gusts sooner and brings more noise into the rates",
+    }

@@ -1,0 +1,75 @@
+"""`companion tune`, as a user calls it; the flights are in `tests/tuning/test_flights.py`."""
+
+import json
+import shutil
+
+import pytest
+import yaml
+
+from companion.cli.main import main
+from companion.config.files import load, shipped
+
+
+def run(capsys, *arguments):
+    code = main(["tune", *(str(argument) for argument in arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, " ".join(captured.err.split())
+
+
+@pytest.fixture
+def vehicle(tmp_path):
+    path = tmp_path / "flight" / "vehicle.yaml"
+    path.parent.mkdir()
+    shutil.copy(shipped("vehicle-px4.yaml"), path)
+    return path
+
+
+def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsys):
+    config = tmp_path / "my.yaml"
+    config.write_text("guidance: {drag_per_s: 1.0}\nplanner: {gain_per_s: 4.0}\n")
+    out = tmp_path / "tuned.yaml"
+    code, told, _ = run(
+        capsys, vehicle, "--config", config, "--output", out, "--no-flights", "--json"
+    )
+    assert code == 0
+    figures = json.loads(told.splitlines()[-1])
+    tuned = load(out)
+    assert tuned.vehicle.lag_ms == 47.0
+    assert tuned.planner.gain_per_s == figures["proposed"]["planner"]["gain_per_s"]
+    assert tuned.guidance.drag_per_s == 1.0
+    assert figures["expected"]["after"]["gain_margin_db"] >= 6.0
+    assert figures["expected"]["after"]["phase_margin_deg"] >= 30.0
+    assert yaml.safe_load(out.read_text())["include"] == "flight/vehicle.yaml"
+    including = tmp_path / "flown.yaml"
+    including.write_text(f"include: {out.name}\n")
+    assert load(including).guidance == tuned.guidance
+    code, _, error = run(capsys, vehicle, "--output", out, "--no-flights")
+    assert code == 2
+    assert "exists; name another with --output" in error
+
+
+def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle, tmp_path, capsys):
+    folder = vehicle.parent
+    (folder / "config.yaml").write_text(
+        "planner: {name: first-order, gain_per_s: 3.0}\nflight: {maneuvers: [identify]}\n"
+    )
+    learned = {"drag_per_s": 0.7, "quadratic_drag_per_m": 0.01, "top_speed_m_s": 5.0}
+    (tmp_path / "learned-1.json").write_text(json.dumps(learned))
+    code, told, _ = run(capsys, folder, "--no-flights")
+    assert code == 0, told
+    text = (folder / "tuned.yaml").read_text()
+    assert "# before 3; the quickest sensible gain" in text
+    assert load(folder / "tuned.yaml").guidance.drag_per_s == 0.7
+
+
+def test_what_cannot_be_tuned_is_said_in_a_sentence(vehicle, tmp_path, capsys):
+    code, _, error = run(capsys, tmp_path / "nowhere.yaml")
+    assert code == 2
+    assert "does not exist; name the file or the flight folder" in error
+    vehicle.write_text("thrust: {hover_thrust: 0.4}\n")
+    code, _, error = run(capsys, vehicle, "--no-flights")
+    assert code == 2
+    assert "are not known; run `companion identify`" in error
+    code, _, error = run(capsys, vehicle, "--output", tmp_path / "missing" / "x.yaml")
+    assert code == 2
+    assert "there is no folder" in error

@@ -1,0 +1,44 @@
+"""Proposals flown on the mock vehicle, against the configuration that `companion init` writes."""
+
+import pytest
+
+from companion.config.files import changed, load, shipped
+from companion.tuning import propose
+from companion.tuning.flights import CIRCLE_IN_GUSTS, COURSES, autopilot_like, flown
+
+
+def started(autopilot, factor=1.0):
+    """The file of `companion init`, with lag and dead time that are wrong by a factor."""
+    config = load(shipped(f"{autopilot}.yaml"))
+    times = {
+        key: factor * value
+        for key, value in config.vehicle.model_dump().items()
+        if key in ("lag_ms", "dead_time_ms", "pitch_lag_ms", "pitch_dead_time_ms") and value
+    }
+    return changed(config, {"vehicle": times, "limits": {"max_tilt_rate_deg_s": 135.0}}, "test")
+
+
+def test_in_gusts_the_error_is_much_smaller():
+    config = started("px4")
+    before = flown(config, CIRCLE_IN_GUSTS, "px4")
+    after = flown(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
+    assert before.ok, before
+    assert after.ok, after
+    assert after.reported <= 0.75 * before.reported
+    assert after.rate_limited < 0.02
+
+
+def test_the_mock_vehicle_is_like_the_identified_one():
+    assert autopilot_like(started("px4")) == "px4"
+    assert autopilot_like(started("ardupilot")) == "ardupilot"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.7, 1.3])
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_it_flies_with_lag_and_dead_time_wrong_by_30_percent(autopilot, factor):
+    tuned = propose(started(autopilot, factor)).tuned
+    for course in COURSES:
+        result = flown(tuned, course, autopilot)
+        assert result.ok, result
+        assert result.reported <= 0.2
