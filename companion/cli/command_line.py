@@ -63,6 +63,9 @@ def _add_flights(commands: Commands) -> None:
     show.add_argument(
         "--config", type=Path, metavar="FILE", help="default: the mock-px4.yaml that ships"
     )
+    show.add_argument(
+        "--open", action="store_true", help="open the report in the browser after the flight"
+    )
     show.set_defaults(run="flights.demo")
     for command in (fly, show):
         command.add_argument(

@@ -1,6 +1,7 @@
 """`companion fly` and `companion demo`."""
 
 import argparse
+import webbrowser
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
@@ -9,6 +10,7 @@ from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.recording.folder import flight_folder
 from companion.recording.summary import Summary
+from companion.report import PAGE
 
 
 def fly(options: argparse.Namespace) -> int:
@@ -26,7 +28,10 @@ def demo(options: argparse.Namespace) -> int:
     """Start the bundled vehicle and fly it."""
     called = flying.invocation(options)._replace(config=None)
     path, console = options.config, _console(options)
-    return _ended(flying.fly_bundled(path, options, console, called=called), options)
+    summary = flying.fly_bundled(path, options, console, called=called)
+    if options.open and summary.log is not None and (page := summary.log / PAGE).is_file():
+        webbrowser.open(page.resolve().as_uri())
+    return _ended(summary, options)
 
 
 def _console(options: argparse.Namespace) -> FlightConsole:

@@ -15,7 +15,7 @@ from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import assigned, changed, load
 from companion.control.outer_loop import predictive_settings
-from companion.extras import require
+from companion.extras import MissingExtraError, require
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import Several
 from companion.flight.session import Session
@@ -25,6 +25,7 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
+from companion.recording.flight_record import RecordError
 from companion.recording.folder import flight_folder
 from companion.recording.report import flight_table, words_text
 from companion.recording.summary import Summary
@@ -116,7 +117,21 @@ def fly(
         console.print(f"Recorded in {folder}", soft_wrap=True)
         words = closing_words(summary.as_dict(), called)
         console.print(words_text(words), soft_wrap=True)
+        if config.recording.report:
+            console.print(page_about(folder), soft_wrap=True)
     return summary
+
+
+def page_about(folder: Path) -> str:
+    """Write the page about a flight; returns a sentence that says where it is, or why not."""
+    from companion.report.page import write_report  # noqa: PLC0415  after the flight only
+
+    try:
+        return f"Report: {write_report(folder)}"
+    except MissingExtraError as error:
+        return f"No report: {error}"
+    except (RecordError, OSError) as error:
+        return f"No report: {error}; `companion report {folder}` tries again"
 
 
 def fly_bundled(

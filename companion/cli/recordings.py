@@ -1,6 +1,7 @@
-"""The commands that read recorded flights: `plot`, `export` and `replay`."""
+"""The commands that read recorded flights: `plot`, `report`, `compare`, `export` and `replay`."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
@@ -16,6 +17,29 @@ def plot(options: argparse.Namespace) -> int:
     out = options.out or options.folder / "flight.png"
     draw_flight(options.folder, out)
     print(out)
+    return EXIT_OK
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write the page about a flight."""
+    from companion.report.page import write_report  # noqa: PLC0415  no other command needs it
+
+    return _write(lambda: write_report(options.flight, options.out))
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Write a page that sets flights beside each other."""
+    from companion.report.page import write_comparison  # noqa: PLC0415  no other command needs it
+
+    return _write(lambda: write_comparison(options.flights, options.out))
+
+
+def _write(make: Callable[[], Path]) -> int:
+    """Print the path of the page that `make` writes."""
+    try:
+        print(make())
+    except OSError as error:
+        raise ConfigError(f"{error.filename}: cannot write there: {error.strerror}") from error
     return EXIT_OK
 
 

@@ -9,11 +9,10 @@ from companion.mavlink.errors import LogError
 from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
 from companion.vehicle.autopilot import Autopilot, Role
-from companion.vehicle.registry import AUTOPILOT_NAMES, AUTOPILOTS
+from companion.vehicle.registry import AUTOPILOT_NAMES, BY_NUMBER
 
 Row = tuple[float, ...]
 
-_AUTOPILOTS = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
 _ARMED = 128
 _RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
 """Bits of a type mask that are compared: quaternion, three rates, throttle, body thrust."""
@@ -110,8 +109,8 @@ class _Reader:
             self._telemetry(kind, message)
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
-        if self.vehicle is None and heartbeat.autopilot in _AUTOPILOTS:
-            self.vehicle, self._autopilot = source, _AUTOPILOTS[heartbeat.autopilot]
+        if self.vehicle is None and heartbeat.autopilot in BY_NUMBER:
+            self.vehicle, self._autopilot = source, BY_NUMBER[heartbeat.autopilot]
         if source != self.vehicle or self._autopilot is None:
             return
         mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)

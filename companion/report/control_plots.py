@@ -1,0 +1,113 @@
+"""How the vehicle obeyed: coefficients, steps, body rates, thrust and latency."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from companion.recording.response import first_order
+from companion.recording.second_order import nearest_second_order
+from companion.report.flight_data import FlightData
+from companion.report.plots import (
+    FLIGHTS,
+    IDEAL,
+    MEASURED,
+    NEAREST,
+    REFERENCE,
+    Plot,
+    axes,
+    line,
+    over_time,
+    time_axis,
+)
+
+_STEPS_SHOWN = 6
+"""Most doublets in one plot."""
+
+
+def control_plots(flight: FlightData) -> Iterator[Plot]:
+    """The plots of control for one flight; one without curves is left out."""
+    found = [_steps(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
+    yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
+
+
+def _steps(flight: FlightData) -> Plot:
+    """The first doublet along its own direction, with the ideal and the nearest linear model."""
+    if not flight.runs:
+        return Plot("", "", [])
+    run, model = flight.runs[0], nearest_second_order(flight.runs)
+    along = run.target[0] / max(float(np.hypot(*run.target[0])), 1e-9)
+    time = run.time - run.time[0]
+    nearest = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
+    traces = [
+        line("target", time, run.target @ along, REFERENCE, dash="dot"),
+        line("measured", time, run.measured @ along, MEASURED),
+        line(nearest, time, model.path(run) @ along, NEAREST, dash="dash"),
+    ]
+    if np.isfinite(flight.gain):
+        ideal = f"ideal: first order, {1.0 / flight.gain:.2g} s"
+        traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL))
+    note = (
+        "A first doublet along its direction. The response is linear if it follows the nearest "
+        "model; that model is slower than the ideal by the vehicle's own rate loop."
+    )
+    return Plot("Step response", note, traces, axes(x="time, s", y="acceleration / thrust"))
+
+
+def _plane(flight: FlightData) -> Plot:
+    """The steps in the plane of the coefficients."""
+    traces = []
+    for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
+        colour = FLIGHTS[number % len(FLIGHTS)]
+        traces.append(line(f"doublet {number + 1}", run.measured[:, 1], run.measured[:, 0], colour))
+    layout = axes(x="a_E, east", y="a_N, north")
+    layout["yaxis"]["scaleanchor"] = "x"
+    note = "Horizontal acceleration per specific thrust. A linear response moves on straight lines."
+    return Plot("Straightness of the steps", note, traces, layout, 420)
+
+
+def _coefficients(flight: FlightData) -> Iterator[Plot]:
+    for column, axis in enumerate(("north", "east")):
+        shown = (("target", "target", REFERENCE), ("measured", "coefficients", MEASURED))
+        traces = [
+            over_time(name, flight.curves[which], column, colour)
+            for name, which, colour in shown
+            if which in flight.curves
+        ]
+        layout = time_axis(flight, y="acceleration / thrust")
+        note = (
+            "Horizontal acceleration per specific thrust: what guidance asks, what the tilt gives."
+        )
+        yield Plot(f"Acceleration coefficient, {axis}", note, traces, layout, 280)
+
+
+def _rates(flight: FlightData) -> Iterator[Plot]:
+    for column, axis in enumerate(("roll", "pitch", "yaw")):
+        traces = [
+            over_time(which, flight.curves[which], column, colour)
+            for which, colour in (("commanded", REFERENCE), ("measured", MEASURED))
+            if which in flight.curves
+        ]
+        layout = time_axis(flight, y="rate, °/s")
+        note = "The measured rate follows the commanded one after dead time and lag of the vehicle."
+        yield Plot(f"Body rate, {axis}", note, traces, layout, 240)
+
+
+def _thrust(flight: FlightData) -> Plot:
+    if "thrust" not in flight.curves:
+        return Plot("", "", [])
+    curve = flight.curves["thrust"]
+    traces = [over_time("sent", curve, 0, MEASURED)]
+    if curve.values.shape[1] > 1:
+        traces.append(over_time("learned at hover", curve, 1, NEAREST, dash="dash"))
+    layout = time_axis(flight, y="thrust, 0..1")
+    return Plot("Thrust", "Normalised collective thrust.", traces, layout, 260)
+
+
+def _latency(flight: FlightData) -> Plot:
+    curve = flight.curves.get("latency")
+    if curve is None or not curve.values.any():  # In virtual time there is no latency.
+        return Plot("", "", [])
+    traces = [over_time("latency", curve, 0, MEASURED)]
+    layout = time_axis(flight, y="latency, ms")
+    note = "From the arrival of a sample to its setpoint, in this program."
+    return Plot("Latency", note, traces, layout, 240)

@@ -1,0 +1,163 @@
+"""What a page shows of one flight, read from its folder."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config.files import load
+from companion.config.reference import Key, differences
+from companion.files.yaml_file import ConfigError
+from companion.recording.flight_record import Event, FlightRecord, read_flight
+from companion.recording.mcap_file.fields import Row
+from companion.recording.recorded_summary import summary_of, trace_of
+from companion.recording.second_order import StepRun, step_runs
+
+Floats = NDArray[np.float64]
+
+
+class Curve(NamedTuple):
+    """Values over time.
+
+    Attributes:
+        time: (N,), s since the flight began.
+        values: (N, columns).
+    """
+
+    time: Floats
+    values: Floats
+
+
+class Span(NamedTuple):
+    """A phase, a maneuver or a mode.
+
+    Attributes:
+        begin, end: s since the flight began.
+        name: shown to the user.
+    """
+
+    begin: float
+    end: float
+    name: str
+
+
+@dataclass(frozen=True)
+class FlightData:
+    """One flight, from its own record or from a `.tlog`.
+
+    Attributes:
+        name: of the folder or of the log.
+        curves: by name; a curve is missing where nothing was recorded. Their columns:
+            "position", "reference": north, east, height, m. "error": tracking error, m.
+            "motion": height in m, speed in m/s, tilt in °. "coefficients", "target": north, east.
+            "commanded", "measured": roll, pitch, yaw rate, °/s. "thrust": sent, learned at hover.
+            "latency": from a sample's arrival to its setpoint, ms.
+        figures: as `Summary.as_dict` makes them; None for a `.tlog`.
+        provisional: whether the flight wrote no summary, so that the figures are from its record.
+        phases: in order.
+        maneuvers: in order.
+        events: in order.
+        differences: keys of the configuration that are not the default; None where unknown.
+        runs: the open-loop steps, in vehicle time.
+        gain: p of the planner, 1/s; NaN where unknown.
+    """
+
+    name: str
+    curves: Mapping[str, Curve]
+    figures: Mapping[str, Any] | None = None
+    provisional: bool = False
+    phases: tuple[Span, ...] = ()
+    maneuvers: tuple[Span, ...] = ()
+    events: tuple[Event, ...] = ()
+    differences: tuple[Key, ...] | None = None
+    runs: list[StepRun] = field(default_factory=list)
+    gain: float = float("nan")
+
+
+def recorded(folder: Path) -> FlightData:
+    """The flight in a folder.
+
+    Raises:
+        RecordError: the folder holds no record of a flight.
+    """
+    record = read_flight(folder)
+    figures, provisional = summary_of(record)
+    return FlightData(
+        name=folder.resolve().name,
+        curves={name: curve for name, curve in _curves(record).items() if len(curve.time)},
+        figures=figures,
+        provisional=provisional,
+        phases=_spans([(each.time, each.name) for each in record.phases], record.duration),
+        maneuvers=_maneuvers(record),
+        events=tuple(each for each in record.events if each.source != "phase"),
+        differences=_differences(folder),
+        runs=step_runs(trace_of(record).response_rows()),
+        gain=float(record.metadata["flight"].get("gain_per_s", "nan")),
+    )
+
+
+def _spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
+    """Spans that follow each other; the last one ends at `end`."""
+    ends = [time for time, _ in begins[1:]] + [end]
+    return tuple(Span(time, until, name) for (time, name), until in zip(begins, ends, strict=True))
+
+
+def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
+    marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
+    return tuple(span for span in _spans(marks, record.duration) if span.name)
+
+
+def _differences(folder: Path) -> tuple[Key, ...] | None:
+    try:
+        return tuple(differences(load(folder / "config.yaml")))
+    except ConfigError:
+        return None  # An older program wrote it, or it was not written whole.
+
+
+def _curves(record: FlightRecord) -> dict[str, Curve]:
+    guidance, setpoint, sample = map(record.rows, ("guidance", "setpoint", "sample"))
+    setpoint = setpoint[setpoint["idle"] == 0]
+    motion, thrust = record.rows("motion"), record.rows("thrust")
+    stepped = record.since_start(guidance["time_s"])
+    answered = record.since_start(setpoint["received_s"])
+    return {
+        "position": Curve(stepped, _place(guidance, "estimated")),
+        "reference": Curve(stepped, _held(guidance)),
+        "error": Curve(stepped, _columns(guidance, "error_m")),
+        "motion": Curve(motion["time_s"], _columns(motion, "height_m", "speed_m_s", "tilt_deg")),
+        "coefficients": Curve(answered, _columns(setpoint, "measured_north", "measured_east")),
+        "target": Curve(answered, _columns(setpoint, "target_north", "target_east")),
+        "commanded": Curve(answered, _rates(setpoint, "commanded")),
+        "measured": Curve(record.since_start(sample["received_s"]), _rates(sample, "measured")),
+        "thrust": Curve(
+            record.since_start(thrust["time_s"]), _columns(thrust, "sent", "hover_thrust")
+        ),
+        "latency": Curve(answered, 1e-3 * _columns(setpoint, "latency_us")),
+    }
+
+
+def _columns(rows: Row, *names: str) -> Floats:
+    return np.column_stack([rows[name] for name in names])
+
+
+def _place(rows: Row, whose: str) -> Floats:
+    """North, east and height, m."""
+    return _columns(rows, *(f"{whose}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
+
+
+def _held(guidance: Row) -> Floats:
+    """The reference; NaN where the vehicle need not be there, as in open loop."""
+    reference = _place(guidance, "reference")
+    reference[guidance["holds_position"] == 0, :2] = np.nan
+    reference[guidance["holds_height"] == 0, 2] = np.nan
+    return reference
+
+
+def _rates(rows: Row, which: str) -> Floats:
+    """Roll, pitch and yaw rate, °/s."""
+    return np.degrees(
+        _columns(rows, *(f"{which}_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")))
+    )

@@ -1,0 +1,106 @@
+"""Where the vehicle flew: track, height, tracking error, speed and tilt."""
+
+from collections.abc import Iterator, Sequence
+
+from companion.report.flight_data import FlightData
+from companion.report.plots import (
+    FLIGHTS,
+    MEASURED,
+    REFERENCE,
+    Plot,
+    axes,
+    evenly,
+    line,
+    numbers,
+    over_time,
+    time_axis,
+)
+
+_NORTH, _EAST, _HEIGHT = range(3)
+
+
+def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
+    """The plots of the motion; one without curves is left out."""
+    found = (_plan(flights), _space(flights), _height(flights), _error(flights), _speed(flights))
+    yield from (plot for plot in found if plot.traces)
+
+
+def _colour(flights: Sequence[FlightData], number: int) -> str:
+    return MEASURED if len(flights) == 1 else FLIGHTS[number % len(FLIGHTS)]
+
+
+def _name(flights: Sequence[FlightData], flight: FlightData, what: str) -> str:
+    return what if len(flights) == 1 else f"{flight.name}: {what}"
+
+
+def _plan(flights: Sequence[FlightData]) -> Plot:
+    """The track from above."""
+    traces = []
+    for number, flight in enumerate(flights):
+        for which, dash in (("reference", "dash"), ("position", "solid")):
+            if which in flight.curves:
+                place = flight.curves[which].values[evenly(len(flight.curves[which].time))]
+                first = which == "reference" and len(flights) == 1
+                colour = REFERENCE if first else _colour(flights, number)
+                name = _name(flights, flight, "flown" if which == "position" else which)
+                traces.append(line(name, place[:, _EAST], place[:, _NORTH], colour, dash=dash))
+    layout = axes(x="east, m", y="north, m")
+    layout["yaxis"]["scaleanchor"] = "x"
+    note = "The track from above. In open-loop steps the vehicle has no reference and drifts."
+    return Plot("Track", note, traces, layout, 420)
+
+
+def _space(flights: Sequence[FlightData]) -> Plot:
+    """The track in three dimensions."""
+    traces = []
+    for number, flight in enumerate(flights):
+        if "position" in flight.curves:
+            curve = flight.curves["position"]
+            place = curve.values[evenly(len(curve.time))]
+            traces.append(
+                {
+                    "type": "scatter3d",
+                    "mode": "lines",
+                    "name": _name(flights, flight, "flown"),
+                    "x": numbers(place[:, _EAST]),
+                    "y": numbers(place[:, _NORTH]),
+                    "z": numbers(place[:, _HEIGHT]),
+                    "line": {"color": _colour(flights, number), "width": 4},
+                }
+            )
+    scene = {**axes(x="east, m", y="north, m", z="height, m"), "aspectmode": "data"}
+    return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 420)
+
+
+def _height(flights: Sequence[FlightData]) -> Plot:
+    traces = []
+    for number, flight in enumerate(flights):
+        if "motion" in flight.curves:
+            name = _name(flights, flight, "height above home")
+            traces.append(over_time(name, flight.curves["motion"], 0, _colour(flights, number)))
+    layout = time_axis(flights[0], y="height, m")
+    return Plot("Height", "Height above home over the whole flight.", traces, layout)
+
+
+def _error(flights: Sequence[FlightData]) -> Plot:
+    traces = []
+    for number, flight in enumerate(flights):
+        if "error" in flight.curves:
+            name = _name(flights, flight, "distance from the reference")
+            traces.append(over_time(name, flight.curves["error"], 0, _colour(flights, number)))
+    layout = time_axis(flights[0], y="error, m")
+    note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
+    return Plot("Tracking error", note, traces, layout)
+
+
+def _speed(flights: Sequence[FlightData]) -> Plot:
+    traces = []
+    for number, flight in enumerate(flights):
+        if "motion" in flight.curves:
+            motion, colour = flight.curves["motion"], _colour(flights, number)
+            traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
+            tilt = _name(flights, flight, "tilt, °")
+            traces.append(over_time(tilt, motion, 2, colour, dash="dot", yaxis="y2"))
+    layout = time_axis(flights[0], y="speed, m/s", y2="tilt, °")
+    layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}
+    return Plot("Speed and tilt", "Solid: speed. Dotted: tilt.", traces, layout)

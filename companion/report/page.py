@@ -1,0 +1,108 @@
+"""Makes the page of one flight, or of several beside each other: one HTML file, no network."""
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from companion.extras import require
+from companion.files.write_whole import write_whole
+from companion.recording.closing_words import ClosingWords, closing_words
+from companion.report import PAGE
+from companion.report.control_plots import control_plots
+from companion.report.flight_data import FlightData, recorded
+from companion.report.motion_plots import motion_plots
+from companion.report.plots import Plot
+from companion.report.tables import Table, beside_each_other, configuration, flight_tables
+from companion.report.timeline import timeline
+from companion.report.tlog_data import logged
+
+
+def read(path: Path) -> FlightData:
+    """The flight in a folder, or in a `.tlog` of any program.
+
+    Raises:
+        RecordError: the folder holds no record of a flight.
+        LogError: the log cannot be used.
+    """
+    return logged(path) if path.is_file() else recorded(path)
+
+
+def write_report(path: Path, out: Path | None = None) -> Path:
+    """Write the page about one flight; return its path.
+
+    Args:
+        path: folder of the flight, or a `.tlog`.
+        out: the page; None: `report.html` in the folder, or beside the log.
+
+    Raises:
+        MissingExtraError: the extra `report` is missing.
+        RecordError, LogError: the flight cannot be read.
+        OSError: the page cannot be written.
+    """
+    _require_extra()
+    flight = read(path)
+    if out is None:
+        out = path.with_suffix(".html") if path.is_file() else path / PAGE
+    words = None if flight.figures is None else closing_words(flight.figures, None)
+    plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
+    tables = flight_tables(flight)
+    write_whole(out, _page(flight.name, words, [flight], tables, plots, configuration(flight)))
+    return out
+
+
+def write_comparison(paths: Sequence[Path], out: Path) -> Path:
+    """Write a page that sets several flights beside each other; return its path.
+
+    Raises:
+        MissingExtraError, RecordError, LogError, OSError: as `write_report`.
+    """
+    _require_extra()
+    flights = [read(path) for path in paths]
+    title = " and ".join(flight.name for flight in flights)
+    plots = list(motion_plots(flights))
+    write_whole(out, _page(title, None, flights, beside_each_other(flights), plots, None))
+    return out
+
+
+def _require_extra() -> None:
+    for module in ("plotly", "jinja2"):
+        require(module, "report", "a report")
+
+
+def _page(
+    title: str,
+    words: ClosingWords | None,
+    flights: Sequence[FlightData],
+    tables: Sequence[Table],
+    plots: Sequence[Plot],
+    settings: Table | None,
+) -> str:
+    import jinja2  # noqa: PLC0415  an extra
+
+    here = files("companion.report")
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string((here / "page.html.j2").read_text("utf-8"))
+    plotly = files("plotly") / "package_data" / "plotly.min.js"
+    return template.render(
+        title=title,
+        words=words,
+        flights=flights,
+        tables=tables,
+        plots=plots,
+        plots_json=_script_safe([_plain(plot) for plot in plots]),
+        settings=settings,
+        plotly=plotly.read_text("utf-8"),
+        version=version("mavlink-companion"),
+    )
+
+
+def _plain(plot: Plot) -> dict[str, Any]:
+    return {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
+
+
+def _script_safe(data: Any) -> str:
+    """JSON inside a script element: no `<`, with which a tag could begin."""
+    return json.dumps(data, allow_nan=False).replace("<", "\\u003c")

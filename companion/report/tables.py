@@ -1,0 +1,136 @@
+"""The tables of the page: maneuvers, figures, configuration, and flights beside each other."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+from companion.report.flight_data import FlightData
+
+_EMPTY = "–"
+
+
+class Table(NamedTuple):
+    """A table of texts.
+
+    Attributes:
+        title: shown above it.
+        header: names of the columns.
+        rows: one text for each column.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+def flight_tables(flight: FlightData) -> list[Table]:
+    """The tables about one flight; one without rows is left out."""
+    figures = flight.figures
+    tables = [] if figures is None else [_maneuvers(figures), Table(*_figures(figures))]
+    return [table for table in tables if table.rows]
+
+
+def configuration(flight: FlightData) -> Table:
+    """The keys that are not the default."""
+    rows = [
+        (f"{key.section}.{key.name}", _value(key.value), _value(key.default), key.unit)
+        for key in flight.differences or ()
+    ]
+    return Table("Configuration that is not the default", ("key", "flown", "default", "unit"), rows)
+
+
+def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
+    """The figures and the configurations of several flights, one column a flight."""
+    names = tuple(flight.name for flight in flights)
+    known = [
+        {**dict(_tracking(flight.figures)), **dict(_rows(flight.figures))} if flight.figures else {}
+        for flight in flights
+    ]
+    labels = dict.fromkeys(label for figures in known for label in figures)
+    figures = [(label, *(each.get(label, _EMPTY) for each in known)) for label in labels]
+    keys = [
+        None
+        if flight.differences is None
+        else {f"{key.section}.{key.name}": _value(key.value) for key in flight.differences}
+        for flight in flights
+    ]
+    changed = sorted({key for each in keys for key in each or {}})
+    settings = [
+        (key, *(_EMPTY if each is None else each.get(key, "default") for each in keys))
+        for key in changed
+    ]
+    differ = [row for row in settings if len(set(row[1:])) > 1]
+    tables = [
+        Table("Figures", ("figure", *names), figures),
+        Table("Keys that differ", ("key", *names), differ),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def _figures(figures: Any) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
+    return "Figures", ("figure", "measured"), list(_rows(figures))
+
+
+def _rows(figures: Any) -> Iterator[tuple[str, str]]:
+    """Label and text of each figure that was measured."""
+    response = figures.get("response") or {}
+    latency, link = figures.get("latency_us") or {}, figures.get("link") or {}
+    constants = response.get("time_constant_s") or {}
+    wanted: list[tuple[str, Any, Callable[[Any], str]]] = [
+        ("result", figures.get("result"), str),
+        ("planner", figures.get("planner"), str),
+        ("time constant, north", constants.get("north"), _unit("{:.3f} s")),
+        ("time constant, east", constants.get("east"), _unit("{:.3f} s")),
+        (
+            "largest distance from the line of a step",
+            response.get("cross_axis_max"),
+            _unit("{:.4f}"),
+        ),
+        ("samples", figures.get("samples"), _unit("{:,}")),
+        ("setpoints", figures.get("setpoints"), _unit("{:,}")),
+        ("frames lost", link.get("lost"), _unit("{:,}")),
+    ]
+    if not figures.get("lockstep"):  # The vehicle waits in lockstep, so its wall time says nothing.
+        wanted += [
+            ("missed deadlines", figures.get("missed_deadlines"), _unit("{:,}")),
+            ("latency, median", latency.get("p50"), _unit("{:.0f} µs")),
+            ("latency, 99th percentile", latency.get("p99"), _unit("{:.0f} µs")),
+        ]
+    yield from ((label, show(value)) for label, value, show in wanted if value not in (None, ""))
+
+
+def _tracking(figures: Any) -> Iterator[tuple[str, str]]:
+    """Label and text of each maneuver's RMS errors."""
+    for maneuver in figures.get("maneuvers", ()):
+        for key, what in (("level_rms_m", "level RMS"), ("height_rms_m", "height RMS")):
+            if maneuver.get(key) is not None:
+                yield f"{maneuver['name']}, {what}", f"{maneuver[key]:.3f} m"
+
+
+def _unit(text: str) -> Callable[[Any], str]:
+    return text.format
+
+
+def _maneuvers(figures: Any) -> Table:
+    columns = (
+        ("name", "maneuver", "{}"),
+        ("duration_s", "duration, s", "{:.1f}"),
+        ("reference_speed_max_m_s", "largest speed of the reference, m/s", "{:.1f}"),
+        ("level_rms_m", "level RMS, m", "{:.3f}"),
+        ("level_max_m", "level max, m", "{:.3f}"),
+        ("height_rms_m", "height RMS, m", "{:.3f}"),
+        ("height_max_m", "height max, m", "{:.3f}"),
+        ("drift_max_m", "drift in open loop, m", "{:.1f}"),
+    )
+    rows = [
+        tuple(
+            _EMPTY if maneuver.get(key) is None else text.format(maneuver[key])
+            for key, _, text in columns
+        )
+        for maneuver in figures.get("maneuvers", ())
+    ]
+    return Table("Tracking by maneuver", tuple(title for _, title, _ in columns), rows)
+
+
+def _value(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False) if not isinstance(value, str) else value

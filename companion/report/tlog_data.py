@@ -1,0 +1,150 @@
+"""What a page shows of a `.tlog`, of this program or of another one."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from companion.attitude import coefficients
+from companion.mavlink.errors import LogError
+from companion.mavlink.messages import Message
+from companion.mavlink.tlog_file import messages
+from companion.recording.flight_record import Event
+from companion.report.flight_data import Curve, FlightData, Floats, Span
+from companion.vehicle.flight_log import read_flight_log
+from companion.vehicle.registry import BY_NUMBER
+
+_NAMES = frozenset(
+    {"ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "STATUSTEXT"}
+)
+_INFORMATION, _WARNING, _ERROR = 2, 3, 4
+"""Levels of `Event`."""
+_MAV_ERROR, _MAV_WARNING = 3, 4
+"""MAV_SEVERITY."""
+
+
+def logged(path: Path) -> FlightData:
+    """The flight in a `.tlog`. Times are since the first attitude or position of the autopilot.
+
+    Raises:
+        LogError: the file cannot be read, is not a `.tlog`, or has no telemetry of an autopilot.
+    """
+    reader = _Reader()
+    for frame, message in messages(path, _NAMES):
+        reader.take((frame.system, frame.component), message)
+    if reader.vehicle is None or reader.began is None:
+        raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")
+    curves = {**reader.curves(), **_control(path, reader.began)}
+    return FlightData(
+        name=path.name,
+        curves={name: curve for name, curve in curves.items() if len(curve.time)},
+        phases=reader.modes(),
+        events=tuple(reader.events),
+    )
+
+
+class _Reader:
+    """Takes the messages in the order of the log.
+
+    Attributes:
+        vehicle: system and component of the autopilot, from its first heartbeat.
+        began: the first stamp of attitude or position, s since boot.
+        events: the autopilot's texts.
+    """
+
+    def __init__(self) -> None:
+        self.vehicle: tuple[int, int] | None = None
+        self.began: float | None = None
+        self.events: list[Event] = []
+        self._now = 0.0
+        self._attitudes: list[tuple[float, ...]] = []
+        self._positions: list[tuple[float, ...]] = []
+        self._tilts: list[tuple[float, float]] = []
+        self._modes: list[tuple[float, str]] = []
+
+    def take(self, source: tuple[int, int], message: Message) -> None:
+        """Take one message from `source` (system, component)."""
+        kind = message.get_type()
+        if kind == "HEARTBEAT":
+            self._heartbeat(source, message)
+        elif source != self.vehicle:
+            return
+        elif kind == "STATUSTEXT":
+            self._text(message)
+        elif kind == "LOCAL_POSITION_NED":
+            self._stamp(message)
+            velocity = np.linalg.norm((message.vx, message.vy, message.vz))
+            place = message.x, message.y, -message.z
+            self._positions.append((self._now, *place, float(velocity)))
+        else:
+            self._stamp(message)
+            self._attitude(kind, message)
+
+    def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
+        autopilot = BY_NUMBER.get(heartbeat.autopilot)
+        if autopilot is None or self.vehicle not in (None, source):
+            return
+        self.vehicle = source
+        mode = autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
+        if not self._modes or self._modes[-1][1] != mode:
+            self._modes.append((self._now, mode))
+
+    def _stamp(self, message: Message) -> None:
+        time = 1e-3 * message.time_boot_ms
+        if self.began is None:
+            self.began = time
+        self._now = time - self.began
+
+    def _attitude(self, kind: str, message: Message) -> None:
+        if kind == "ATTITUDE":
+            tilt = np.arccos(np.cos(message.roll) * np.cos(message.pitch))
+        else:
+            c = coefficients((message.q1, message.q2, message.q3, message.q4))
+            self._attitudes.append((self._now, c.north, c.east))
+            tilt = np.arcsin(min(np.hypot(c.north, c.east), 1.0))
+        self._tilts.append((self._now, float(np.degrees(tilt))))
+
+    def _text(self, message: Message) -> None:
+        severity = message.severity
+        level = _ERROR if severity <= _MAV_ERROR else _INFORMATION
+        level = _WARNING if severity == _MAV_WARNING else level
+        self.events.append(Event(self._now, message.text, level, "autopilot"))
+
+    def modes(self) -> tuple[Span, ...]:
+        """The autopilot's modes, in order."""
+        ends = [time for time, _ in self._modes[1:]] + [self._now]
+        return tuple(
+            Span(*mode[:1], end, mode[1]) for mode, end in zip(self._modes, ends, strict=True)
+        )
+
+    def curves(self) -> dict[str, Curve]:
+        """Attitude and position, as in `FlightData.curves`."""
+        positions, tilts = _rows(self._positions, 5), _rows(self._tilts, 2)
+        tilt = (
+            np.interp(positions[:, 0], *tilts.T) if len(tilts) else np.full(len(positions), np.nan)
+        )
+        motion = np.column_stack([positions[:, 3], positions[:, 4], tilt])
+        attitudes = _rows(self._attitudes, 3)
+        return {
+            "position": Curve(positions[:, 0], positions[:, 1:4]),
+            "motion": Curve(positions[:, 0], motion),
+            "coefficients": Curve(attitudes[:, 0], attitudes[:, 1:]),
+        }
+
+
+def _rows(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
+    return np.array(list(rows), dtype=float).reshape(-1, columns)
+
+
+def _control(path: Path, began: float) -> dict[str, Curve]:
+    """Rates and thrust of a log with setpoints that the autopilot obeyed; else nothing."""
+    try:
+        log = read_flight_log(path)
+    except LogError:
+        return {}
+    sent, rates = _rows(log.setpoints, 5), _rows(log.rates, 4)
+    return {
+        "commanded": Curve(sent[:, 0] - began, np.degrees(sent[:, 1:4])),
+        "measured": Curve(rates[:, 0] - began, np.degrees(rates[:, 1:4])),
+        "thrust": Curve(sent[:, 0] - began, sent[:, [4]]),
+    }

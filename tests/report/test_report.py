@@ -1,0 +1,143 @@
+"""The page about a flight: from its record, a cut-off record or a `.tlog`; and of two flights."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.cli.main import main
+from companion.report import PAGE, page
+from companion.report.plots import thinned
+from tests.flight.fly import fly, mock_vehicle
+
+FLIGHT = {
+    "flight": {"maneuvers": ["hover", "steps", "circle"]},
+    "hover": {"duration_s": 2.0},
+    "steps": {"duration_s": 0.5, "settle_s": 1.0},
+    "circle": {"laps": 0.5},
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of one flight in memory."""
+    flown = tmp_path_factory.mktemp("flights") / "one"
+    flown.mkdir()
+    with mock_vehicle() as mock:
+        assert fly(mock, flown, **FLIGHT).result == "ok"
+    return flown
+
+
+@pytest.fixture
+def copied(folder, tmp_path):
+    """A copy of the folder, to be damaged."""
+    return shutil.copytree(folder, tmp_path / "copy")
+
+
+def plots_of(path):
+    """The plots of a page, as its script reads them, by title."""
+    text = path.read_text("utf-8")
+    found = re.search(r'<script id="plots" type="application/json">(.*?)</script>', text, re.S)
+    return dict(zip(headings(text), json.loads(found[1]), strict=True))
+
+
+def headings(text):
+    return re.findall(r'<h2>([^<]*)</h2>\n<p class="note">', text)
+
+
+def body(path):
+    """The page without Plotly and the data."""
+    return re.sub(r"<script.*?</script>", "", path.read_text("utf-8"), flags=re.S)
+
+
+def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(folder, capsys):
+    assert main(["report", str(folder)]) == 0
+    path = folder / PAGE
+    assert capsys.readouterr().out.strip() == str(path)
+    text = body(path)
+    assert re.search(r"<h1[^>]*>The flight was (not )?good", text)
+    assert text.index("<h1") < text.index("Tracking by maneuver") < text.index("Timeline")
+    for maneuver in ("hover", "steps", "circle"):
+        assert f"<td>{maneuver}</td>" in text
+    assert "flight.arm" in text, "the configuration that is not the default"
+    assert not re.search(r'(src|href)="', text), "the page needs no network"
+    plots = plots_of(path)
+    assert {"Track", "Step response", "Tracking error", "Body rate, yaw", "Thrust"} <= set(plots)
+    heights = [y for y in plots["Height"]["traces"][0]["y"] if y is not None]
+    assert 1.8 < max(heights) < 2.3
+    measured = next(t for t in plots["Step response"]["traces"] if t["name"] == "measured")
+    assert max(measured["y"]) == pytest.approx(0.25, abs=0.05)
+    assert [shape["label"]["text"] for shape in plots["Height"]["layout"]["shapes"]] == [
+        "hover",
+        "steps",
+        "circle",
+    ]
+
+
+def test_a_record_that_was_cut_off_makes_a_page_that_says_so(copied):
+    (copied / "summary.json").unlink()
+    record = copied / "flight.mcap"
+    record.write_bytes(record.read_bytes()[: record.stat().st_size // 2])
+    text = body(page.write_report(copied))
+    assert "The flight ended early: the record ends" in text
+    assert "The recording ends before the flight was over." in text
+
+
+def test_a_tlog_alone_makes_a_page(folder, tmp_path):
+    out = page.write_report(folder / "flight.tlog", tmp_path / "page.html")
+    plots = plots_of(out)
+    assert {"Track", "Height", "Body rate, roll", "Acceleration coefficient, north"} <= set(plots)
+    own = plots_of(page.write_report(folder, tmp_path / "own.html"))
+    theirs, ours = (
+        max(y for y in each["Body rate, roll"]["traces"][0]["y"] if y is not None)
+        for each in (plots, own)
+    )
+    assert theirs == pytest.approx(ours, rel=1e-3), "the same commands from both recordings"
+
+
+def test_flights_stand_beside_each_other(folder, copied, tmp_path):
+    config = copied / "config.yaml"
+    config.write_text(config.read_text().replace("gain_per_s: 5.0", "gain_per_s: 6.0"))
+    changed = "gain_per_s: 6.0" in config.read_text()
+    out = page.write_comparison([folder, copied], tmp_path / "compare.html")
+    text = body(out)
+    assert "2 flights beside each other" in text
+    assert "<th>one</th><th>copy</th>" in text
+    assert ("planner.gain_per_s" in text) == changed
+    names = {trace["name"] for trace in plots_of(out)["Track"]["traces"]}
+    assert {"one: flown", "copy: flown"} <= names
+
+
+def test_what_cannot_be_shown_is_one_sentence(tmp_path, capsys, monkeypatch):
+    assert main(["report", str(tmp_path)]) == 2
+    assert "is this the folder of a flight?" in capsys.readouterr().err
+    other = tmp_path / "other.tlog"
+    other.write_bytes(b"no log")
+    assert main(["compare", str(other)]) == 2
+    assert "not a .tlog" in capsys.readouterr().err
+    monkeypatch.setattr("companion.extras.importlib.util.find_spec", lambda _: None)
+    assert main(["report", str(tmp_path)]) == 2
+    assert "mavlink-companion[report]" in capsys.readouterr().err
+
+
+def test_text_of_a_log_cannot_become_a_tag():
+    assert "</script>" not in page._script_safe({"text": "</script><script>alert(1)"})
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 9000), st.floats(0.0, 1.0))
+def test_thinning_keeps_the_extremes_and_the_gaps(seed, count, missing):
+    random = np.random.default_rng(seed)
+    values = random.normal(size=count)
+    values[random.random(count) < missing] = np.nan
+    kept = thinned(values)
+    assert len(kept) <= 3 * 3000
+    assert (np.diff(kept) > 0).all()
+    if not np.isnan(values).all():
+        assert np.nanmax(values[kept]) == np.nanmax(values)
+        assert np.nanmin(values[kept]) == np.nanmin(values)
+    assert np.isnan(values[kept]).any() == np.isnan(values).any()
