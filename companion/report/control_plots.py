@@ -26,11 +26,11 @@ _STEPS_SHOWN = 6
 
 def control_plots(flight: FlightData) -> Iterator[Plot]:
     """The plots of control for one flight; one without curves is left out."""
-    found = [_steps(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
+    found = [_step_response(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
     yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
 
 
-def _steps(flight: FlightData) -> Plot:
+def _step_response(flight: FlightData) -> Plot:
     """The first doublet along its own direction, with the ideal and the nearest linear model."""
     if not flight.runs:
         return Plot("", "", [])
