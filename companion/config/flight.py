@@ -105,7 +105,7 @@ class IdentifyConfig(Section):
     climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
     """Vertical acceleration of the doublets that measure the thrust."""
     climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
-    """Duration of the first part of a climb doublet. The vehicle rises by climb_m_s2 · duration²."""
+    """Duration of the first part of a climb doublet. The vehicle rises climb_m_s2 · duration²."""
     settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
     """Position hold before each doublet and at the end."""
 
