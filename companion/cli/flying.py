@@ -132,7 +132,7 @@ def page_about(folder: Path) -> str:
     except (
         Exception,
         KeyboardInterrupt,
-    ) as error:  # The flight is over, and was as good as it was.
+    ) as error:  # The flight is over.
         return f"No report: {error or 'interrupted'}; `companion report {folder}` tries again"
 
 

@@ -95,7 +95,7 @@ def axes(**titles: str) -> dict[str, Any]:
 
 
 def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
-    """Layout of a plot over whole flights: its axes; the maneuvers of a single flight are shaded."""
+    """Layout of a plot over whole flights; the maneuvers of a single flight are shaded."""
     layout = axes(x="time, s", **titles)
     ends = [flight.phases[-1].end for flight in flights if flight.phases]
     if ends:
