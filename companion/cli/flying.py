@@ -25,7 +25,6 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
-from companion.recording.flight_record import RecordError
 from companion.recording.folder import flight_folder
 from companion.recording.report import flight_table, words_text
 from companion.recording.summary import Summary
@@ -118,7 +117,7 @@ def fly(
         words = closing_words(summary.as_dict(), called)
         console.print(words_text(words), soft_wrap=True)
         if config.recording.report:
-            console.print(page_about(folder), soft_wrap=True)
+            console.print(page_about(folder), soft_wrap=True, markup=False)
     return summary
 
 
@@ -130,8 +129,11 @@ def page_about(folder: Path) -> str:
         return f"Report: {write_report(folder)}"
     except MissingExtraError as error:
         return f"No report: {error}"
-    except (RecordError, OSError) as error:
-        return f"No report: {error}; `companion report {folder}` tries again"
+    except (
+        Exception,
+        KeyboardInterrupt,
+    ) as error:  # The flight is over.
+        return f"No report: {error or 'interrupted'}; `companion report {folder}` tries again"
 
 
 def fly_bundled(

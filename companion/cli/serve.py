@@ -51,7 +51,7 @@ def serve(options: argparse.Namespace) -> int:
 
 
 class _Events(TerminalObserver):
-    """Shows phases and events; no live lines, which would stay between two flights."""
+    """Shows phases and events. It has no live lines: they would stay on screen between flights."""
 
     def status(self, status: FlightStatus) -> None:
         """Ignore it."""

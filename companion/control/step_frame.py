@@ -23,7 +23,7 @@ _DECAY_S = 2.0
 
 
 class StepFrame:
-    """Keeps the turn between the estimator's frame and the frame of the steps.
+    """Converts between the estimator's frame and the frame in which open-loop steps are straight.
 
     Attributes:
         turn: heading in the estimator's frame minus heading in this frame, rad.
