@@ -152,7 +152,7 @@ def fly_bundled(
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
-    config = load(path)
+    config = read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
         options.endpoint, options.arm = wire.endpoint, True
         config = as_told(config, options, planner)
@@ -160,7 +160,7 @@ def fly_bundled(
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
-            helper(options, config, path, folder, console, follows=True) as beside,
+            helper(options, config, path, read, folder, console, follows=True) as beside,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
             return fly(config, folder, console, called, beside)
