@@ -15,11 +15,12 @@ from companion.report import PAGE
 
 def fly(options: argparse.Namespace) -> int:
     """Fly the vehicle that the configuration names."""
-    config = flying.as_told(load(options.config), options)
+    read = load(options.config)
+    config = flying.as_told(read, options)
     folder = flight_folder(config.recording.directory)
     called = flying.invocation(options)
     console = _console(options)
-    with helper(options, config, options.config, folder, console, follows=True) as beside:
+    with helper(options, config, options.config, read, folder, console, follows=True) as beside:
         summary = flying.fly(config, folder, console, called, beside)
     return _ended(summary, options)
 

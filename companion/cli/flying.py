@@ -25,7 +25,6 @@ from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
-from companion.recording.flight_record import RecordError
 from companion.recording.folder import flight_folder
 from companion.recording.report import flight_table, words_text
 from companion.recording.summary import Summary
@@ -118,7 +117,7 @@ def fly(
         words = closing_words(summary.as_dict(), called)
         console.print(words_text(words), soft_wrap=True)
         if config.recording.report:
-            console.print(page_about(folder), soft_wrap=True)
+            console.print(page_about(folder), soft_wrap=True, markup=False)
     return summary
 
 
@@ -130,8 +129,11 @@ def page_about(folder: Path) -> str:
         return f"Report: {write_report(folder)}"
     except MissingExtraError as error:
         return f"No report: {error}"
-    except (RecordError, OSError) as error:
-        return f"No report: {error}; `companion report {folder}` tries again"
+    except (
+        Exception,
+        KeyboardInterrupt,
+    ) as error:  # The flight is over.
+        return f"No report: {error or 'interrupted'}; `companion report {folder}` tries again"
 
 
 def fly_bundled(
@@ -150,7 +152,7 @@ def fly_bundled(
         VehicleStoppedError: the vehicle ended before the flight did.
     """
     path = path or demo.default_config()
-    config = load(path)
+    config = read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
         options.endpoint, options.arm = wire.endpoint, True
         config = as_told(config, options, planner)
@@ -158,7 +160,7 @@ def fly_bundled(
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
-            helper(options, config, path, folder, console, follows=True) as beside,
+            helper(options, config, path, read, folder, console, follows=True) as beside,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
             return fly(config, folder, console, called, beside)

@@ -18,6 +18,7 @@ def helper(
     options: argparse.Namespace,
     config: Config,
     path: Path,
+    read: Config,
     folder: Path | None,
     console: Console,
     *,
@@ -29,6 +30,7 @@ def helper(
         options: of the command line; `watch` and `live` count.
         config: of the flight.
         path: file of the configuration, which `--watch` watches.
+        read: the configuration as it was read from this file.
         folder: of the flight, or None.
         console: shows where the live page is.
         follows: whether the flight flies the maneuvers of its configuration.
@@ -45,7 +47,7 @@ def helper(
         require("nicegui", "live", "--live")
         door = open_door(options.live)
         console.print(door.words(), markup=False, highlight=False, soft_wrap=True)
-    made = Helper(Wishes(path if options.watch else None, door, follows, folder), config)
+    made = Helper(Wishes(path if options.watch else None, read, door, follows, folder), config)
     if door is not None:
         door.listening.close()  # the process has it
     words = "the program has ended"

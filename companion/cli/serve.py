@@ -25,7 +25,8 @@ from companion.serve.session import ServeSession
 
 def serve(options: argparse.Namespace) -> int:
     """Pass everything between the vehicle and other programs, and fly their setpoints."""
-    config = _as_told(load(options.config), options)
+    read = load(options.config)
+    config = _as_told(read, options)
     console = FlightConsole(stderr=options.json, highlight=False)
     observer = _Events(console)
     began = time.monotonic()
@@ -33,7 +34,7 @@ def serve(options: argparse.Namespace) -> int:
     def note(text: str) -> None:
         told.event(time.monotonic() - began, text)
 
-    with helper(options, config, options.config, None, console, follows=False) as beside:
+    with helper(options, config, options.config, read, None, console, follows=False) as beside:
         told = observer if beside is None else Several(observer, beside)
         session = ServeSession(config, note, told, directory=config.recording.directory)
         serving = _until_stopped(session)
@@ -50,7 +51,7 @@ def serve(options: argparse.Namespace) -> int:
 
 
 class _Events(TerminalObserver):
-    """Shows phases and events; no live lines, which would stay between two flights."""
+    """Shows phases and events. It has no live lines: they would stay on screen between flights."""
 
     def status(self, status: FlightStatus) -> None:
         """Ignore it."""

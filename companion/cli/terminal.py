@@ -76,7 +76,7 @@ class FlightConsole(Console):
     """A console whose reader may close the pipe; rich itself would end the program."""
 
     def on_broken_pipe(self) -> None:
-        """Raise to the caller that prints."""
+        """Raise `BrokenPipeError` instead of ending the program, as Rich would."""
         raise BrokenPipeError
 
 

@@ -3,6 +3,7 @@
 import json
 import sysconfig
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from os.path import realpath
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,17 @@ def load(path: Path) -> Config:
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """A configuration file and all that it includes, also through others, as far as they are read.
+
+    The last one may be missing or faulty.
+    """
+    reading = _Reading(Contents({}, {}))
+    with suppress(ConfigError):
+        reading.add_included((path,), _read(path).keys)
+    return (path, *reading.files)
+
+
 def _read(path: Path) -> Contents:
     """A file, its paths resolved against its own folder."""
     contents = yaml_file.read(path, Config)
@@ -72,11 +84,14 @@ class _Reading:
 
     Args:
         merged: receives their keys.
+
+    Attributes:
+        files: those that were opened.
     """
 
     def __init__(self, merged: Contents) -> None:
         self._merged = merged
-        self._count = 0
+        self.files: list[Path] = []
 
     def add_included(self, chain: tuple[Path, ...], keys: dict[str, Any]) -> None:
         """Add the files that the last file of `chain` includes, without its own keys.
@@ -93,8 +108,8 @@ class _Reading:
 
     def _add(self, chain: tuple[Path, ...]) -> None:
         *_, by, path = chain
-        self._count += 1
-        if self._count > MOST_INCLUDED:
+        self.files.append(path)
+        if len(self.files) > MOST_INCLUDED:
             raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
         if realpath(path) in map(realpath, chain[:-1]):
             names = " includes ".join(str(one) for one in chain)

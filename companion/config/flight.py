@@ -97,15 +97,15 @@ class IdentifyConfig(Section):
     tilt_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 60.0
     """Roll and pitch rate of the larger doublets; the smaller ones have half the rate."""
     tilt_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
-    """Duration of their first part. Rate times duration is the tilt."""
+    """Duration of the first part of a roll or pitch doublet. Rate times duration is the tilt."""
     yaw_rate_deg_s: Annotated[float, Field(ge=15.0, le=180.0)] = 50.0
     """Yaw rate of the larger doublet; the smaller one has half the rate."""
     yaw_duration_s: Annotated[float, Field(ge=0.2, le=3.0)] = 1.2
-    """Duration of the first part in yaw, which responds more slowly."""
+    """Duration of the first part of a yaw doublet. Yaw responds more slowly than roll and pitch."""
     climb_m_s2: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
     """Vertical acceleration of the doublets that measure the thrust."""
     climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
-    """Duration of their first part. The vehicle rises by climb_m_s2 · duration²."""
+    """Duration of the first part of a climb doublet. The vehicle rises climb_m_s2 · duration²."""
     settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
     """Position hold before each doublet and at the end."""
 

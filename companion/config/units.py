@@ -24,7 +24,7 @@ _CONVERSIONS: dict[str, Conversion] = {
     "_ms": seconds,
     "_percent": share,
 }
-"""By the end of a key: to rad, rad/s, rad/s², s and a share."""
+"""Conversion to SI (rad, rad/s, rad/s², s, share of 1) by the suffix of a key."""
 
 
 def converted(value: float | None, convert: Conversion) -> float | None:

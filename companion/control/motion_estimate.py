@@ -21,7 +21,7 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 _LEAST_COSINE = 0.2
 """Lower limit of the cosine of the tilt (78°), so that the slope of the thrust stays bounded."""
 _LONGEST = 0.2
-"""From positions further apart than this, no acceleration is computed, s."""
+"""Longest time between two positions from which an acceleration is computed, s."""
 _MISMATCH = 0.15
 """A larger error of the assumed drag is reported, 1/s."""
 

@@ -11,11 +11,7 @@ from companion.config.guidance import LINEAR
 from companion.config.in_flight import Difference, differences
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
-from companion.control.hold_settings import (
-    disturbance_bandwidth,
-    hold_weights,
-    observer_settings,
-)
+from companion.control.hold_settings import hold_weights, observer_settings
 from companion.control.inner_loop import law_constants, rate_limits
 from companion.control.outer_loop import linear_settings
 from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
@@ -115,7 +111,8 @@ def between(before: Config, after: Config, share: float) -> Config:
         return after
     middle: dict[str, dict[str, Any]] = {}
     for each in differences(before, after):
-        first, last = _number(before, each, each.before), _number(after, each, each.after)
+        first = value_in_effect(before, each, each.before)
+        last = value_in_effect(after, each, each.after)
         if first > 0.0 and last > 0.0:
             value = exp((1.0 - share) * log(first) + share * log(last))
         else:
@@ -127,13 +124,12 @@ def between(before: Config, after: Config, share: float) -> Config:
     return after.model_copy(update=sections)
 
 
-def _number(config: Config, difference: Difference, value: float | None) -> float:
+def value_in_effect(config: Config, difference: Difference, value: float | None) -> float:
     """The value, or what null comes to in `config`."""
     if value is not None:
         return value
     comes_to = {
         "guidance.position_weight_per_s4": lambda: hold_weights(config).position,
         "guidance.velocity_weight_per_s2": lambda: hold_weights(config).velocity,
-        "guidance.disturbance_bandwidth_rad_s": lambda: disturbance_bandwidth(config),
     }
     return comes_to[difference.name]()

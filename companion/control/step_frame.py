@@ -5,14 +5,14 @@ vehicle accelerates after a hover: by 1.3° within the first step on ArduCopter'
 bends that line by 0.015. The body rates show that the vehicle did not turn. So while steps are
 flown, the planner sees an attitude without the heading changes that body rates do not explain.
 
-In closed loop, guidance computes each acceleration in the estimator's frame. There the target is
-turned with the attitude, so the acceleration stays as guidance asked, and the turn decays.
+In closed loop, guidance computes each acceleration in the estimator's frame. Its horizontal target
+is rotated with the attitude, so the acceleration stays as guidance asked, and the turn decays. The
+heading target is not rotated: it would jump by the turn where steps begin and end.
 """
 
 from math import exp, radians
 
 from companion.attitude import Quaternion, Target
-from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp, turned_about_vertical
 from companion.guidance.reference import rotated
 
@@ -23,7 +23,7 @@ _DECAY_S = 2.0
 
 
 class StepFrame:
-    """Keeps the turn between the estimator's frame and the frame of the steps.
+    """Converts between the estimator's frame and the frame in which open-loop steps are straight.
 
     Attributes:
         turn: heading in the estimator's frame minus heading in this frame, rad.
@@ -52,9 +52,11 @@ class StepFrame:
         return q if self.turn == 0.0 else turned_about_vertical(q, -self.turn)
 
     def target(self, target: Target) -> Target:
-        """A target of the estimator's frame in this frame; targets of steps are in it already."""
+        """A target of the estimator's frame with its horizontal part in this frame.
+
+        The heading stays. Targets of steps are in this frame already.
+        """
         if self.turn == 0.0:
             return target
         north, east = rotated(target.north, target.east, -self.turn)
-        heading = wrap_angle(target.heading - self.turn)
-        return target._replace(north=north, east=east, heading=heading)
+        return target._replace(north=north, east=east)

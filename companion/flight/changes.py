@@ -14,6 +14,7 @@ from companion.config.in_flight import (
 )
 from companion.control.retuning import Retuning, between, fixed_because, tuning
 from companion.files.yaml_file import ConfigError
+from companion.flight.change_bounds import require_moderate
 from companion.safety.actions import internal
 
 SLEW = 0.7
@@ -77,6 +78,7 @@ class Changes:
         self._earlier: list[Config] = []
         self._made_before = 0
         self._retuning: Retuning | None = None
+        self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
         self._began: float | None = None
         self._stepped = 0.0
 
@@ -104,13 +106,16 @@ class Changes:
         """Begin to change to these values; returns what changes, in words.
 
         Raises:
-            ChangeRefusedError: a key must not change in flight, or a value is not valid. Nothing
-                has changed.
+            ChangeRefusedError: a key must not change in flight, a value is not valid, or the
+                change is too large. Nothing has changed.
         """
         try:
             wanted = changed_in_flight(self._start, self.wanted, values, by)
+            require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
+        except (ValueError, ArithmeticError) as error:
+            raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         before = self.wanted
         told = self._begin(wanted, by)
         self._earlier = [*self._earlier, before][-_MOST:]
@@ -129,6 +134,20 @@ class Changes:
         self._earlier.pop()
         self.on_change(self.wanted)
         return told
+
+    @contextmanager
+    def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
+        """Ask `refuses` about each change and each undo while the block runs.
+
+        Args:
+            refuses: called with the configuration now and the wanted one; returns why the change
+                is refused, as a sentence, or None.
+        """
+        self._refuses = refuses
+        try:
+            yield
+        finally:
+            self._refuses = _refuse_nothing
 
     @contextmanager
     def applied_by(self, retuning: Retuning, note: Callable[[str], None]) -> Iterator[None]:
@@ -177,9 +196,12 @@ class Changes:
         keys = tuple(differences(self.wanted, wanted))
         if not keys:
             raise ChangeRefusedError(f"{by}: the values are so already; nothing has changed")
+        refusal = self._refuses(self.wanted, wanted)
+        if refusal is not None:
+            raise ChangeRefusedError(f"{by}: {refusal}; nothing has changed")
         try:
             tuning(wanted)
-        except ValueError as error:
+        except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         now = asyncio.get_running_loop().time()
         self._from, self.wanted, self._began = self._now, wanted, now
@@ -189,3 +211,7 @@ class Changes:
         self.made.append(change)
         self.note(str(change))
         return str(change)
+
+
+def _refuse_nothing(_before: Config, _after: Config) -> str | None:
+    return None

@@ -19,7 +19,7 @@ _PERIOD = 2.0
 _PERIODS = 4
 """Each measurement is over this number of periods; the first one is a period shorter."""
 _UNSURE = 1.5
-"""The autopilot may have taken over in this time before the last row without our knowing, s."""
+"""The rows of the newest time, s, are not used: the autopilot may have left offboard already."""
 _LONGEST = 75_000
 """Largest number of rows, the newest, in the measurement at the end: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")

@@ -101,6 +101,25 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector) -> Non
             raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
 
 
+def require_still_flyable(config: Config, flown: ManeuverSequence) -> None:
+    """Check the maneuvers of a flight against limits that have changed since it began.
+
+    A trajectory is judged as it is flown: it is neither read nor slowed down again.
+
+    Args:
+        config: the changed configuration; its maneuvers are those of `flown`.
+        flown: the maneuvers that were made when the flight began.
+
+    Raises:
+        ConfigError: a maneuver cannot be flown within the limits and the fence.
+    """
+    for name, part in zip(config.flight.maneuvers, flown.parts, strict=True):
+        if not isinstance(part, Follow):
+            _part(config, name)
+        elif broken := violations(part.trajectory, _envelope(config)):
+            raise ConfigError(f"{part.name}: {broken[0]}; it is flown as it was when it began")
+
+
 def _part(config: Config, name: str) -> Maneuver:
     if name == "trajectory":
         return _follow(config)

@@ -57,7 +57,7 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
         drag: linear drag per mass, 1/s.
 
     Raises:
-        ValueError: the lag is not positive and finite.
+        ValueError: the lag is not positive and finite, or no positive and finite gains follow.
     """
     if not (isfinite(lag) and lag > 0.0):
         raise ValueError(f"the lag of the acceleration must be positive and finite, not {lag}")
@@ -68,7 +68,10 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     stable = vectors[:, np.argsort(values.real)[:3]]
     riccati = np.real(stable[3:] @ np.linalg.inv(stable[:3]))
     position, velocity, acceleration = (b.T @ riccati)[0].tolist()
-    return ChainGains(position, velocity, acceleration)
+    gains = ChainGains(position, velocity, acceleration)
+    if not all(isfinite(gain) and gain > 0.0 for gain in (position, velocity, acceleration)):
+        raise ValueError(f"no positive and finite gains follow from {weights}: {gains}")
+    return gains
 
 
 _LARGEST_DOWN = 0.5 * GRAVITY

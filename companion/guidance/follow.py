@@ -46,7 +46,7 @@ class HeldFigure:
         return self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s.
+        """The times at which to check the trajectory, s.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.
@@ -93,7 +93,7 @@ class Follow:
         return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s; the turn on the spot is not checked."""
+        """The times at which to check the trajectory, s; the turn on the spot is not checked."""
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:

@@ -39,7 +39,7 @@ _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_SHARES = (0.0, 0.3, 0.6)
 """Starts of the search for the dead time of a second-order model, as shares of the whole delay."""
 _EXCITED = 0.02
-"""A sample is excited if it differs from the command by more than this share of their range."""
+"""Share of the commands' range; a sample that differs more from its command is excited."""
 _MEMORY = 4.0
 """Length of the vehicle's response and of its noise correlation, as multiples of the delay."""
 _COARSE = 500

@@ -75,3 +75,7 @@ class Channel:
         """Close our end."""
         self.open = False
         self._end.close()
+
+
+class NoAnswerError(Exception):
+    """The flight has not answered a request in time; the message is a sentence for the user."""

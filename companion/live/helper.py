@@ -14,6 +14,7 @@ from companion.flight.changes import ChangeRefusedError, Changes
 from companion.flight.status import FlightStatus
 from companion.live.channel import Channel, Message
 from companion.live.door import Door
+from companion.realtime import schedule_as_usual
 
 T = TypeVar("T")
 
@@ -26,12 +27,14 @@ class Wishes(NamedTuple):
 
     Attributes:
         watch: file whose edits are applied, or None.
+        read: the configuration as it was read from this file for the flight.
         door: of the live page, or None.
         follows: whether the flight flies the maneuvers of its configuration.
         folder: of the flight; takes `live.log` and saved values; None: there is none.
     """
 
     watch: Path | None
+    read: Config
     door: Door | None
     follows: bool
     folder: Path | None
@@ -153,7 +156,7 @@ class Helper:
                 told = self.changes.undo(by)
             else:
                 told = self.changes.change(message.get("values") or {}, by)
-        except ChangeRefusedError as refused:
+        except (ChangeRefusedError, ValueError, ArithmeticError) as refused:
             self._send("answer", id=message.get("id"), refusal=str(refused))
         else:
             self._send("answer", id=message.get("id"), refusal=None, text=told)
@@ -166,7 +169,7 @@ def _started(
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
     with log.open("ab") as words, theirs:
-        return subprocess.Popen(
+        process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=words,
@@ -174,12 +177,15 @@ def _started(
             pass_fds=descriptors,
             start_new_session=True,
         )
+    schedule_as_usual(process.pid)  # it must not compute with the flight's real-time priority
+    return process
 
 
 def _first(wishes: Wishes, config: Config) -> Message:
     door = wishes.door
     return {
         "config": _plain(config),
+        "read": _plain(wishes.read),
         "follows": wishes.follows,
         "watch": None if wishes.watch is None else str(wishes.watch.absolute()),
         "folder": None if wishes.folder is None else str(wishes.folder.absolute()),

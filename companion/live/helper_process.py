@@ -8,10 +8,10 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from companion.config import Config
 from companion.config.in_flight import Values
-from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
-from companion.live.channel import Channel, Message
+from companion.live.channel import Channel, Message, NoAnswerError
 from companion.live.checks import ChangeChecks
 from companion.live.watched_file import WatchedFile
 
@@ -55,6 +55,7 @@ class Relay:
         Raises:
             ConfigError: the values cannot be used.
             ChangeRefusedError: the flight refuses them, or has ended.
+            NoAnswerError: the flight has not answered in time; it may have changed.
         """
         await asyncio.to_thread(self.checks.check, values, by)
         return await self.ask({"kind": "change", "values": values, "by": by})
@@ -64,6 +65,7 @@ class Relay:
 
         Raises:
             ChangeRefusedError: the flight refuses it, or has ended.
+            NoAnswerError: the flight has not answered in time; it may have done it.
         """
         number = next(self._ids)
         answer = self._asked[number] = asyncio.get_running_loop().create_future()
@@ -73,7 +75,10 @@ class Relay:
             async with asyncio.timeout(_ANSWER):
                 told = await answer
         except TimeoutError as error:
-            raise ChangeRefusedError("the flight does not answer; look at its values") from error
+            raise NoAnswerError(
+                f"no answer of the flight within {_ANSWER:g} s; it may have been applied, so look "
+                "at the values of the flight"
+            ) from error
         finally:
             del self._asked[number]
         if told.get("refusal") is not None:
@@ -108,11 +113,8 @@ class Relay:
 
 async def watch(relay: Relay, path: Path) -> None:
     """Apply the edits of a file until the flight ends."""
-    try:
-        watched = WatchedFile(path, relay.checks.check)
-    except ConfigError as error:
-        relay.note(f"{path.name} is not watched: {error}")
-        return
+    read = Config.model_validate(relay.first["read"])
+    watched = WatchedFile(path, read, relay.checks.check)
     relay.note(f"edits of {path.name} are applied from now on")
     while not relay.over.is_set():
         edit = await asyncio.to_thread(watched.look)
@@ -125,6 +127,9 @@ async def watch(relay: Relay, path: Path) -> None:
                 watched.accept()
             except ChangeRefusedError as refused:
                 relay.note(f"{path.name} is not applied: {refused}")
+            except NoAnswerError as error:
+                relay.note(f"{path.name}: {error}")
+                watched.accept()  # so that an edit that takes it back is sent
         await asyncio.sleep(_LOOK_PERIOD)
 
 

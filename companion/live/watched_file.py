@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.config import Config
-from companion.config.files import load
+from companion.config.files import files_of, load
 from companion.config.in_flight import Values, differences
 from companion.files.yaml_file import ConfigError
 
@@ -15,7 +15,7 @@ _SETTLED = 3
 """A file that does not change over this many looks is whole; editors remove it for a moment."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
-"""Inode, size and time of the file and of those it includes; None: it is not there."""
+"""Inode, size and time of the file and of all that it includes; None: it is not there."""
 
 
 class Edit:
@@ -37,16 +37,17 @@ class WatchedFile:
 
     Args:
         path: of the file.
+        read: the configuration as it was read from this file for the flight. If the file has
+            changed since, that is its first edit.
         check: raises ConfigError if the values cannot be used; called with the name of the file.
-
-    Raises:
-        ConfigError: the file cannot be read now.
     """
 
-    def __init__(self, path: Path, check: Callable[[Values, str], None]) -> None:
+    def __init__(self, path: Path, read: Config, check: Callable[[Values, str], None]) -> None:
         self._path, self._check = path, check
-        self._accepted = self._offered = load(path)
-        self._seen = self._judged = self._signature()
+        self._accepted = self._offered = read
+        self._files = files_of(path)
+        self._seen = self._signature()
+        self._judged: Signature | None = None
         self._looks = 0
 
     def look(self) -> Edit | None:
@@ -57,7 +58,8 @@ class WatchedFile:
         self._looks += 1
         if self._looks < _SETTLED or signature == self._judged:
             return None
-        self._judged = signature
+        self._files = files_of(self._path)
+        self._seen = self._judged = self._signature()
         return self._edit()
 
     def accept(self) -> None:
@@ -79,9 +81,7 @@ class WatchedFile:
         return Edit(values)
 
     def _signature(self) -> Signature:
-        included = self._accepted.include
-        names = (included,) if isinstance(included, str) else included
-        return tuple(map(_stamp, (self._path, *(self._path.parent / name for name in names))))
+        return tuple(map(_stamp, self._files))
 
 
 def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:

@@ -173,7 +173,12 @@ class StampJudge:
         return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
     def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
-        """The newest stamp of a stream on disk, among those too far `ahead` or not; 0: none."""
+        """The newest stamp of a stream on disk, 0 without one.
+
+        Args:
+            stream: the signer's stream.
+            ahead: true: among the stamps far ahead of the date; false: among the others.
+        """
         stamps = (s for s in self._kept.get(stream, ()) if (s > self._limit) == ahead)
         return max(stamps, default=0)
 

@@ -61,7 +61,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def _even_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
-    """The rate, Hz, lowered for bursts: in flight, too, the pauses between them count."""
+    """The effective rate, Hz. Bursts lower it, because the pauses between them count in flight."""
     samples = evidence.samples.rate
     if name != "ATTITUDE_QUATERNION" or samples is None:
         return rate.achieved

@@ -82,7 +82,7 @@ async def gather(
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
         received={name: counts.get(message_id(name), 0) for name in granted},
         window=seconds,
-        link=_quality(link, before, tuple(notices)),
+        link=_link_quality(link, before, tuple(notices)),
         samples=listener.samples,
         other_nodes=listener.other_nodes,
         resets=listener.resets,
@@ -120,7 +120,7 @@ async def _identity_and_words(link: Link) -> Identity:
     return await identify(link)
 
 
-def _quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
+def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
     now = link.stats
     return LinkQuality(
         frames=now.frames - before.frames,

@@ -85,7 +85,7 @@ def marks_of(summary: Any) -> Marks:
 
 
 def _title(maneuver: Any) -> str:
-    """In open loop the error has gaps: there is none."""
+    """The name of a maneuver; "(open loop)" explains why the error has a gap there."""
     return f"{maneuver['name']}{' (open loop)' if maneuver['open_loop'] else ''}"
 
 

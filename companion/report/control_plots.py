@@ -26,11 +26,11 @@ _STEPS_SHOWN = 6
 
 def control_plots(flight: FlightData) -> Iterator[Plot]:
     """The plots of control for one flight; one without curves is left out."""
-    found = [_steps(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
+    found = [_step_response(flight), _plane(flight), *_coefficients(flight), *_rates(flight)]
     yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
 
 
-def _steps(flight: FlightData) -> Plot:
+def _step_response(flight: FlightData) -> Plot:
     """The first doublet along its own direction, with the ideal and the nearest linear model."""
     if not flight.runs:
         return Plot("", "", [])
@@ -73,7 +73,7 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
             for name, which, colour in shown
             if which in flight.curves
         ]
-        layout = time_axis(flight, y="acceleration / thrust")
+        layout = time_axis([flight], y="acceleration / thrust")
         note = (
             "Horizontal acceleration per specific thrust: what guidance asks, what the tilt gives."
         )
@@ -87,7 +87,7 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
             for which, colour in (("commanded", REFERENCE), ("measured", MEASURED))
             if which in flight.curves
         ]
-        layout = time_axis(flight, y="rate, °/s")
+        layout = time_axis([flight], y="rate, °/s")
         note = "The measured rate follows the commanded one after dead time and lag of the vehicle."
         yield Plot(f"Body rate, {axis}", note, traces, layout, 240)
 
@@ -99,7 +99,7 @@ def _thrust(flight: FlightData) -> Plot:
     traces = [over_time("sent", curve, 0, MEASURED)]
     if curve.values.shape[1] > 1:
         traces.append(over_time("learned at hover", curve, 1, NEAREST, dash="dash"))
-    layout = time_axis(flight, y="thrust, 0..1")
+    layout = time_axis([flight], y="thrust, 0..1")
     return Plot("Thrust", "Normalised collective thrust.", traces, layout, 260)
 
 
@@ -108,6 +108,6 @@ def _latency(flight: FlightData) -> Plot:
     if curve is None or not curve.values.any():  # In virtual time there is no latency.
         return Plot("", "", [])
     traces = [over_time("latency", curve, 0, MEASURED)]
-    layout = time_axis(flight, y="latency, ms")
+    layout = time_axis([flight], y="latency, ms")
     note = "From the arrival of a sample to its setpoint, in this program."
     return Plot("Latency", note, traces, layout, 240)

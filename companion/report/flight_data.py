@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -90,7 +91,7 @@ def recorded(folder: Path) -> FlightData:
         curves={name: curve for name, curve in _curves(record).items() if len(curve.time)},
         figures=figures,
         provisional=provisional,
-        phases=_spans([(each.time, each.name) for each in record.phases], record.duration),
+        phases=spans([(each.time, each.name) for each in record.phases], record.duration),
         maneuvers=_maneuvers(record),
         events=tuple(each for each in record.events if each.source != "phase"),
         differences=_differences(folder),
@@ -99,15 +100,15 @@ def recorded(folder: Path) -> FlightData:
     )
 
 
-def _spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
+def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
     """Spans that follow each other; the last one ends at `end`."""
-    ends = [time for time, _ in begins[1:]] + [end]
-    return tuple(Span(time, until, name) for (time, name), until in zip(begins, ends, strict=True))
+    bounds = [*begins, (end, "")]
+    return tuple(Span(time, until, name) for (time, name), (until, _) in pairwise(bounds))
 
 
 def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
     marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
-    return tuple(span for span in _spans(marks, record.duration) if span.name)
+    return tuple(span for span in spans(marks, record.duration) if span.name)
 
 
 def _differences(folder: Path) -> tuple[Key, ...] | None:

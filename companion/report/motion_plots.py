@@ -78,7 +78,7 @@ def _height(flights: Sequence[FlightData]) -> Plot:
         if "motion" in flight.curves:
             name = _name(flights, flight, "height above home")
             traces.append(over_time(name, flight.curves["motion"], 0, _colour(flights, number)))
-    layout = time_axis(flights[0], y="height, m")
+    layout = time_axis(flights, y="height, m")
     return Plot("Height", "Height above home over the whole flight.", traces, layout)
 
 
@@ -88,7 +88,7 @@ def _error(flights: Sequence[FlightData]) -> Plot:
         if "error" in flight.curves:
             name = _name(flights, flight, "distance from the reference")
             traces.append(over_time(name, flight.curves["error"], 0, _colour(flights, number)))
-    layout = time_axis(flights[0], y="error, m")
+    layout = time_axis(flights, y="error, m")
     note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
     return Plot("Tracking error", note, traces, layout)
 
@@ -101,6 +101,6 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
             traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
             traces.append(over_time(tilt, motion, 2, colour, dash="dot", yaxis="y2"))
-    layout = time_axis(flights[0], y="speed, m/s", y2="tilt, °")
+    layout = time_axis(flights, y="speed, m/s", y2="tilt, °")
     layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}
     return Plot("Speed and tilt", "Solid: speed. Dotted: tilt.", traces, layout)

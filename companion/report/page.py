@@ -1,7 +1,8 @@
 """Makes the page of one flight, or of several beside each other: one HTML file, no network."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
+from companion.recording.flight_record import RecordError
 from companion.report import PAGE
 from companion.report.control_plots import control_plots
 from companion.report.flight_data import FlightData, recorded
@@ -46,10 +48,12 @@ def write_report(path: Path, out: Path | None = None) -> Path:
     flight = read(path)
     if out is None:
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
-    words = None if flight.figures is None else closing_words(flight.figures, None)
-    plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
-    tables = flight_tables(flight)
-    write_whole(out, _page(flight.name, words, [flight], tables, plots, configuration(flight)))
+    with _of_this_version(path):
+        words = None if flight.figures is None else closing_words(flight.figures, None)
+        plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
+        tables = flight_tables(flight)
+        page = _page(flight.name, words, [flight], tables, plots, configuration(flight))
+    write_whole(out, page)
     return out
 
 
@@ -62,9 +66,27 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     _require_extra()
     flights = [read(path) for path in paths]
     title = " and ".join(flight.name for flight in flights)
-    plots = list(motion_plots(flights))
-    write_whole(out, _page(title, None, flights, beside_each_other(flights), plots, None))
+    with _of_this_version(paths[0]):
+        plots = list(motion_plots(flights))
+        page = _page(title, None, flights, beside_each_other(flights), plots, None)
+    write_whole(out, page)
     return out
+
+
+@contextmanager
+def _of_this_version(path: Path) -> Iterator[None]:
+    """Turn the errors of figures that this version does not write into one for the user.
+
+    Raises:
+        RecordError: a figure is missing or of another type.
+    """
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise RecordError(
+            f"{path}: not as this version records a flight ({error!r}); without its summary.json "
+            "the figures are measured again"
+        ) from error
 
 
 def _require_extra() -> None:

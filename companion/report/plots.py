@@ -3,6 +3,7 @@
 The colours can be told apart by the colour-blind.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -93,12 +94,13 @@ def axes(**titles: str) -> dict[str, Any]:
     }
 
 
-def time_axis(flight: FlightData, **titles: str) -> dict[str, Any]:
-    """Layout of a plot over the whole flight: its axes, and the maneuvers shaded and named."""
+def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
+    """Layout of a plot over whole flights; the maneuvers of a single flight are shaded."""
     layout = axes(x="time, s", **titles)
-    if flight.phases:
-        layout["xaxis"]["range"] = [0.0, flight.phases[-1].end]
-    return {**layout, **_shaded(flight.maneuvers)}
+    ends = [flight.phases[-1].end for flight in flights if flight.phases]
+    if ends:
+        layout["xaxis"]["range"] = [0.0, max(ends)]
+    return {**layout, **_shaded(flights[0].maneuvers)} if len(flights) == 1 else layout
 
 
 def _shaded(spans: tuple[Span, ...]) -> dict[str, Any]:

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from companion.attitude import coefficients
+from companion.attitude.representation import is_unit
 from companion.mavlink.errors import LogError
 from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
 from companion.recording.flight_record import Event
-from companion.report.flight_data import Curve, FlightData, Floats, Span
+from companion.report.flight_data import Curve, FlightData, Floats, Span, spans
 from companion.vehicle.flight_log import read_flight_log
 from companion.vehicle.registry import BY_NUMBER
 
@@ -99,7 +100,10 @@ class _Reader:
         if kind == "ATTITUDE":
             tilt = np.arccos(np.cos(message.roll) * np.cos(message.pitch))
         else:
-            c = coefficients((message.q1, message.q2, message.q3, message.q4))
+            q = message.q1, message.q2, message.q3, message.q4
+            if not is_unit(q):
+                return
+            c = coefficients(q)
             self._attitudes.append((self._now, c.north, c.east))
             tilt = np.arcsin(min(np.hypot(c.north, c.east), 1.0))
         self._tilts.append((self._now, float(np.degrees(tilt))))
@@ -112,10 +116,7 @@ class _Reader:
 
     def modes(self) -> tuple[Span, ...]:
         """The autopilot's modes, in order."""
-        ends = [time for time, _ in self._modes[1:]] + [self._now]
-        return tuple(
-            Span(*mode[:1], end, mode[1]) for mode, end in zip(self._modes, ends, strict=True)
-        )
+        return spans(self._modes, self._now)
 
     def curves(self) -> dict[str, Curve]:
         """Attitude and position, as in `FlightData.curves`."""

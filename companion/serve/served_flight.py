@@ -2,10 +2,12 @@
 
 import asyncio
 from collections.abc import Coroutine
+from math import atan2, degrees
 from typing import Any, NamedTuple
 
 from companion.attitude.representation import heading
 from companion.config import Config
+from companion.config.in_flight import differences
 from companion.flight.assembly import assemble
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
@@ -13,6 +15,7 @@ from companion.flight.environment import Environment
 from companion.flight.observer import Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
+from companion.guidance import GRAVITY
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.summary import Summary
@@ -34,6 +37,10 @@ REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 _PROGRESS_PERIOD = 0.4
 """A client that asked for control is told so often that the takeover goes on, s."""
 _LOOK_PERIOD = 0.05
+_MOTION_LIMITS = frozenset(
+    {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
+)
+"""Limits of `CommandedMotion`, which takes them at the takeover."""
 _VALUES_PERIOD = 0.5
 
 
@@ -82,6 +89,7 @@ class ServedFlight:
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
         self._link, self._component, self._ownership = link, component, ownership
+        self._changes = changes
         self._environment = environment
         self._clock = asyncio.get_running_loop().time
         settings = link.settings
@@ -124,7 +132,8 @@ class ServedFlight:
 
     async def run(self, asked: Asked | None) -> bool:
         """Fly; returns whether control had begun."""
-        with self._records.recording(self._record):
+        limited = self._changes.limited_by(_refusal_in_control)
+        with self._records.recording(self._record), limited:
             result = "left at once"
             self._record.begin_counting(self._link.stats)
             try:
@@ -205,6 +214,24 @@ class ServedFlight:
     def _heading(self) -> float:
         """The vehicle's heading without the jumps of estimator resets, rad."""
         return heading(self._assembled.context.guidance_loop.attitude())
+
+
+def _refusal_in_control(before: Config, after: Config) -> str | None:
+    """Why a change is refused while a client is in control: its motions are planned already.
+
+    Their limits are those at the takeover. With lower ones in the loops, the reference would run
+    away from the vehicle.
+    """
+    names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
+    if names:
+        return f"{', '.join(sorted(names))} must not change while a client is in control"
+    needed = atan2(after.serve.max_acceleration_m_s2, GRAVITY)
+    if after.limits.max_tilt < min(needed, before.limits.max_tilt):
+        return (
+            f"limits.max_tilt_deg {after.limits.max_tilt_deg:g} is less than the "
+            f"{degrees(needed):.1f}° that serve.max_acceleration_m_s2 needs"
+        )
+    return None
 
 
 def _motion(config: Config) -> CommandedMotion:

@@ -47,7 +47,7 @@ class Disturbances:
     shake: float = 0.02
     position_noise: float = 0.003
     velocity_noise: float = 0.005
-    source: str = "usual ones of PX4 and ArduPilot"
+    source: str = "usual ones of a multirotor"
 
 
 class Errors(NamedTuple):

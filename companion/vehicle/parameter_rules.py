@@ -52,7 +52,7 @@ class CheckResult(Enum):
     INEFFECTIVE = "ineffective"
     """The flight does not do what is commanded, or a protection has no effect."""
     NOT_READY = "not_ready"
-    """Only because the vehicle is not ready to arm yet."""
+    """The check fails only because the vehicle is not ready to arm yet."""
     NOT_CONNECTED = "not_connected"
     """No vehicle answers, so nothing was checked."""
 

@@ -37,7 +37,7 @@ class Estimate(NamedTuple):
 
 
 class SensorLaw(NamedTuple):
-    """Constants of the estimate."""
+    """Constants of the simulated estimator: its delays, errors and noise."""
 
     gravity: float  # m/s^2
     attitude_delay: int  # steps

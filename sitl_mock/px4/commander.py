@@ -116,7 +116,7 @@ class Px4Commander:
         return ACCEPTED
 
     def land(self) -> int:
-        """Land here, and return a MAV_RESULT; PX4 announces this, but not a change to LAND."""
+        """Land here; return a MAV_RESULT. PX4 sends a text for this command, not for the mode."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
             self._announce(EventKind.LANDING_COMMANDED, "")
@@ -160,9 +160,9 @@ class Px4Commander:
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self._problem()
-        self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._at_sticks)
+        self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present)
         self._watch_sticks()
-        self.failsafe.step(pilot=self._at_sticks)
+        self.failsafe.step(pilot=self._pilot_present)
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
@@ -174,13 +174,13 @@ class Px4Commander:
         self._publish_status()
 
     @property
-    def _at_sticks(self) -> bool:
+    def _pilot_present(self) -> bool:
         """Whether a pilot holds the sticks, by fault injection or by MANUAL_CONTROL."""
         return self.pilot or self._sticks.present(self._state.time_us)
 
     def _problem(self) -> str | None:
         return self._checks.problem(
-            gcs_alive=self.failsafe.gcs_alive, pilot=self._at_sticks, refusal=self.refusal
+            gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present, refusal=self.refusal
         )
 
     def _watch_sticks(self) -> None:
@@ -221,7 +221,7 @@ class Px4Commander:
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
             return self._checks.offboard_alive
-        if mode in PILOTED and not self._at_sticks:
+        if mode in PILOTED and not self._pilot_present:
             return False
         return self._state.position_valid or mode not in NEEDS_POSITION
 

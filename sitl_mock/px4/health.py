@@ -15,7 +15,7 @@ _CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
 
 _ALL_MODES = 0xFFFFFFFF
 _ARMABLE = 0x807F7AB0
-"""Modes that can be armed without a failing check and without a pilot, one bit each."""
+"""Bit mask of the modes in which PX4 arms without a transmitter, if no check fails."""
 _PRESENT = 0x38020D02
 _GPS_PRESENT = 1 << 3
 _GCS_PRESENT = 1 << 12

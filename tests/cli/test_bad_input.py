@@ -204,7 +204,7 @@ def test_what_realtime_requires_and_is_refused_is_named_and_nothing_is_flown(cap
 def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):
     code, _, err = run(capsys, "plot", tmp_path)
     assert code == 2
-    assert "no flight with anything to draw is recorded there" in err
+    assert "is this the folder of a flight?" in err
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ QUICK_PARAMETERS = {
 }
 QUICK_FLIGHT = {
     "flight": {"arm": True, "takeoff_height_m": 2.0, "maneuvers": ["hover"]},
-    "hover": {"duration_s": 5.0},
+    "hover": {"duration_s": 3.0},
     "guidance": {"drag_per_s": 1.0},
     "thrust": {"hover_thrust": 0.49},
 }

@@ -150,7 +150,7 @@ def test_a_mode_that_is_not_told_any_more_lets_the_vehicle_go(tmp_path):
     fault = {"kind": "stop_telemetry", "messages": silent, "after_offboard_s": 2.0}
     takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "after_offboard_s": 2.5}
     with mock_vehicle(tmp_path, faults=[fault, takeover]) as mock:
-        summary = fly(mock, tmp_path / "log")
+        summary = fly(mock, tmp_path / "log", hover={"duration_s": 5.0})
         assert mock.state()["mode"] == "POSCTL"
     assert "no heartbeat" in summary.result
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")

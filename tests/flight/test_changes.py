@@ -38,6 +38,14 @@ BAD = {
     "section without keys": {"mock": {"autopilot": "px4"}},
     "more than at the start": {"limits": {"max_tilt_deg": 36.0}},
     "good beside bad": {"planner": {"gain_per_s": 4.0}, "limits": {"max_thrust": 0.8}},
+    "more than threefold": {"planner": {"gain_per_s": 15.5}},
+    "less than a third": {"guidance": {"position_weight_per_s4": 5.0}},
+    "bandwidth from null": {"guidance": {"disturbance_bandwidth_rad_s": 4.0}},
+    "no height gain": {"guidance": {"height_gain_per_s": 0.0}},
+    "no climb gain": {"guidance": {"climb_gain_per_s": 0.0}},
+    "no yaw gain": {"planner": {"yaw_gain_per_s": 0.0}},
+    "hardly any tilt": {"limits": {"max_tilt_deg": 4.0}},
+    "hardly any tilt rate": {"limits": {"max_tilt_rate_deg_s": 15.0}},
     "the same again": {"limits": {"max_tilt_deg": 35.0}},
     "nothing": {},
 }
@@ -76,6 +84,31 @@ def test_with_predictive_control_nothing_changes(section, key, value):
         Changes(start).change({"limits": {"max_climb_m_s": 1.0}}, "a test")
 
 
+@pytest.mark.parametrize(
+    "key", ["position_weight_per_s4", "velocity_weight_per_s2", "disturbance_bandwidth_rad_s"]
+)
+def test_values_that_identify_does_not_use_are_refused(key):
+    start = changed(
+        Config(),
+        {"flight": {"maneuvers": ["identify"]}, "guidance": {"disturbance_bandwidth_rad_s": 4.0}},
+        "test",
+    )
+    with pytest.raises(ChangeRefusedError, match=f"{key} has no effect while .*identify"):
+        Changes(start).change({"guidance": {key: 5.0}}, "a test")
+
+
+@pytest.mark.parametrize("fault", [ValueError("fault"), OverflowError("fault")])
+def test_a_change_without_gains_is_refused(fault, monkeypatch):
+    def tuning(_):
+        raise fault
+
+    monkeypatch.setattr("companion.flight.changes.tuning", tuning)
+    changes = Changes(Config())
+    with pytest.raises(ChangeRefusedError, match="a test: fault; nothing has changed"):
+        changes.change({"planner": {"gain_per_s": 4.0}}, "a test")
+    assert not changes.made
+
+
 def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():
     before = Config()
     after = changed(before, {"guidance": {"position_weight_per_s4": 1000.0}}, "test")
@@ -109,7 +142,7 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
     values = {
         "limits": {"max_tilt_deg": 20.0, "max_tilt_rate_deg_s": 60.0},
         "planner": {"gain_per_s": 4.0},
-        "guidance": {"position_weight_per_s4": 30.0},
+        "guidance": {"position_weight_per_s4": 150.0},
     }
 
     async def fly(session):
@@ -151,6 +184,6 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
     told = json.loads((tmp_path / "summary.json").read_text())
     assert [change["by"] for change in told["changes"]] == ["a test"] * 2
     assert told["changes"][0]["keys"]["limits.max_tilt_deg"] == [35.0, 20.0]
-    assert told["changes"][1]["keys"]["guidance.position_weight_per_s4"] == [30.0, None]
+    assert told["changes"][1]["keys"]["guidance.position_weight_per_s4"] == [150.0, None]
     assert set(texts) <= {event["text"] for event in told["events"]}
     assert told["tracking"]["position_max_m"] < 0.1

@@ -111,7 +111,7 @@ FAULTS = [
 )
 def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes, latest):
     with mock_vehicle(tmp_path, faults=[{**fault, **CONTROL}]) as mock:
-        summary = fly(mock, tmp_path / "log")
+        summary = fly(mock, tmp_path / "log", hover={"duration_s": 5.0})
         assert words in summary.result, summary.events
         assert summary.phase == "maneuvers"
         # Where nothing is heard nothing is commanded: the autopilot's own failsafe comes by itself.

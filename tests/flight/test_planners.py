@@ -19,7 +19,7 @@ from companion.attitude import (
     make_planner,
 )
 from companion.config.files import load
-from companion.flight import assembly
+from companion.control import inner_loop
 from companion.mavlink import loop
 from tests.flight import sockets
 from tests.flight.fly import fly, mock_vehicle
@@ -212,7 +212,7 @@ def test_the_yaml_gives_model_following_the_vehicles_response(tmp_path):
         yaw_acceleration=math.radians(200),
         frame_lead=0.05,
     )
-    planner = assembly.planner(load(path))
+    planner = inner_loop.planner(load(path))
     for _ in range(30):
         assert planner.rates(q, target, 0.01, rates) == expected.rates(q, target, 0.01, rates)
 
@@ -240,7 +240,7 @@ def test_the_yaml_makes_the_planner_it_names(name, tmp_path):
         "limits: {max_tilt_deg: 40, max_tilt_rate_deg_s: 80, max_yaw_rate_deg_s: 50,\n"
         "  rate_limit: paper, recovery_angle_deg: 70}\n"
     )
-    planner = assembly.planner(load(path))
+    planner = inner_loop.planner(load(path))
     limits = Limits(*(math.radians(angle) for angle in (40, 80, 50)), shape="paper")
     expected = make_planner(name, 4.0, 1.5, limits, recovery_angle=math.radians(70))
     assert planner.law is expected.law

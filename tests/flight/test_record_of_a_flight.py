@@ -120,12 +120,12 @@ def test_the_state_is_shown_in_every_phase(good):
     shown = {state.phase for state in observer.states}
     assert {"checks", "takeoff", "maneuvers", "land"} <= shown
     flying = [state for state in observer.states if state.maneuver == "hover"]
-    assert len(flying) == pytest.approx(10, abs=2)
+    assert len(flying) == pytest.approx(20, abs=3)
     assert all(state.monitored and state.alarms == () for state in flying)
     assert flying[-1].rate == pytest.approx(250.0, rel=0.05)
     assert {state.latency for state in observer.states} == {None}  # in lockstep
     times = [state.time for state in observer.states]
-    assert np.diff(times) == pytest.approx(0.2, abs=0.05)
+    assert np.diff(times) == pytest.approx(0.1, abs=0.05)
 
 
 def test_a_flight_that_a_monitor_ends_says_when_where_and_why(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed
 from companion.flight.assembly import assemble, link_settings
-from companion.flight.observer import Silent
+from companion.flight.observer import EventRecorder, Silent
 from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.guidance import Reference
@@ -48,8 +48,9 @@ def taken_over(mock, source, program=None):
 
     async def main():
         async with Link(link_settings(config), opener=open_wire) as link:
+            recorder = EventRecorder(Silent(), asyncio.get_running_loop().time, lambda _: None)
             assembled = assemble(
-                config, link, Silent(), None, None, TakeoverPlan(source), environment
+                config, link, recorder, None, None, TakeoverPlan(source), environment
             )
             with connected(link, assembled):
                 flight = asyncio.ensure_future(assembled.flight.run())

@@ -5,8 +5,10 @@ import time
 
 import pytest
 
+from companion.config import Config
 from companion.config.files import load
-from companion.live.channel import Channel
+from companion.live import helper_process
+from companion.live.channel import Channel, NoAnswerError
 from companion.live.helper import Helper, Wishes
 from tests.live.pages import status
 
@@ -38,7 +40,7 @@ def test_a_message_that_is_too_large_is_dropped():
 def test_edits_of_the_file_reach_the_flight(tmp_path):
     path = tmp_path / "flown.yaml"
     path.write_text("planner: {gain_per_s: 5.0}\n")
-    helper = Helper(Wishes(path, None, True, None), load(path))
+    helper = Helper(Wishes(path, load(path), None, True, None), load(path))
     notes = []
     helper.note = helper.changes.note = notes.append
 
@@ -63,3 +65,21 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
     ]
     helper.close("over")
     assert helper._process.wait(30.0) == 0
+
+
+def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
+    monkeypatch.setattr(helper_process, "_ANSWER", 0.02)
+
+    async def ask():
+        ours, theirs = Channel.pair()
+        first = {"config": Config().model_dump(mode="json"), "follows": False}
+        relay = helper_process.Relay(Channel(theirs), first)
+        try:
+            with pytest.raises(NoAnswerError, match="it may have been applied"):
+                await relay.ask({"kind": "undo"})
+        finally:
+            asyncio.get_running_loop().remove_reader(theirs.fileno())
+            theirs.close()
+            ours.close()
+
+    asyncio.run(ask())

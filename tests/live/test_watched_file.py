@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from companion.config.files import load
-from companion.files.yaml_file import ConfigError
 from companion.live.checks import ChangeChecks
 from companion.live.watched_file import WatchedFile
 
@@ -88,7 +87,7 @@ def watched(tmp_path: Path):
     (tmp_path / "base.yaml").write_text(BASE)
     path.write_text(GOOD)
     checks = ChangeChecks(load(path), follows=True)
-    return path, WatchedFile(path, checks.check), checks
+    return path, WatchedFile(path, load(path), checks.check), checks
 
 
 def _looked(watch):
@@ -137,8 +136,24 @@ def test_a_file_that_is_being_written_is_left_alone(watched):
     assert _looked(watch) is None
 
 
-def test_a_file_that_is_not_good_at_the_start_is_not_watched(tmp_path):
-    path = tmp_path / "bad.yaml"
+def test_an_edit_made_before_the_watch_begins_is_the_first_edit(tmp_path):
+    path = tmp_path / "watched.yaml"
+    path.write_text("planner: {gain_per_s: 5.0}\n")
+    read = load(path)
+    path.write_text("planner: {gain_per_s: 4.0}\n")
+    watch = WatchedFile(path, read, lambda *_: None)
+    assert _looked(watch).values == {"planner": {"gain_per_s": 4.0}}
     path.write_text("limits: [")
-    with pytest.raises(ConfigError):
-        WatchedFile(path, lambda *_: None)
+    assert _looked(watch).refusal is not None
+
+
+def test_an_edit_of_a_nested_include_counts_also_where_it_was_missing(watched):
+    path, watch, _ = watched
+    assert _looked(watch) is None
+    path.with_name("base.yaml").write_text(f"include: deep.yaml\n{BASE}")
+    assert "deep.yaml" in _looked(watch).refusal
+    path.with_name("deep.yaml").write_text("planner: {yaw_gain_per_s: 2.5}\n")
+    assert _looked(watch).values == {"planner": {"yaw_gain_per_s": 2.5}}
+    watch.accept()
+    path.with_name("deep.yaml").write_text("planner: {yaw_gain_per_s: 1.5}\n")
+    assert _looked(watch).values == {"planner": {"yaw_gain_per_s": 1.5}}

@@ -124,6 +124,12 @@ def test_what_cannot_be_shown_is_one_sentence(tmp_path, capsys, monkeypatch):
     assert "mavlink-companion[report]" in capsys.readouterr().err
 
 
+def test_a_summary_of_another_version_is_one_sentence(copied, capsys):
+    (copied / "summary.json").write_text('{"result": "ok"}')
+    assert main(["report", str(copied)]) == 2
+    assert "without its summary.json" in capsys.readouterr().err
+
+
 def test_text_of_a_log_cannot_become_a_tag():
     assert "</script>" not in page._script_safe({"text": "</script><script>alert(1)"})
 

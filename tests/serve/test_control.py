@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config.files import load
+from companion.flight.changes import ChangeRefusedError
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay
 from tests.serve.virtual import (
@@ -142,8 +143,13 @@ def test_a_station_wins_over_a_client_and_its_stream_is_not_obeyed_any_more(auto
         begin = place(session)
         await begin_control(session, script, autopilot, lambda _: script.local(ALL, begin))
         land = {"px4": (176, 1, 4, 6), "ardupilot": (176, 1, 9)}[autopilot]
+        slower, flat = {"limits": {"max_climb_m_s": 1.0}}, {"limits": {"max_tilt_deg": 16.0}}
+        for values, told in ((slower, "while a client is in control"), (flat, "serve.max_accel")):
+            with pytest.raises(ChangeRefusedError, match=told):
+                session.changes.change(values, "a test")
         ground.command(*land)
         await stream(1.5, lambda _: script.local(ALL, begin))
+        session.changes.change(slower, "a test")  # nobody is in control
         assert vehicle.state()["mode"] == {"px4": "LAND", "ardupilot": "LAND"}[autopilot]
         assert not session.control.in_control
         count = len(vehicle.setpoints)

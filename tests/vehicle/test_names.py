@@ -8,8 +8,8 @@ COMPANION = Path(__file__).parents[2] / "companion"
 NAMED = re.compile(r"px4|ardupilot(?!mega)", re.IGNORECASE)
 """pymavlink calls its dialect ardupilotmega, whatever autopilot one speaks to."""
 MAY_NAME = ("vehicle/px4", "vehicle/ardupilot", "vehicle/registry.py")
-TEXTS = ("study", "bench", "cli", "demo.py", "testing")
-"""Rooms whose texts tell a user of autopilots; nothing there decides anything by their names."""
+TEXTS = ("study", "bench", "cli", "demo.py", "report", "testing", "tuning/flights.py")
+"""Rooms whose texts tell a user of autopilots, or that fly a mock vehicle by its name."""
 
 
 def names_in(source):

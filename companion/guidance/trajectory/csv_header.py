@@ -38,7 +38,7 @@ def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
 
     Args:
         reader: a reader of the `csv` module.
-        frames: receives the frames that comments before the header name.
+        frames: receives the name of each frame in comments before the header.
     """
     header = True
     for row in reader:

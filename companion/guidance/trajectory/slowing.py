@@ -42,7 +42,7 @@ _EVEN_MOMENTS = 8000
 _SHORTEST_STEP = 0.006
 """Shortest step between evenly spaced moments, s."""
 _MOMENTS_A_PIECE = 8.0
-"""Fewest moments in a piece of the slowness; they do not miss an extreme of its ramps."""
+"""Fewest moments in each piece of the slowness; fewer could miss the extreme of a ramp."""
 _GAP = 3.0
 """Ratio of a gap between check times to the usual gap from which moments are filled in."""
 _WORTH = 0.98
@@ -239,7 +239,7 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
 
 
 def _limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """The limit that is exceeded most at some moments at the old speed; the fence if none is."""
+    """The limit that `moments` exceed most at the original speed; the fence if they exceed none."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

@@ -73,7 +73,7 @@ class Guard:
         )
 
     def _with_cookie(self, send: Send) -> Send:
-        """`send` that lets the browser watch from now on."""
+        """`send`, with a cookie added to the response that allows this browser to watch."""
         cookie = f"{_COOKIE}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
 
         async def sending(message: MutableMapping[str, Any]) -> None:

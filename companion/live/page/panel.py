@@ -10,6 +10,7 @@ from companion.config.in_flight import shown
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
+from companion.live.channel import NoAnswerError
 from companion.live.helper_process import Relay
 from companion.live.page.guard import Guard
 from companion.live.page.store import Store
@@ -88,6 +89,8 @@ class Panel:
             self._say(await request)
         except (ConfigError, ChangeRefusedError) as refused:
             self._say(f"refused: {refused}")
+        except NoAnswerError as error:
+            self._say(str(error))
 
     async def _save(self) -> None:
         """Give the changed values to the browser, and write them into the flight's folder."""

@@ -53,7 +53,7 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
     def watched() -> bool:
         return any(client.has_socket_connection for client in Client.instances.values())
 
-    async with _leaves_on_request(int(relay.first["port"])) as asked:
+    async with _leave_request(int(relay.first["port"])) as asked:
         quiet = 0.0
         for _ in range(int(_LONGEST)):
             quiet = 0.0 if watched() else quiet + 1.0
@@ -69,8 +69,8 @@ async def _serve(relay: Relay, listening: socket.socket) -> None:
 
 
 @asynccontextmanager
-async def _leaves_on_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
-    """An event that the next flight sets, if it is of the same user and wants the port."""
+async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
+    """Yield an event; the next flight of the same user sets it when it wants the port."""
     asked = asyncio.Event()
 
     async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

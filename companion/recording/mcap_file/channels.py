@@ -179,7 +179,7 @@ INPUT = Channel(
 )
 ATTITUDE_TARGET = Channel(
     "/attitude_target",
-    "A new ATTITUDE_TARGET of an autopilot that takes body rates along its axes (ArduPilot).",
+    "A new ATTITUDE_TARGET of an autopilot that takes body rates along its axes.",
     (
         Field("time_boot_ms", "The vehicle's stamp as received, ms."),
         *(Field(f"q_{part}", "Attitude target, body FRD to world NED.") for part in "wxyz"),

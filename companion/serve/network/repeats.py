@@ -24,7 +24,7 @@ class Repeats:
         self._older: set[bytes] = set()
         self._since = clock()
 
-    def came(self, raw: bytes) -> bool:
+    def is_repeat(self, raw: bytes) -> bool:
         """Whether these bytes came just before; remembers them."""
         age = self._clock() - self._since
         if age > _WITHIN or len(self._newer) >= _MOST // 2:

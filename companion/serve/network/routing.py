@@ -115,7 +115,7 @@ class Routing:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
         if source != self._autopilot:  # another component, or a station behind the autopilot
-            if source == self._own or self._repeats.came(frame.raw):
+            if source == self._own or self._repeats.is_repeat(frame.raw):
                 self.stats.looped += 1
                 return
             self._heard[self._vehicle].add(source)
@@ -137,7 +137,7 @@ class Routing:
         if (
             source in (self._autopilot, self._own)
             or client not in self._heard
-            or self._repeats.came(frame.raw)
+            or self._repeats.is_repeat(frame.raw)
         ):
             self.stats.looped += 1
             return

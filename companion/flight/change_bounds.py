@@ -1,0 +1,69 @@
+"""Bounds of a change in flight, beside the types and ranges of the keys."""
+
+from math import inf
+
+from companion.config import Config
+from companion.config.in_flight import Difference, changeable, differences, shown
+from companion.control.hold_settings import flies_identify
+from companion.control.retuning import value_in_effect
+from companion.files.yaml_file import ConfigError
+
+LARGEST_FACTOR = 3.0
+"""A change may multiply or divide a value by this at most."""
+_LEAST = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
+"""With less tilt or tilt rate the vehicle cannot hold its position in wind."""
+_NEVER_ZERO = frozenset(
+    {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
+)
+"""Gains without which nothing controls yaw or height."""
+_BANDWIDTH = "guidance.disturbance_bandwidth_rad_s"
+_WITHOUT_EFFECT = frozenset(
+    {"guidance.position_weight_per_s4", "guidance.velocity_weight_per_s2", _BANDWIDTH}
+)
+"""`identify` flies with its own weights and bandwidth."""
+
+
+def require_moderate(before: Config, after: Config, name: str) -> None:
+    """Check that a change is not too large for a vehicle in the air.
+
+    Args:
+        before: the configuration now.
+        after: the wanted one; it differs in keys that may change in flight.
+        name: names the change in error messages.
+
+    Raises:
+        ConfigError: a value changes by more than `LARGEST_FACTOR`, becomes too small to control
+            the vehicle, or cannot change in this flight.
+        ValueError: no weights follow from the configuration.
+    """
+    for each in differences(before, after):
+        if (each.section, each.key) not in changeable():
+            continue  # such as `include`, which is no value
+        why = _why_not(before, after, each)
+        if why is not None:
+            raise ConfigError(f"{name}: {why}")
+
+
+def _why_not(before: Config, after: Config, change: Difference) -> str | None:
+    """Why a key must not change so, as a sentence; None: it may."""
+    key = change.name
+    if key in _WITHOUT_EFFECT and flies_identify(before):
+        return f"{key} has no effect while the maneuver `identify` is flown"
+    if key == _BANDWIDTH and None in (change.before, change.after):
+        return (
+            f"{key} must not change between null and a number in flight; begin the next flight "
+            "with a number to change it in flight"
+        )
+    if key in _NEVER_ZERO and change.after == 0.0:
+        return f"{key} must not become 0 in flight"
+    if key in _LEAST and change.after < _LEAST[key]:
+        return f"{key} {shown(change.after)} is less than {_LEAST[key]:g}, the least in flight"
+    old = value_in_effect(before, change, change.before)
+    new = value_in_effect(after, change, change.after)
+    low, high = min(old, new), max(old, new)
+    if (high / low if low > 0.0 else inf) > LARGEST_FACTOR * (1.0 + 1e-9):
+        return (
+            f"{key} from {old:g} to {new:g} is more than a factor of {LARGEST_FACTOR:g}; change it "
+            "in several smaller steps"
+        )
+    return None

@@ -1,0 +1,73 @@
+"""The helper's checks of a change: stability margins, and the trajectory that is flown."""
+
+import pytest
+
+from companion.config import Config
+from companion.config.files import changed, load, shipped
+from companion.files.yaml_file import ConfigError
+from companion.live.checks import ChangeChecks
+from companion.serve.served_flight import _refusal_in_control
+
+
+def _after(start, *values):
+    """Checks of a flight in which these changes were made."""
+    checks = ChangeChecks(start, follows=False)
+    for each in values:
+        checks.check(each, "a test")
+        checks.now = changed(checks.now, each, "a test")
+    return checks
+
+
+def test_margins_are_kept():
+    px4 = load(shipped("px4.yaml"))
+    gain = {"planner": {"gain_per_s": 11.0}}
+    with pytest.raises(
+        ConfigError, match=r"keeps margins of .* only; .* must keep 4\.0 dB and 20°"
+    ):
+        ChangeChecks(px4, follows=False).check(gain, "a test")
+    checks = ChangeChecks(px4, follows=False)
+    checks.now = changed(px4, {"planner": {"gain_per_s": 12.0}}, "a test")
+    with pytest.raises(ConfigError, match="the control loop is unstable"):
+        checks.check({"planner": {"gain_per_s": 20.0}}, "a test")
+    with pytest.raises(ConfigError, match=r"position_weight_per_s4 .* more than a factor of 3"):
+        ChangeChecks(px4, follows=False).check(
+            {"guidance": {"position_weight_per_s4": 10000.0}}, "a test"
+        )
+    small = {"planner": {"gain_per_s": 4.5}}, {"planner": {"gain_per_s": 3.5}}
+    assert _after(px4, *small).now.planner.gain_per_s == 3.5
+
+
+def test_a_loop_that_began_with_less_keeps_what_it_had():
+    start = Config()  # no vehicle is identified: 14° for a heavy one
+    with pytest.raises(ConfigError, match=r"must keep 4\.0 dB and 14°"):
+        _after(start, {"planner": {"gain_per_s": 5.5}})
+    _after(start, {"limits": {"max_climb_m_s": 1.0}}, {"planner": {"gain_per_s": 4.0}})
+
+
+def test_a_slowed_trajectory_is_judged_as_it_is_flown(tmp_path):
+    path = tmp_path / "line.csv"
+    path.write_text(
+        "t,x,y,z\n"
+        + "".join(f"{k / 10},{4 * (k / 30) ** 2 * (3 - k / 15)},0,0\n" for k in range(31))
+    )
+    start = changed(
+        Config(),
+        {
+            "flight": {"maneuvers": ["trajectory"], "trajectory": str(path), "slow_down": True},
+            "limits": {"max_tilt_deg": 15.0},
+        },
+        "a test",
+    )
+    checks = ChangeChecks(start, follows=True)
+    path.unlink()  # it is not read again
+    checks.check({"limits": {"max_climb_m_s": 1.0}}, "a test")
+    with pytest.raises(ConfigError, match="it is flown as it was when it began"):
+        checks.check({"limits": {"max_tilt_deg": 6.0}}, "a test")
+
+
+@pytest.mark.parametrize("key", ["max_climb_m_s", "max_descent_m_s", "max_yaw_rate_deg_s"])
+def test_limits_of_a_clients_motion_stay_while_it_is_in_control(key):
+    before = Config()
+    after = changed(before, {"limits": {key: 0.5 * getattr(before.limits, key)}}, "a test")
+    told = _refusal_in_control(before, after)
+    assert told == f"limits.{key} must not change while a client is in control"
