@@ -18,7 +18,7 @@ from companion.serve.control import ServedControl
 from companion.serve.flight_records import FlightRecords
 from companion.serve.mode_requests import asks_for_control, starves_control
 from companion.serve.network.network import Network
-from companion.vehicle.px4 import PX4
+from companion.vehicle.px4.autopilot import Px4
 
 
 def command(number, *parameters):
@@ -28,8 +28,8 @@ def command(number, *parameters):
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_a_number_that_is_none_asks_for_nothing(number):
-    assert asks_for_control(command(176, 1.0, 6.0, 0.0), PX4)
-    assert not asks_for_control(command(176, number, 6.0, 0.0), PX4)
+    assert asks_for_control(command(176, 1.0, 6.0, 0.0), Px4())
+    assert not asks_for_control(command(176, number, 6.0, 0.0), Px4())
     assert starves_control(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
     assert not starves_control(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
 
