@@ -43,8 +43,8 @@ def tune(options: argparse.Namespace) -> int:
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _flights(proposal, console)
-    include = _relative(vehicle, output) if included else None
-    write_whole(output, proposal_text(proposal, include, flights, source.name))
+    known = _relative(vehicle, output) if included else _vehicle_of(proposal.tuned)
+    write_whole(output, proposal_text(proposal, known, flights, source.name))
     load(output)
     console.print("\n".join(summary_lines(proposal, flights)))
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
@@ -114,6 +114,12 @@ def _flyable(config: Config) -> Config:
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )
+
+
+def _vehicle_of(config: Config) -> dict[str, Any]:
+    """The section `vehicle` of a flight without a vehicle file; its values that are not null."""
+    values = config.vehicle.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
+    return {"vehicle": values}
 
 
 def _relative(vehicle: Path, output: Path) -> Path:

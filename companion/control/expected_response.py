@@ -1,17 +1,14 @@
 """Predicts the step response of a configuration, and finds which setting or delay limits it."""
 
 from dataclasses import dataclass, replace
-from math import asin, degrees, hypot
+from math import asin, degrees, hypot, inf
 
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.reference_model import rates_along
 from companion.config import Config
 from companion.control.hold_settings import attitude_delay, hold_gains, hold_weights
-from companion.control.inner_loop import slower_tilt, tilt_response
+from companion.control.inner_loop import LARGEST_PRODUCT, sensible_gain, tilt_response
 from companion.guidance import InnerResponse
-
-LARGEST_PRODUCT = 0.45
-"""Largest sensible gain · (lag + dead time); above it, a higher gain is hardly quicker."""
 
 _NOTICEABLE = 0.99
 """A change is reported if it reduces the time constant to less than this share."""
@@ -86,15 +83,13 @@ def expected_response(config: Config) -> ExpectedResponse:
         _RATE: response.step_time(step),
         **_without_the_vehicle(config, response, speed),
     }
-    lag, dead_time = slower_tilt(config)
-    delay = lag + dead_time
-    known = config.vehicle.known and delay > 0.0
+    quickest = sensible_gain(config)
     return ExpectedResponse(
         config.steps.coefficient,
         response.step_time(step, speed),
         otherwise,
         config.planner.gain_per_s,
-        LARGEST_PRODUCT / delay if known else None,
+        None if quickest == inf else quickest,
     )
 
 

@@ -4,7 +4,7 @@ from math import inf
 
 from companion.config import Config
 from companion.config.known_drag import drag_prior
-from companion.control.inner_loop import slower_tilt, tilt_response
+from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_response
 from companion.guidance import ObserverSettings, Weights, chain_gains
 from companion.guidance.feedback import ChainGains
 from companion.guidance.position_correction import CorrectionSettings
@@ -118,8 +118,13 @@ def disturbance_bandwidth(config: Config) -> float:
 
 
 def attitude_delay(config: Config) -> float:
-    """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified."""
-    delay = feedback_delay(config)
+    """The delay T of `hold_weights`, s; a usual rate loop is assumed if none is identified.
+
+    A gain above the largest sensible one counts as that one: it hardly makes the attitude quicker,
+    and a stiffer hold would swing.
+    """
+    excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
+    delay = feedback_delay(config) + max(0.0, excess)
     return delay if config.vehicle.known else delay + _USUAL_RATE_LOOP
 
 

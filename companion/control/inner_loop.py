@@ -1,5 +1,6 @@
 """Builds the inner loop from the configuration: planner, limits, thrust, vehicle response."""
 
+from math import inf
 from typing import Any
 
 from companion import plugins
@@ -12,6 +13,9 @@ from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
+
+LARGEST_PRODUCT = 0.45
+"""Largest sensible gain · (lag + dead time); above it, a higher gain is hardly quicker."""
 
 
 def planner(config: Config) -> Planner:
@@ -109,6 +113,12 @@ def slower_tilt(config: Config) -> tuple[float, float]:
         max(axis.lag or 0.0 for axis in tilt),
         max(axis.dead_time or 0.0 for axis in tilt),
     )
+
+
+def sensible_gain(config: Config) -> float:
+    """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
+    delay = sum(slower_tilt(config))
+    return LARGEST_PRODUCT / delay if config.vehicle.known and delay > 0.0 else inf
 
 
 def heading_response(config: Config) -> InnerResponse:

@@ -124,7 +124,9 @@ def _maneuvers(figures: Any) -> Table:
     )
     rows = [
         tuple(
-            _EMPTY if maneuver.get(key) is None else text.format(maneuver[key])
+            _EMPTY
+            if maneuver.get(key) is None or (key == "drift_max_m" and not maneuver["open_loop"])
+            else text.format(maneuver[key])
             for key, _, text in columns
         )
         for maneuver in figures.get("maneuvers", ())

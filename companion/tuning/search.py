@@ -6,9 +6,8 @@ from math import exp, inf, log
 from typing import NamedTuple
 
 from companion.config import Config
-from companion.control.expected_response import LARGEST_PRODUCT
 from companion.control.hold_settings import attitude_delay
-from companion.control.inner_loop import slower_tilt
+from companion.control.inner_loop import sensible_gain
 from companion.tuning.expectation import Disturbances, expected_errors
 from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller
@@ -90,8 +89,7 @@ def slewing_delay(config: Config) -> float:
 
 def largest_gain(config: Config) -> float:
     """The quickest sensible planner gain, as `companion check-config` states it, 1/s."""
-    delay = sum(slower_tilt(config))
-    return min(_LARGEST.gain, LARGEST_PRODUCT / delay) if delay > 0.0 else _LARGEST.gain
+    return min(_LARGEST.gain, sensible_gain(config))
 
 
 def searched(config: Config, disturbances: Disturbances, aims: Aims) -> Design:

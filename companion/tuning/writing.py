@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from math import degrees
 from pathlib import Path
+from typing import Any
 
 from companion.control.hold_settings import disturbance_bandwidth, hold_weights
 from companion.files import bounded_yaml
@@ -16,19 +17,23 @@ Flights = Mapping[str, tuple[Flown, Flown]]
 """Flights with the configuration before and with the proposal, by the name of the course."""
 
 
-def proposal_text(proposal: Proposal, vehicle: Path | None, flights: Flights, where: str) -> str:
+def proposal_text(
+    proposal: Proposal, vehicle: Path | Mapping[str, Any], flights: Flights, where: str
+) -> str:
     """The file's text: what was analysed, what to expect, and the keys with their reasons.
 
     Args:
         proposal: what is proposed.
-        vehicle: vehicle file to include, relative to the file; None: none is included.
+        vehicle: vehicle file to include, relative to the file; or the section `vehicle` itself.
         flights: flights on the mock vehicle; empty if none was flown.
         where: from what the vehicle is known, for the reader.
     """
     lines = [f"# Proposed by `companion tune` for {where}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
-    if vehicle is not None:
+    if isinstance(vehicle, Path):
         lines += ["", f"include: {bounded_yaml.dump_value(str(vehicle))}  # the identified vehicle"]
+    else:
+        lines += ["", *bounded_yaml.dump(dict(vehicle)).splitlines()]
     reasons = _reasons(proposal)
     for section, keys in proposal.changes.items():
         lines += ["", f"{section}:"]
@@ -112,7 +117,7 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
         "quadratic_drag_per_m": drag,
         "gain_per_s": f"before {untuned.planner.gain_per_s:g}; {why}",
         "position_weight_per_s4": f"before {weights.position:.3g}; a stiffer hold tracks better, "
-        "until the margins are used up",
+        "a softer one has more margin",
         "velocity_weight_per_s2": f"before {weights.velocity:.3g}; a larger one brings errors of "
         "the estimated velocity into the position",
         "disturbance_bandwidth_rad_s": f"before {disturbance_bandwidth(untuned):.3g}; a quicker "

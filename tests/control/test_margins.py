@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from companion.config import Config
+from companion.config.files import changed
 from companion.control.hold_settings import (
     attitude_delay,
     correction_settings,
@@ -121,3 +122,14 @@ def test_the_margins_hold_over_the_whole_grid(lag, dead):
             continue
         places = hold(believed(lag, dead), real(lag, dead, slower, strength), off=OFF)
         assert settled(places, OFF), (slower, strength)
+
+
+def test_a_gain_above_the_sensible_one_does_not_stiffen_the_hold():
+    """It hardly makes the attitude quicker; with a stiffer hold the mock vehicle swung by 16°."""
+    known = {"vehicle": {"lag_ms": 47.0, "dead_time_ms": 40.0}}
+    sensible, quick = (
+        hold_weights(changed(Config(), {**known, "planner": {"gain_per_s": gain}}, "test"))
+        for gain in (0.45 / 0.087, 10.0)
+    )
+    assert quick.position <= 1.05 * sensible.position
+    assert quick.velocity <= 1.05 * sensible.velocity
