@@ -15,7 +15,10 @@ def plot(options: argparse.Namespace) -> int:
     from companion.recording.figure import draw_flight  # noqa: PLC0415  no other command needs it
 
     out = options.out or options.folder / "flight.png"
-    draw_flight(options.folder, out)
+    try:
+        draw_flight(options.folder, out)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot write it: {error.strerror}") from error
     print(out)
     return EXIT_OK
 

@@ -135,10 +135,11 @@ class SampleRows:
             -2.0 * ay,
             2.0 * ax,
             *((nan, nan) if planned is None else planned[:2]),
-            sqrt(roll * roll + pitch * pitch) >= self._tilt_rate,
-            abs(yaw) >= self._yaw_rate,
+            # A program's own rates may be NumPy's, whose truth values cannot be packed.
+            bool(sqrt(roll * roll + pitch * pitch) >= self._tilt_rate),
+            bool(abs(yaw) >= self._yaw_rate),
             not idle and thrust in self._thrust_limits,
-            flags.offboard_active,
-            is_step,
-            idle,
+            bool(flags.offboard_active),
+            bool(is_step),
+            bool(idle),
         )

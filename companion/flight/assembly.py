@@ -205,9 +205,10 @@ def assemble(
                 flight.note(text)
             if config.guidance.kind == "nmpc":
                 guidance_loop.predictive = predictive(config, part, flight.note)
+    changes = changes or Changes(config)
     if record is not None:
-        record.metadata("configuration", flat(config.model_dump(mode="json")))
-        record.begin(flight.began, description(config, plan, real_time=real_time))
+        record.metadata("configuration", flat(changes.flown.model_dump(mode="json")))
+        record.begin(flight.began, description(changes.flown, plan, real_time=real_time))
         ladder.on_change = record.alarm
         memory.on_begin = partial(_record_drag, record, clock)
     dead_time_watch = DeadTimeWatch(trace, rate_loops(config), flight.note)
@@ -227,5 +228,4 @@ def assemble(
         clock,
         real_time=real_time,
     )
-    changes = changes or Changes(config)
     return Assembled(flight, context, trace, dead_time_watch, memory, ladder, reporter, changes)

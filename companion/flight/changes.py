@@ -60,6 +60,7 @@ class Changes:
     Attributes:
         wanted: the configuration after the newest change.
         made: all changes, in order.
+        flown: the configuration in the record of the flight: as it was when the flight began.
         note: shows a change while no flight goes on.
         on_change: called with `wanted` after each change.
 
@@ -70,10 +71,12 @@ class Changes:
     def __init__(self, start: Config) -> None:
         self.wanted = start
         self.made: list[Change] = []
+        self.flown = start
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self._start = self._now = self._from = start
         self._earlier: list[Config] = []
+        self._made_before = 0
         self._retuning: Retuning | None = None
         self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
         self._began: float | None = None
@@ -88,6 +91,16 @@ class Changes:
     def can_undo(self) -> bool:
         """Whether there is a change to undo."""
         return bool(self._earlier)
+
+    @property
+    def made_in_flight(self) -> tuple[Change, ...]:
+        """The changes since the flight began, in order."""
+        return tuple(self.made[self._made_before :])
+
+    def begin_flight(self) -> Config:
+        """A flight begins: returns the configuration that it begins with, for its record."""
+        self.flown, self._made_before = self.wanted, len(self.made)
+        return self.flown
 
     def change(self, values: Values, by: str) -> str:
         """Begin to change to these values; returns what changes, in words.

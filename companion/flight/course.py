@@ -79,7 +79,7 @@ def course_of(
         lockstep=not reporter.real_time,
         advice=advised,
         settings=_settings(context),
-        changes=tuple(change.as_dict(began) for change in assembled.changes.made),
+        changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
     )
 
 

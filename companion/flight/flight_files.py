@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import TracebackType
@@ -55,7 +56,7 @@ class FlightFiles:
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
         self._counted: dict[str, int] = {}
-        self._failed = False
+        self._failed = self._opened = False
         self.tap: TlogWriter | None = None
         self.mcap: FlightRecorder | None = None
         if folder is not None:
@@ -67,13 +68,30 @@ class FlightFiles:
             def on_failure(text: str) -> None:  # called in a writing thread
                 loop.call_soon_threadsafe(self._tell_failure, text)
 
+            def on_bad_entry(text: str) -> None:  # the same
+                loop.call_soon_threadsafe(note, text)
+
             self.tap = TlogWriter(folder / "flight.tlog", epoch, on_failure)
-            self.mcap = FlightRecorder(folder / "flight.mcap", epoch, loop.time, on_failure)
+            self.mcap = FlightRecorder(
+                folder / "flight.mcap", epoch, loop.time, on_failure, on_bad_entry
+            )
+
+    def open(self) -> None:
+        """Create `flight.tlog` and `flight.mcap`, both or none.
+
+        Raises:
+            OSError: one cannot be created.
+        """
+        with ExitStack() as opened:
+            for file in (self.tap, self.mcap):
+                if file is not None:
+                    opened.enter_context(file)
+            opened.pop_all()
+        self._opened = True
 
     def __enter__(self) -> "FlightFiles":
-        for file in (self.tap, self.mcap):
-            if file is not None:
-                file.open()
+        if not self._opened:
+            self.open()
         return self
 
     def __exit__(

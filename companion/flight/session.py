@@ -90,8 +90,9 @@ class Session:
         # This takes up to a second, during which an open link would not be read.
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         environment = self._environment
+        config = self.changes.begin_flight()
         record = FlightFiles(
-            self._config, self._folder, environment, self.note, follows=self._plan is None
+            config, self._folder, environment, self.note, follows=self._plan is None
         )
         wishes = realtime_wishes(self._config) if environment.realtime else Wishes()
         with realtime.asked_for(wishes) as grants, record:

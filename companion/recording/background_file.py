@@ -1,7 +1,8 @@
 """A file that a thread of its own writes: who hands items over never waits for the disk.
 
 The thread looks every 50 ms for new items: to wake it for each of them would cost the control loop
-more than all the rest of recording. Twice a second it waits until the disk has what was written.
+more than all the rest of recording. It writes them in slices, with a pause after each, in which the
+control loop can run. Twice a second it waits until the disk has what was written.
 """
 
 import threading
@@ -10,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
@@ -18,6 +19,14 @@ T = TypeVar("T")
 Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _PERIOD = 0.05
+_SLICE = 20
+"""Items of a slice, if few wait."""
+_MOST_SLICES = 50
+"""A backlog is written in at most this many slices, however long it is."""
+_PAUSE = 0.001
+"""Pause after a slice, s."""
+_LONGEST_CLOSE = 5.0
+"""Time allowed to write out what waits when the file is closed, s."""
 _SYNC_PERIOD = 0.5
 """After a power cut this much is missing, s, and the time that the disk takes."""
 
@@ -68,6 +77,7 @@ class BackgroundFile(ABC, Generic[T]):
         self._waiting: deque[T] = deque()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
+        self._synced_at = -inf  # the first items are on the disk at once
 
     @abstractmethod
     def _make_file(self) -> ItemFile[T]:
@@ -110,27 +120,46 @@ class BackgroundFile(ABC, Generic[T]):
         self.close()
 
     def close(self) -> None:
-        """Write out what waits and close the file."""
+        """Write out what waits and close the file.
+
+        If the disk does not answer for 5 s, that is a failure: the thread is left behind.
+        """
         self._closing.set()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_LONGEST_CLOSE)
+            if self._thread.is_alive():
+                self.dropped += len(self._waiting)
+                self._fail(f"the disk did not answer for {_LONGEST_CLOSE:g} s")
 
     def _run(self, file: ItemFile[T]) -> None:
-        synced_at = -inf  # the first items are on the disk at once
         while not self._closing.wait(_PERIOD):
             self._write_waiting(file)
-            if self.failure is None and monotonic() - synced_at >= _SYNC_PERIOD:
-                self._guarded(file.sync)
-                synced_at = monotonic()
+            self._sync_when_due(file)
         self._write_waiting(file)
         self._guarded(lambda: file.close(complete=self.failure is None))
 
     def _write_waiting(self, file: ItemFile[T]) -> None:
-        items = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        """Write what waits now; what comes meanwhile waits for the next time."""
+        left = len(self._waiting)
+        size = max(_SLICE, -(-left // _MOST_SLICES))
+        while left > 0:
+            items = [self._waiting.popleft() for _ in range(min(size, left))]
+            left -= len(items)
+            self._write_slice(file, items)
+            self._sync_when_due(file)
+            if not self._closing.is_set():
+                sleep(_PAUSE)
+
+    def _write_slice(self, file: ItemFile[T], items: Sequence[T]) -> None:
         if self.failure is None:
             self._guarded(lambda: file.write(items))
         if self.failure is not None:
             self.dropped += len(items)
+
+    def _sync_when_due(self, file: ItemFile[T]) -> None:
+        if self.failure is None and monotonic() - self._synced_at >= _SYNC_PERIOD:
+            self._guarded(file.sync)
+            self._synced_at = monotonic()
 
     def _guarded(self, work: Callable[[], None]) -> None:
         try:

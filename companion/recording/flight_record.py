@@ -13,7 +13,8 @@ channel `motion` are in. `since_start` converts from our clock. A flight in lock
 has its clock in vehicle time; then `epoch` is 0.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,7 +28,7 @@ from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.fields import Row
-from companion.recording.mcap_file.reader import McapContent, read_mcap
+from companion.recording.mcap_file.reader import McapContent, changed_topic, read_mcap
 from companion.recording.trace import ManeuverMark
 
 FILE = "flight.mcap"
@@ -37,6 +38,19 @@ _LONGEST_CONFIGURATION = 1 << 20
 
 class RecordError(Exception):
     """A folder holds no record of a flight that can be read; the message says what and where."""
+
+
+@contextmanager
+def as_recorded(folder: Path) -> Iterator[None]:
+    """While the block reads the record in `folder`: values that no flight records are an error.
+
+    Raises:
+        RecordError: the block met such a value.
+    """
+    try:
+        yield
+    except (ValueError, IndexError, OverflowError, TypeError) as error:
+        raise RecordError(f"{folder / FILE}: not as a flight records it: {error}") from error
 
 
 class Phase(NamedTuple):
@@ -115,12 +129,19 @@ class FlightRecord:
 
         Raises:
             KeyError: there is no such channel.
+            RecordError: a message is not as a flight records it.
         """
+        if name not in self._rows:
+            channel = _BY_NAME[name]
+            with as_recorded(self.folder):
+                data = [each for _, each in self.content.messages[channel.topic]]
+                self._rows[name] = channel.rows(data)
         return self._rows[name]
 
     @cached_property
-    def _rows(self) -> "_Rows":
-        return _Rows(self.content)
+    def _rows(self) -> dict[str, Row]:
+        """The rows that were asked for."""
+        return {}
 
     def since_start(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Times on our clock (s) as s since the flight began."""
@@ -135,13 +156,13 @@ class FlightRecord:
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The phases that began, in order."""
-        found = (cdr.words_of(data, 1, 2) for data in self._messages("/phase"))
+        found = self._words("/phase", 1, 2)
         return tuple(Phase(time - self.began, *words) for (time,), words in found)
 
     @cached_property
     def maneuvers(self) -> tuple[ManeuverMark, ...]:
         """When each maneuver began, and the last one ended (name None). `time` is on our clock."""
-        found = (cdr.words_of(data, 2, 1) for data in self._messages("/maneuver"))
+        found = self._words("/maneuver", 2, 1)
         return tuple(
             ManeuverMark(time, vehicle_time, name or None)
             for (time, vehicle_time), (name,) in found
@@ -152,14 +173,15 @@ class FlightRecord:
         """All events, in order."""
         events = []
         for time_ns, data in self.content.messages["/log"]:
-            level, text, source = cdr.log_of(data)
+            with as_recorded(self.folder):
+                level, text, source = cdr.log_of(data)
             events.append(Event(time_ns * 1e-9 - self.epoch - self.began, text, level, source))
         return tuple(events)
 
     @cached_property
     def alarms(self) -> tuple[AlarmChange, ...]:
         """What the safety monitors said, in order."""
-        found = (cdr.words_of(data, 2, 3) for data in self._messages("/alarm"))
+        found = self._words("/alarm", 2, 3)
         return tuple(
             AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
         )
@@ -180,21 +202,12 @@ class FlightRecord:
             raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
         return found
 
-    def _messages(self, topic: str) -> list[bytes]:
-        return [data for _, data in self.content.messages[topic]]
-
-
-class _Rows(dict[str, Row]):
-    """The rows of each channel of numbers, decoded when they are asked for."""
-
-    def __init__(self, content: McapContent) -> None:
-        self._content = content
-
-    def __missing__(self, name: str) -> Row:
-        channel = _BY_NAME[name]
-        found = channel.rows([data for _, data in self._content.messages[channel.topic]])
-        self[name] = found
-        return found
+    def _words(
+        self, topic: str, numbers: int, texts: int
+    ) -> list[tuple[tuple[float, ...], list[str]]]:
+        messages = self.content.messages[topic]
+        with as_recorded(self.folder):
+            return [cdr.words_of(data, numbers, texts) for _, data in messages]
 
 
 def read_flight(folder: Path) -> FlightRecord:
@@ -223,6 +236,12 @@ def read_flight(folder: Path) -> FlightRecord:
     except (KeyError, ValueError) as error:
         why = content.damage or "it does not say when the flight began"
         raise RecordError(f"{path}: not the record of a flight: {why}") from error
+    topic = changed_topic(content)
+    if topic is not None:
+        raise RecordError(
+            f"{path}: the messages of {topic} have other columns than this version's; read the "
+            f"record with the version that wrote it: companion {flight.get('companion', 'unknown')}"
+        )
     return FlightRecord(
         folder, content, content.complete, content.damage, began, epoch, content.metadata
     )

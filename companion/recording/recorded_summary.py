@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.course import Course, EarlyEnd
-from companion.recording.flight_record import FlightRecord
+from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.channels import REASONS
 from companion.recording.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
@@ -23,6 +23,14 @@ _AXES = "roll", "pitch", "yaw"
 _SENT = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
 _STEP = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
 _REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
+_KEYS = frozenset(
+    (
+        *("result", "planner", "phases", "maneuvers", "early_end", "samples", "unanswered"),
+        *("link", "latency_us", "response", "extent", "battery", "deadline_ms", "lockstep"),
+        *("advice", "at_the_end", "settings", "log"),
+    )
+)
+"""Keys of `summary.json` without which a summary is not used: it is of another version."""
 _NO_REASONS = 2
 """The first of `REASONS` are no reasons of an unanswered sample."""
 
@@ -32,18 +40,30 @@ def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
 
     A provisional one is derived from the record: `result` says that the record ends early, and the
     dead times, the realtime grants and the advice are missing.
+
+    Raises:
+        RecordError: the record is not as a flight writes it.
     """
     written = _written(record.folder / "summary.json")
     return (derived_summary(record), True) if written is None else (written, False)
 
 
 def derived_summary(record: FlightRecord) -> dict[str, Any]:
-    """The summary of a flight, from its record alone."""
+    """The summary of a flight, from its record alone.
+
+    Raises:
+        RecordError: it is not as a flight writes it.
+    """
+    with as_recorded(record.folder):
+        return _derived(record).as_dict()
+
+
+def _derived(record: FlightRecord) -> Summary:
     flight = record.metadata["flight"]
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
     phase = record.phases[-1].name if record.phases else "connect"
     resources, thrust = record.rows("resources"), record.rows("thrust")
-    summary = Summary(
+    return Summary(
         result=reason,
         phase=phase,
         planner=flight.get("planner", ""),
@@ -67,11 +87,19 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
             lockstep=flight.get("real_time") == "no",
         ),
     )
-    return summary.as_dict()
 
 
 def trace_of(record: FlightRecord) -> FlightTrace:
-    """The rows that the measurements after a flight take, as the flight itself kept them."""
+    """The rows that the measurements after a flight take, as the flight itself kept them.
+
+    Raises:
+        RecordError: the record is not as a flight writes it.
+    """
+    with as_recorded(record.folder):
+        return _trace(record)
+
+
+def _trace(record: FlightRecord) -> FlightTrace:
     trace = FlightTrace()
     sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
     sample = sample[sample["unanswered"] == 0]
@@ -159,9 +187,9 @@ def _last(values: NDArray[np.float64]) -> float | None:
 
 
 def _written(path: Path) -> dict[str, Any] | None:
-    """`summary.json`; None where the flight wrote none, or not all of it."""
+    """`summary.json`; None where the flight wrote none, not all of it, or other keys than ours."""
     try:
         found = json.loads(read_text(path, _LONGEST))
     except (FileRefusedError, ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) else None
+    return found if isinstance(found, dict) and found.keys() >= _KEYS else None

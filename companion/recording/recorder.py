@@ -44,6 +44,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         epoch: s since 1970 at which the flight's clock read 0.
         clock: the flight's, s.
         on_failure: called once, from the writing thread, when the file cannot be written any more.
+        on_bad_entry: called once, from the writing thread, when an entry cannot be recorded.
     """
 
     def __init__(
@@ -52,12 +53,21 @@ class FlightRecorder(BackgroundFile[Entry]):
         epoch: float,
         clock: Callable[[], float],
         on_failure: Callable[[str], None] | None = None,
+        on_bad_entry: Callable[[str], None] | None = None,
     ) -> None:
         self._epoch, self._clock = epoch, clock
+        self._on_bad_entry = on_bad_entry
         super().__init__(path, _MOST_WAITING, on_failure)
 
     def _make_file(self) -> "_McapEntries":
-        return _McapEntries(self.path, self._epoch)
+        return _McapEntries(self.path, self._epoch, self._drop)
+
+    def _drop(self, error: Exception) -> None:
+        """Count an entry that cannot be recorded; tell the first one."""
+        self.dropped += 1
+        told, self._on_bad_entry = self._on_bad_entry, None
+        if told is not None:
+            told(f"{self.path}: an entry was not recorded: {error!r}; the recording goes on")
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
         """Record an entry of `time` (s on our clock)."""
@@ -109,16 +119,27 @@ class FlightRecorder(BackgroundFile[Entry]):
 
 
 class _McapEntries:
-    """Writes entries to a `.mcap`."""
+    """Writes entries to a `.mcap`.
 
-    def __init__(self, path: Path, epoch: float) -> None:
-        self._writer = McapWriter(path)
+    Args:
+        path: of the file.
+        epoch: see `FlightRecorder`.
+        drop: called with the reason why an entry cannot be recorded.
+    """
+
+    def __init__(self, path: Path, epoch: float, drop: Callable[[Exception], None]) -> None:
+        self._writer, self._drop = McapWriter(path), drop
         self._epoch_ns = round(epoch * 1e9)
 
     def write(self, items: Sequence[Entry]) -> None:
         writer, epoch_ns = self._writer, self._epoch_ns
         for time, encoder, values in items:
-            encoder(writer, epoch_ns + round(time * 1e9), values)
+            try:
+                encoder(writer, epoch_ns + round(time * 1e9), values)
+            except OSError:
+                raise
+            except Exception as error:  # one bad entry must not end the record of the flight
+                self._drop(error)
 
     def sync(self) -> None:
         self._writer.flush()

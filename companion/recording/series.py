@@ -24,6 +24,9 @@ _CHUNK_ROWS = 1024
 _MOST_WAITING = 64
 """Most chunks that wait for a slow disk; further ones are lost, and counted."""
 
+_LONGEST_WAIT = 5.0
+"""Time allowed for the disk to take all chunks, s."""
+
 
 class SpooledFile:
     """A temporary file of doubles, made at the first write and deleted with its owner.
@@ -75,7 +78,7 @@ class Spool:
         self.folder = folder
         self._queue: SimpleQueue[_Work] = SimpleQueue()
         self._failures: list[str] = []
-        self._begun = False
+        self._begun = self._stuck = False
 
     @property
     def failure(self) -> str | None:
@@ -97,12 +100,15 @@ class Spool:
         self._queue.put((file, chunk))
         return True
 
-    def flush(self) -> None:
-        """Wait until all chunks are written."""
-        if self._begun:
+    def flush(self) -> bool:
+        """Wait until all chunks are written; false if the disk does not answer for 5 s."""
+        if self._begun and not self._stuck:
             written = threading.Event()
             self._queue.put(written)
-            written.wait()
+            if not written.wait(_LONGEST_WAIT):
+                self._stuck = True
+                self._failures.append(f"the disk did not answer for {_LONGEST_WAIT:g} s")
+        return not self._stuck
 
 
 def _write(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
@@ -163,10 +169,10 @@ class Series:
                 break
             parts.insert(0, chunk)
             have += len(chunk)
-        if have < wanted:
-            self._spool.flush()
+        if have < wanted and self._spool.flush():
             numbers = np.concatenate([self._file.read(len(self.columns)), self._chunk])
-        else:
+        else:  # in memory, or all that there is while the disk does not answer
+            self.lost = max(self.lost, (wanted - have) // len(self.columns))
             numbers = np.concatenate(parts)
         return numbers[max(0, len(numbers) - wanted) :].reshape(-1, len(self.columns))
 

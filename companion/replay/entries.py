@@ -10,7 +10,7 @@ from companion.control.sample_rows import LoopFlags
 from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
-from companion.recording.flight_record import FlightRecord
+from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.channels import (
     ACTION,
     ACTIONS,
@@ -94,7 +94,16 @@ Entry = RecordedSample | RecordedStep | RecordedAction | AttitudeTarget
 
 
 def entries(record: FlightRecord) -> Iterator[Entry]:
-    """All entries of a flight, in the order in which the program took them."""
+    """All entries of a flight, in the order in which the program took them.
+
+    Raises:
+        RecordError: one is not as a flight records it.
+    """
+    with as_recorded(record.folder):
+        yield from _entries(record)
+
+
+def _entries(record: FlightRecord) -> Iterator[Entry]:
     messages = _Messages(record)
     while (channel := messages.next()) is not None:
         if channel is SAMPLE:

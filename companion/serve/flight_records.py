@@ -21,7 +21,6 @@ class FlightRecords:
     The link stays open between flights and has one tap, which is this object.
 
     Args:
-        config: of the flights.
         directory: in which each flight makes its own folder; None: nothing is recorded.
         environment: of the flights.
         note: takes events as sentences.
@@ -32,13 +31,12 @@ class FlightRecords:
 
     def __init__(
         self,
-        config: Config,
         directory: Path | None,
         environment: Environment,
         note: Callable[[str], None],
     ) -> None:
         self.grants: tuple[realtime.Grant, ...] = ()
-        self._config, self._directory = config, directory
+        self._directory = directory
         self._environment, self._note = environment, note
         self._tap: Tap | None = None
 
@@ -47,25 +45,27 @@ class FlightRecords:
         if self._tap is not None:
             self._tap(time, frame)
 
-    def new(self) -> FlightFiles:
-        """The record of a new flight; if its folder cannot be made, it flies without one."""
+    def new(self, config: Config) -> FlightFiles:
+        """The open record of a new flight; if it cannot be made, the flight has none.
+
+        Args:
+            config: with which the flight begins.
+        """
         folder = None
         if self._directory is not None:
             try:
                 folder = flight_folder(self._directory)
-                return self._record(folder)
+                record = self._record(config, folder)
+                record.open()
+                return record
             except (ConfigError, OSError) as error:
                 self._note(f"this flight is not recorded: {error}")
                 _remove(folder)
-        return self._record(None)
+        return self._record(config, None)
 
     @contextmanager
     def recording(self, record: FlightFiles) -> Iterator[None]:
-        """Write the frames of the link to a record while the block runs.
-
-        Raises:
-            OSError: its files cannot be made.
-        """
+        """Write the frames of the link to a record while the block runs; then close it."""
         with record:
             self._tap = record.tap
             try:
@@ -83,8 +83,8 @@ class FlightRecords:
         """Remove the record of a takeover that failed: nothing was flown."""
         _remove(record.folder)
 
-    def _record(self, folder: Path | None) -> FlightFiles:
-        return FlightFiles(self._config, folder, self._environment, self._note, follows=False)
+    def _record(self, config: Config, folder: Path | None) -> FlightFiles:
+        return FlightFiles(config, folder, self._environment, self._note, follows=False)
 
 
 def _remove(folder: Path | None) -> None:

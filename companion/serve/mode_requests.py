@@ -1,5 +1,7 @@
 """Which messages of clients ask for our mode, and which would starve our control. Pure."""
 
+from math import isfinite
+
 from companion.mavlink.commands import (
     MAV_CMD_DO_SET_MODE,
     MAV_CMD_NAV_LAND,
@@ -36,6 +38,7 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     wanted = autopilot.set_mode(autopilot.offboard_mode)
     return bool(
         message.command == MAV_CMD_DO_SET_MODE
+        and isfinite(message.param1)
         and int(message.param1) & _CUSTOM_MODE
         and (message.param2, message.param3) == (wanted.p2, wanted.p3)
     )
@@ -65,5 +68,5 @@ def starves_control(frame: Frame, needed: dict[str, float]) -> bool:
     if message.command != _SET_MESSAGE_INTERVAL:
         return False
     rates = {MESSAGE_IDS[name]: rate for name, rate in needed.items() if name in MESSAGE_IDS}
-    rate = rates.get(int(message.param1)) if message.param1 >= 0.0 else None
+    rate = rates.get(int(message.param1)) if isfinite(message.param1) else None
     return rate is not None and not 0.0 < message.param2 <= 1e6 / rate * 1.001

@@ -85,7 +85,7 @@ class ServedFlight:
         from_ground: bool = False,
     ) -> None:
         self.let_go = False
-        self._records, self._record = records, records.new()
+        self._records, self._record = records, records.new(changes.begin_flight())
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
         self._link, self._component, self._ownership = link, component, ownership

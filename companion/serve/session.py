@@ -60,7 +60,7 @@ class ServeSession:
         directory: Path | None = None,
     ) -> None:
         self._config, self._note = config, note
-        self._records = FlightRecords(config, directory, environment, note)
+        self._records = FlightRecords(directory, environment, note)
         self._observer, self._environment = observer or Silent(), environment
         self.changes = Changes(config)
         self.changes.note = note
@@ -98,7 +98,7 @@ class ServeSession:
         async with open_link(config, self._records, self._note, opener) as link:
             state_logger = StateLogger(link.state, self._note)
             link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
-            async with Network(link, config.serve.clients) as network:
+            async with Network(link, config.serve.clients, self._note) as network:
                 return await self._serve(link, network)
 
     async def _serve(self, link: Link, network: Network) -> dict[str, Any]:

@@ -6,12 +6,14 @@ from math import nan
 import numpy as np
 import pytest
 
+from companion.cli.main import main
 from companion.extras import MissingExtraError
 from companion.recording.figure import FigureError, draw_flight
 from companion.recording.history import HEIGHTS, Marks, Span, draw_history, marks_of
 from companion.recording.mcap_file.channels import MOTION, SAMPLE, SETPOINT
 from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.writer import McapWriter
+from companion.recording.recorded_summary import _KEYS
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 
@@ -31,6 +33,7 @@ SUMMARY = {
     ],
     "early_end": {"time_s": 8.2},
 }
+WHOLE = {**dict.fromkeys(_KEYS), **SUMMARY}
 
 
 def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summary=None):
@@ -57,7 +60,7 @@ def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summar
         ({"largest": 1e300}, "motion: not as a flight records it: a number is above 1e+09"),
         ({"gain": "0"}, "gain_per_s is 0"),
         ({"gain": "x"}, "could not convert"),
-        ({"summary": {"gain_per_s": 5.0, "phases": 3}}, "summary.json: not as a flight writes it"),
+        ({"summary": {**WHOLE, "phases": 3}}, "summary.json: not as a flight writes it"),
     ],
 )
 def test_files_that_no_flight_writes_are_refused(tmp_path, broken, words):
@@ -110,9 +113,16 @@ def test_each_panel_has_its_curve_its_unit_and_all_marks():
 
 @pytest.mark.parametrize("kept", [("motion",), ("steps",), ("motion", "steps")])
 def test_a_flight_is_drawn_with_what_it_recorded(tmp_path, kept):
-    record(tmp_path, **dict.fromkeys(kept, True), summary=SUMMARY)
+    record(tmp_path, **dict.fromkeys(kept, True), summary=WHOLE if "steps" in kept else {})
     draw_flight(tmp_path, tmp_path / "out.png")
     assert (tmp_path / "out.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_missing_folder_for_the_drawing_is_one_sentence(tmp_path, capsys):
+    record(tmp_path, motion=True, summary=WHOLE)
+    out = tmp_path / "missing" / "out.png"
+    assert main(["plot", str(tmp_path), "--out", str(out)]) == 2
+    assert f"{out}: cannot write it: No such file" in capsys.readouterr().err.replace("\n", "")
 
 
 def test_a_missing_extra_is_one_clear_sentence(tmp_path, monkeypatch):

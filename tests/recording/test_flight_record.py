@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from zstandard import ZstdError
 
 from companion.control.loop_record import Unanswered
 from companion.recording.flight_record import RecordError, read_flight
-from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.channels import CHANNELS, REASONS
+from companion.recording.mcap_file import cdr, reader, writer
+from companion.recording.mcap_file.channels import ACTION, CHANNELS, REASONS, RESOURCES, SETPOINT
 from companion.recording.mcap_file.writer import WORDS, McapWriter
+from companion.recording.recorded_summary import derived_summary, summary_of
+from companion.replay.entries import entries
 
 ROWS = 50
 
@@ -112,3 +115,68 @@ def test_another_file_is_refused_with_its_name(tmp_path, content):
 def test_a_folder_without_record_is_refused(tmp_path):
     with pytest.raises(RecordError, match=r"No such file .* is this the folder of a flight\?"):
         read_flight(tmp_path)
+
+
+def write_one(folder, topic, data):
+    """A file with one message."""
+    file = McapWriter(folder / "flight.mcap")
+    file.metadata("flight", {"began_s": "1.0", "epoch_s": "0.0", "companion": "0.0.7"})
+    file.message(topic, 1, data)
+    file.close()
+    return read_flight(folder)
+
+
+def row(channel, number, code):
+    numbers, codes = [number] * len(channel.numbers), [code] * len(channel.codes)
+    return channel.packing.pack(cdr.CDR, *numbers, *codes)
+
+
+@pytest.mark.parametrize(
+    ("topic", "data", "read"),
+    [
+        ("/phase", cdr.CDR, lambda record: record.phases),
+        ("/maneuver", bytes(300), lambda record: record.maneuvers),
+        ("/alarm", b"", lambda record: record.alarms),
+        ("/log", b"", lambda record: record.events),
+        ("/sample", cdr.CDR + bytes(3), lambda record: record.rows("sample")),
+        ("/action", row(ACTION, 1.0, 200), lambda record: list(entries(record))),
+        ("/setpoint", row(SETPOINT, np.nan, 0), derived_summary),
+        ("/resources", row(RESOURCES, np.nan, 0), summary_of),
+    ],
+)
+def test_a_message_that_no_flight_records_is_an_error_with_the_place(tmp_path, topic, data, read):
+    with pytest.raises(RecordError, match=r"flight\.mcap: not as a flight records it: "):
+        read(write_one(tmp_path, topic, data))
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OverflowError("too large"), ZstdError("bad")])
+def test_what_the_decompression_raises_is_damage(tmp_path, monkeypatch, error):
+    def fails(*_, **__):
+        raise error
+
+    path = write(tmp_path)
+    monkeypatch.setattr(reader, "breakup_chunk", fails)
+    assert reader.read_mcap(path).damage == (str(error) or "MemoryError")
+
+
+def test_other_columns_are_refused_with_the_channel_and_the_version(tmp_path, monkeypatch):
+    now = McapWriter._register
+
+    def register(self, topic, name, schema):
+        now(self, topic, name, schema.replace(*self.changed))
+
+    monkeypatch.setattr(writer.McapWriter, "_register", register)
+    monkeypatch.setattr(writer.McapWriter, "changed", (b"# When", b"# At what time"), raising=False)
+    assert write_one(tmp_path, "/action", row(ACTION, 1.0, 0)).rows("action")["time_s"] == 1.0
+    monkeypatch.setattr(writer.McapWriter, "changed", (b"float64 age_s", b"float64 age_ms"))
+    with pytest.raises(RecordError, match=r"of /sample have other columns .* companion 0\.0\.7"):
+        write_one(tmp_path, "/action", row(ACTION, 1.0, 0))
+
+
+@pytest.mark.parametrize("found", ["{}", '{"result": "ok", "phases": []}', "[]", "{"])
+def test_a_summary_without_its_keys_is_derived_from_the_record(tmp_path, found):
+    write(tmp_path)
+    (tmp_path / "summary.json").write_text(found)
+    summary, provisional = summary_of(read_flight(tmp_path))
+    assert provisional
+    assert summary["setpoints"] == ROWS

@@ -13,6 +13,7 @@ import pytest
 from companion.config.files import load
 from companion.flight.observer import Silent
 from companion.mavlink.tlog_file import messages
+from companion.recording import background_file
 from companion.recording.flight_record import read_flight
 from companion.recording.recorded_summary import summary_of
 from tests.flight.fly import fly, mock_vehicle
@@ -91,7 +92,8 @@ def test_a_killed_flight_lacks_at_most_its_last_second(tmp_path, autopilot, mome
         assert 1e-3 * max(stamps) >= record.began + reached - 0.1
 
 
-def test_a_record_cut_off_anywhere_gives_what_stands_before(tmp_path):
+def test_a_record_cut_off_anywhere_gives_what_stands_before(tmp_path, monkeypatch):
+    monkeypatch.setattr(background_file, "_SYNC_PERIOD", 0.1)  # several chunks in a quick flight
     whole = tmp_path / "whole"
     with mock_vehicle() as mock:
         summary = fly(mock, whole, hover={"duration_s": 1.0})

@@ -100,11 +100,19 @@ class Channel:
         )
 
     def rows(self, messages: list[bytes]) -> Row:
-        """All messages of the channel as a structured array; those of a wrong length are left out.
+        """All messages of the channel as a structured array.
 
         Args:
             messages: as they stand in the file, in their order.
+
+        Raises:
+            ValueError: a message has another length, or a code without a name.
         """
         length = self.packing.size
-        data = b"".join(message[4:] for message in messages if len(message) == length)
-        return np.frombuffer(data, self.dtype)
+        if any(len(message) != length for message in messages):
+            raise ValueError(f"{self.topic}: a message is not of {length} bytes")
+        rows = np.frombuffer(b"".join(message[4:] for message in messages), self.dtype)
+        for code in self.codes:
+            if len(rows) and rows[code.name].max() >= len(code.names):
+                raise ValueError(f"{self.topic}: {code.name} is {rows[code.name].max()}")
+        return rows

@@ -6,12 +6,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, McapRecord, Message, Metadata
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
+from zstandard import ZstdError
+
+from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.mcap_file.writer import WORDS
 
 _MOST_BYTES = 1 << 28
 """No record of ours is longer; a longer one is damage."""
-_DAMAGE = (McapError, ValueError, RuntimeError, EOFError, KeyError, IndexError, struct.error)
+_DAMAGE = (
+    McapError,
+    ZstdError,
+    ValueError,
+    RuntimeError,
+    EOFError,
+    KeyError,
+    IndexError,
+    MemoryError,
+    OverflowError,
+    struct.error,
+)
 """What the library and its decompression raise on damaged bytes."""
 
 
@@ -22,6 +37,7 @@ class McapContent:
     Attributes:
         messages: (time ns, data) of each message, by topic, in the order of the file.
         order: the topic of each message, in the order of the file.
+        schemas: the message definition of each topic.
         metadata: metadata records by name; of several with one name the last.
         complete: whether the file was closed, with its index at the end.
         damage: why reading ended before the end of the file, or None.
@@ -29,6 +45,7 @@ class McapContent:
 
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=lambda: defaultdict(list))
     order: list[str] = field(default_factory=list)
+    schemas: dict[str, bytes] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     complete: bool = False
     damage: str | None = None
@@ -42,11 +59,12 @@ def read_mcap(path: Path) -> McapContent:
     """
     content = McapContent()
     topics: dict[int, str] = {}
+    schemas: dict[int, bytes] = {}
     with path.open("rb") as file:
         reader = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_BYTES)
         try:
             for record in reader.records:
-                _take(record, topics, content)
+                _take(record, topics, schemas, content)
             content.complete = True
         except _DAMAGE as error:
             if file.read(1):  # else it was cut off in the middle of this record
@@ -54,17 +72,37 @@ def read_mcap(path: Path) -> McapContent:
     return content
 
 
-def _take(record: McapRecord, topics: dict[int, str], content: McapContent) -> None:
+def _take(
+    record: McapRecord, topics: dict[int, str], schemas: dict[int, bytes], content: McapContent
+) -> None:
     if isinstance(record, Chunk):
         if record.uncompressed_size > _MOST_BYTES:
             raise ValueError(f"a chunk of {record.uncompressed_size} bytes")
         for inner in breakup_chunk(record, validate_crc=True):
-            _take(inner, topics, content)
+            _take(inner, topics, schemas, content)
     elif isinstance(record, Message):
         topic = topics[record.channel_id]
         content.messages[topic].append((record.log_time, record.data))
         content.order.append(topic)
     elif isinstance(record, Channel):
         topics[record.id] = record.topic
+        content.schemas[record.topic] = schemas[record.schema_id]
+    elif isinstance(record, Schema):
+        schemas[record.id] = record.data
     elif isinstance(record, Metadata):
         content.metadata[record.name] = record.metadata
+
+
+def changed_topic(content: McapContent) -> str | None:
+    """A topic whose messages have other columns than this version writes, or None."""
+    ours = {channel.topic: channel.schema for channel in CHANNELS}
+    ours.update((topic, kind.schema) for topic, kind in WORDS.items())
+    for topic, schema in content.schemas.items():
+        if topic in ours and _columns(schema) != _columns(ours[topic]):
+            return topic
+    return None
+
+
+def _columns(schema: bytes) -> list[bytes]:
+    """The lines of a schema without its comments."""
+    return [line for line in schema.splitlines() if not line.startswith(b"#")]

@@ -6,7 +6,7 @@ within `_LONGEST_WAIT`.
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from companion.mavlink.codec import ATTITUDE_QUATERNION
 from companion.mavlink.errors import EndpointError
@@ -19,6 +19,7 @@ from companion.mavlink.transport.endpoint import (
     UdpOut,
     parse_endpoint,
 )
+from companion.safety.actions import internal
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.routing import Routing
@@ -32,6 +33,8 @@ _LONGEST_WAIT = 0.004
 """What came waits no longer than this to be passed on, s."""
 _MOST_NOTED = 4096
 """Frames of the vehicle that may wait to be passed on; more come only after a stall."""
+_MOST_FAULTS = 16
+"""Different faults that are told."""
 
 Port = UdpPort | TcpPort | SerialLine
 
@@ -42,6 +45,7 @@ class Network:
     Args:
         link: to the vehicle, open; its `on_frame` is taken.
         endpoints: of the clients, in the notation of `companion.mavlink.transport.endpoint`.
+        note: takes events as sentences.
 
     Attributes:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
@@ -51,7 +55,9 @@ class Network:
         overflowed: frames of the vehicle that were dropped after a stall.
     """
 
-    def __init__(self, link: Link, endpoints: Iterable[str]) -> None:
+    def __init__(
+        self, link: Link, endpoints: Iterable[str], note: Callable[[str], None] = lambda _: None
+    ) -> None:
         settings, self._loop = link.settings, asyncio.get_running_loop()
         clock = self._loop.time
         rate, burst = uplink_rate(parse_endpoint(settings.endpoint))
@@ -65,7 +71,8 @@ class Network:
         self.ports: list[Port] = []
         self.attitude = b""
         self.overflowed = 0
-        self._link = link
+        self._link, self._note_event = link, note
+        self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
         self._clients: list[Client] = []
         self._noted: list[Frame] = []
@@ -125,9 +132,12 @@ class Network:
             self.uplink.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
-        """A client has sent frames."""
+        """A client has sent frames. One that causes a fault is dropped: it ends no session."""
         for frame in frames:
-            self.routing.from_client(client, frame)
+            try:
+                self.routing.from_client(client, frame)
+            except Exception as error:
+                self._tell_once(f"{internal(error)}; a frame of {client.name} was dropped")
         self._flush_later()
 
     def flush(self) -> None:
@@ -157,6 +167,11 @@ class Network:
                 self._soon = self._loop.call_soon(self.flush)
         elif self._timer is None:
             self._timer = self._loop.call_later(_LONGEST_WAIT, self.flush)
+
+    def _tell_once(self, text: str) -> None:
+        if text not in self._faults and len(self._faults) < _MOST_FAULTS:
+            self._faults.add(text)
+            self._note_event(text)
 
     def _flush_later(self) -> None:
         if self._timer is None and self._soon is None:

@@ -1,0 +1,100 @@
+"""Frames of clients that must not disturb a session, and records that cannot be made."""
+
+import asyncio
+import gc
+import math
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from companion.config import Config
+from companion.flight.changes import Changes
+from companion.flight.environment import THIS_COMPUTER
+from companion.mavlink.framing import FrameScanner
+from companion.mavlink.messages import CRC_EXTRA
+from companion.recording import recorder
+from companion.serve.control import ServedControl
+from companion.serve.flight_records import FlightRecords
+from companion.serve.mode_requests import asks_for_control, starves_control
+from companion.serve.network.network import Network
+from companion.vehicle.px4.autopilot import Px4
+
+
+def command(number, *parameters):
+    message = dialect.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * 4)
+    return FrameScanner(CRC_EXTRA).feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_none_asks_for_nothing(number):
+    assert asks_for_control(command(176, 1.0, 6.0, 0.0), Px4())
+    assert not asks_for_control(command(176, number, 6.0, 0.0), Px4())
+    assert starves_control(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
+    assert not starves_control(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
+
+
+def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
+    notes, routed = [], []
+
+    def from_client(_, frame):
+        if frame == "bad":
+            raise ValueError("a fault")
+        routed.append(frame)
+
+    network = object.__new__(Network)
+    network.routing = SimpleNamespace(from_client=from_client)
+    network._faults, network._note_event = set(), notes.append
+    network._flush_later = lambda: None
+    network.received(SimpleNamespace(name="script"), ["bad", "good", "bad", "good"])
+    assert routed == ["good", "good"]
+    (told,) = notes
+    assert "a fault" in told
+
+
+def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError("No space left on device")
+
+    async def scene():
+        notes = []
+        records = FlightRecords(tmp_path, THIS_COMPUTER, notes.append)
+        with monkeypatch.context() as patched:
+            patched.setattr(recorder, "McapWriter", full)
+            record = records.new(Config())
+        assert record.folder is None
+        with records.recording(record):
+            pass
+        (told,) = notes
+        assert "this flight is not recorded: No space left on device" in told
+        assert list(tmp_path.iterdir()) == []
+
+        changes = Changes(Config())
+        changes.change({"planner": {"gain_per_s": 4.9}}, "a test")
+        with records.recording(records.new(changes.begin_flight())) as _:
+            changes.change({"planner": {"gain_per_s": 4.8}}, "a test")
+        (folder,) = tmp_path.iterdir()
+        assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
+        (change,) = changes.made_in_flight
+        assert change.keys[0].after == 4.8
+        assert changes.flown.planner.gain_per_s == 4.9
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize(("next_flight", "times"), [(None, 1), ("begun", 0)])
+def test_garbage_is_collected_only_between_flights(monkeypatch, next_flight, times):
+    collected = []
+    monkeypatch.setattr(gc, "isenabled", lambda: False)
+    monkeypatch.setattr(gc, "collect", lambda: collected.append(1))
+
+    async def run(_):
+        return True
+
+    async def save():
+        control._flight = next_flight
+
+    control = SimpleNamespace(ownership=SimpleNamespace(release=lambda: None))
+    flight = SimpleNamespace(run=run, save=save)
+    asyncio.run(ServedControl._fly(control, flight, None))
+    assert len(collected) == times
