@@ -156,7 +156,7 @@ def test_in_flight_the_vehicle_stays_where_it_is_when_its_estimate_jumps(tmp_pat
     vehicle = {"lag_ms": 47.0, "dead_time_ms": 40.0, "yaw_lag_ms": 370.0, "yaw_dead_time_ms": 102.0}
     faults, wind = [{**reset, "after_offboard_s": 3.0}], {"speed_m_s": 3.0}
     with mock_vehicle(tmp_path, faults=faults, wind=wind) as mock:
-        summary = fly(mock, tmp_path / "log", vehicle=vehicle)
+        summary = fly(mock, tmp_path / "log", vehicle=vehicle, hover={"duration_s": 5.0})
     assert summary.result == "ok", summary.events
     assert sum("the estimator was reset: 0.5 m and 20°" in text for _, text in summary.events) == 1
     positions, headings = flown(summary)

@@ -26,9 +26,10 @@ def test_margins_are_kept():
     ):
         ChangeChecks(px4, follows=False).check(gain, "a test")
     checks = ChangeChecks(px4, follows=False)
-    checks.now = changed(px4, {"planner": {"gain_per_s": 12.0}}, "a test")
+    stiff, stiffer = ({"guidance": {"position_weight_per_s4": w}} for w in (4000.0, 10000.0))
+    checks.now = changed(px4, stiff, "a test")
     with pytest.raises(ConfigError, match="the control loop is unstable"):
-        checks.check({"planner": {"gain_per_s": 20.0}}, "a test")
+        checks.check(stiffer, "a test")
     with pytest.raises(ConfigError, match=r"position_weight_per_s4 .* more than a factor of 3"):
         ChangeChecks(px4, follows=False).check(
             {"guidance": {"position_weight_per_s4": 10000.0}}, "a test"

@@ -124,8 +124,9 @@ def test_what_cannot_be_shown_is_one_sentence(tmp_path, capsys, monkeypatch):
     assert "mavlink-companion[report]" in capsys.readouterr().err
 
 
-def test_a_summary_of_another_version_is_one_sentence(copied, capsys):
-    (copied / "summary.json").write_text('{"result": "ok"}')
+def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
+    path = copied / "summary.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "maneuvers": [5]}))
     assert main(["report", str(copied)]) == 2
     assert "without its summary.json" in capsys.readouterr().err
 
