@@ -23,6 +23,9 @@ EXIT_OK = 0
 EXIT_USAGE = 2
 _STATUS_PERIOD_S = 0.25
 
+_ENDING = (signal.SIGINT, signal.SIGTERM)
+"""Signals that end the vehicles."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit code: 0 ended by a signal, 2 cannot start."""
@@ -36,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         sys.stderr.write(f"sitl_mock: {error}\n")
         return EXIT_USAGE
-    for number in (signal.SIGINT, signal.SIGTERM):  # a shell may start us with SIGINT ignored
+    for number in _ENDING:  # a shell may start us with SIGINT ignored
         signal.signal(number, _interrupt)
     if options.end_with_stdin:
         threading.Thread(target=_end_with_stdin, name="stdin", daemon=True).start()
@@ -105,11 +108,14 @@ def _run_all(servers: list[Server]) -> None:
     processes: list[BaseProcess] = [
         context.Process(target=_run_one, args=(server,), daemon=True) for server in servers
     ]
+    # A signal within `start` would leave a vehicle that nobody ends.
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
     for process in processes:
         process.start()
     for server in servers:
         server.close()
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
         for process in processes:
             process.join()
     finally:
@@ -120,6 +126,7 @@ def _run_all(servers: list[Server]) -> None:
 
 def _run_one(server: Server) -> None:
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
         server.run()
     except KeyboardInterrupt:
         sys.exit(EXIT_OK)
