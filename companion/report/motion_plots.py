@@ -1,6 +1,7 @@
 """Where the vehicle flew: track, height, tracking error, speed and tilt."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
@@ -73,24 +74,25 @@ def _space(flights: Sequence[FlightData]) -> Plot:
 
 
 def _height(flights: Sequence[FlightData]) -> Plot:
-    traces = []
-    for number, flight in enumerate(flights):
-        if "motion" in flight.curves:
-            name = _name(flights, flight, "height above home")
-            traces.append(over_time(name, flight.curves["motion"], 0, _colour(flights, number)))
+    traces = _lines(flights, "motion", "height above home")
     layout = time_axis(flights, y="height, m")
     return Plot("Height", "Height above home over the whole flight.", traces, layout)
 
 
 def _error(flights: Sequence[FlightData]) -> Plot:
-    traces = []
-    for number, flight in enumerate(flights):
-        if "error" in flight.curves:
-            name = _name(flights, flight, "distance from the reference")
-            traces.append(over_time(name, flight.curves["error"], 0, _colour(flights, number)))
+    traces = _lines(flights, "error", "distance from the reference")
     layout = time_axis(flights, y="error, m")
     note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
     return Plot("Tracking error", note, traces, layout)
+
+
+def _lines(flights: Sequence[FlightData], which: str, what: str) -> list[dict[str, Any]]:
+    """The first column of the curve `which` over time, one line for each flight that has it."""
+    return [
+        over_time(_name(flights, flight, what), flight.curves[which], 0, _colour(flights, number))
+        for number, flight in enumerate(flights)
+        if which in flight.curves
+    ]
 
 
 def _speed(flights: Sequence[FlightData]) -> Plot:

@@ -26,7 +26,7 @@ class Table(NamedTuple):
 def flight_tables(flight: FlightData) -> list[Table]:
     """The tables about one flight; one without rows is left out."""
     figures = flight.figures
-    tables = [] if figures is None else [_maneuvers(figures), Table(*_figures(figures))]
+    tables = [] if figures is None else [_maneuvers(figures), _figures(figures)]
     return [table for table in tables if table.rows]
 
 
@@ -67,8 +67,8 @@ def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
     return [table for table in tables if table.rows]
 
 
-def _figures(figures: Any) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
-    return "Figures", ("figure", "measured"), list(_rows(figures))
+def _figures(figures: Any) -> Table:
+    return Table("Figures", ("figure", "measured"), list(_rows(figures)))
 
 
 def _rows(figures: Any) -> Iterator[tuple[str, str]]:
