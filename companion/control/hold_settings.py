@@ -24,7 +24,7 @@ _CALM_BANDWIDTH = 1.0
 """Bandwidth of the disturbance estimate while the vehicle is identified, rad/s."""
 _POSITION_TIME = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
-_POSITION_PULL = 4.0, 8.0
+_POSITION_PULL = 4.0, 16.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
 _CORRECTS_WITHIN = 0.65
