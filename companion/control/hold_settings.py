@@ -27,7 +27,7 @@ _POSITION_TIME = 0.1
 _POSITION_PULL = 4.0, 8.0
 """Gain from the position error to the observed velocity, with a slow and a quick rate loop, 1/s. It
 is needed because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
-_SMOOTH_PULL = 8.0
+_SMOOTH_PULL = 5.0
 """Increase of that gain with a quick rate loop and smooth positions, 1/s: recorded errors of both
 estimators then move the vehicle 5 to 25 % less."""
 _CORRECTS_WITHIN = 0.65
