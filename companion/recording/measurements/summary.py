@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from companion.recording.course import Course
-from companion.recording.dead_time import DeadTimes
-from companion.recording.maneuver_figures import ManeuverFigures, measure_maneuvers
-from companion.recording.response import StepResponse, measure_response
+from companion.recording.measurements.course import Course
+from companion.recording.measurements.dead_time import DeadTimes
+from companion.recording.measurements.maneuver_figures import ManeuverFigures, measure_maneuvers
+from companion.recording.measurements.response import StepResponse, measure_response
+from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import FlightTrace
-from companion.recording.verdict import checks, is_good
 
 _EXTENT = ("height_max_m", "speed_max_m_s", "tilt_max_deg")
 
