@@ -13,7 +13,7 @@ from companion.campaign.case import Case, Fault
 from companion.campaign.swept import Value
 from companion.config import Config
 from companion.flight.observer import Silent
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
 
 WIRE_S = 0.0005

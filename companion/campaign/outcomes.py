@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from companion.campaign.swept import Value
 from companion.config import Config
-from companion.recording.maneuver_figures import settled_parts
-from companion.recording.summary import Summary, tracking_errors
+from companion.recording.measurements.maneuver_figures import settled_parts
+from companion.recording.measurements.summary import Summary, tracking_errors
 from companion.testing import ReceivedSetpoint, Truth
 
 Floats = NDArray[np.float64]
