@@ -1,7 +1,7 @@
 """Figures of one vehicle's response to steps, compiled.
 
 They are those that `companion.recording.measurements.response` measures in a flight, computed
-sample after sample; `tests/batch/test_rate_loop.py` compares both.
+sample after sample; `tests/campaign/test_kinematics.py` compares both.
 """
 
 from functools import cache
@@ -53,8 +53,8 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
     """
     measure, fit = _compiled()
     figures = measure(flight.path, flight.targets, flight.commanded, 1.0 / gain, period)
-    north, east = (fit(flight.path, flight.targets, axis, period) for axis in (0, 1))
-    return StepFigures(*figures, north, east)
+    constants = [fit(flight.path, flight.targets, axis, period) for axis in (0, 1)]
+    return StepFigures(*figures, *constants)
 
 
 @cache

@@ -32,15 +32,6 @@ from companion.recording.measurements.verdict import STRAIGHTNESS
 
 MANEUVERS = ("steps", "corners")
 """Maneuvers that have open-loop steps."""
-FLOAT_OUTCOMES = (
-    "cross_axis_max",
-    "model_deviation_max",
-    "time_constant_s",
-    "rate_rms_rad_s",
-    "rate_max_rad_s",
-    "flight_s",
-)
-"""Outcomes that are numbers; null where the law failed."""
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
@@ -163,7 +154,8 @@ def _targets(config: Config, longest: float, heading: float) -> Array:
     targets[:, 2] = heading
     changes = np.flatnonzero(np.any(np.diff(wanted, axis=0), axis=1)) + 1
     for begin, end in zip((0, *changes), (*changes, len(wanted)), strict=True):
-        targets[begin:end] = limited_target(Target(*wanted[begin], heading), longest)
+        north, east = wanted[begin].tolist()
+        targets[begin:end] = limited_target(Target(north, east, heading), longest)
     return targets
 
 

@@ -42,9 +42,13 @@ def shortened(value: Any) -> str:
     return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
 
 
-@cache
 def kinds_in(annotation: Any) -> frozenset[Any]:
     """A type and the types inside it, for unions and annotated types."""
+    return _kinds_in(annotation)
+
+
+@cache
+def _kinds_in(annotation: Any) -> frozenset[Any]:
     return frozenset({annotation}).union(*(kinds_in(part) for part in get_args(annotation)))
 
 

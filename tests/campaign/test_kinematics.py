@@ -1,5 +1,6 @@
-"""One vehicle behind its rate loop, compared with Python objects and a flight's measures."""
+"""Batch kinematics: one vehicle behind its rate loop, its figures, and the rows of a campaign."""
 
+import json
 from dataclasses import replace
 from math import radians
 
@@ -20,6 +21,9 @@ from companion.attitude.reference import Lag
 from companion.attitude.rotation import clamp, turned
 from companion.batch.rate_loop import fly_steps
 from companion.batch.step_figures import step_figures
+from companion.campaign import loading
+from companion.campaign.kinematics import check_case, run_cases
+from companion.files.yaml_file import ConfigError
 from companion.recording.measurements.response import measure_response
 
 HEADING, GAIN, EVERY = 0.7, 4.0, 4
@@ -102,3 +106,52 @@ def test_an_axis_without_a_step_has_no_time_constant(planner, targets):
     figures = step_figures(fly_steps(planner, axes, start, north_only, EVERY), GAIN, EVERY / 1000)
     assert np.isnan(figures.time_constant_east)
     assert figures.time_constant_north == pytest.approx(1.0 / GAIN, rel=0.05)
+
+
+BATCH = {
+    "name": "steps",
+    "kind": "batch",
+    "config": {"planner": {"name": "first-order"}, "vehicle": {"lag_ms": 40, "dead_time_ms": 30}},
+    "samples": 3,
+    "set": {"flight.maneuvers": ["corners"], "corners.duration_s": 0.4},
+    "sweep": {
+        "vehicle.lag_ms": [5, 80],
+        "corners.north_coefficient": {"uniform": [0.1, 0.35]},
+        "mock.home.heading_deg": {"uniform": [-180, 180]},
+    },
+}
+
+
+def campaign(folder, **changes):
+    path = folder / "steps.yaml"
+    path.write_text(json.dumps(BATCH | changes))
+    return loading.load(path)
+
+
+def test_each_case_of_a_batch_is_flown_with_its_own_vehicle_and_target(tmp_path):
+    cases = list(campaign(tmp_path).cases())
+    rows = run_cases(cases)
+    assert [row["case"] for row in rows] == list(range(6))
+    assert len({row["digest"] for row in rows}) == 6
+    assert rows == run_cases(cases)
+    for quick, slow in zip(rows[::2], rows[1::2], strict=True):
+        assert quick["corners.north_coefficient"] == slow["corners.north_coefficient"]
+        assert quick["time_constant_s"] < slow["time_constant_s"] - 0.02
+        assert quick["cross_axis_max"] < slow["cross_axis_max"]
+        assert quick["flight_s"] == pytest.approx(8 * 0.4)
+    assert {row["result"] for row in rows} <= {"ok", "not straight"}
+    assert all(row["ok"] == (row["result"] == "ok") for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({"planner.name": "model-following"}, "without memory"),
+        ({"flight.maneuvers": ["hover"]}, r"\[corners\] or \[steps\]"),
+        ({"link.attitude_rate_hz": 300.0}, "divides 1000, not 300"),
+    ],
+)
+def test_what_a_batch_cannot_fly_is_refused(tmp_path, told, message):
+    (case, *_) = campaign(tmp_path, set=BATCH["set"] | told).cases()
+    with pytest.raises(ConfigError, match=message):
+        check_case(case)
