@@ -12,8 +12,8 @@ from companion.config import Config
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance
 from companion.files.yaml_file import ConfigError, parse
-from companion.testing import MockVehicle, check_guidance, check_planner, fly
-from tests.flight.fly import QUICK_FLIGHT, QUICK_PARAMETERS, merged
+from companion.testing import check_guidance, check_planner, fly
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
 from companion.attitude.first_order import first_order
@@ -100,7 +100,7 @@ def config(text):
 
 @pytest.mark.parametrize("name", ["mine", "remembering"])
 def test_a_planner_of_another_package_flies_by_its_name(name):
-    vehicle = MockVehicle("px4", prearm_delay_s=0.2, parameters=QUICK_PARAMETERS["px4"])
+    vehicle = QuickVehicle("px4")
     summary = fly(merged(QUICK_FLIGHT, {"planner": {"name": name}}), vehicle)
     assert (summary.result, summary.planner) == ("ok", name)
     assert summary.tracking()["position_max_m"] < 0.5
@@ -191,7 +191,7 @@ def test_guidance_that_strays_does_not_conform():
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_guidance_that_is_not_finite_is_never_sent_and_the_vehicle_is_handed_back(autopilot):
     """It begins to return NaN on its way along the circle."""
-    vehicle = MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+    vehicle = QuickVehicle(autopilot)
     flight = {"guidance": {"kind": "broken"}, "flight": {"maneuvers": ["circle"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
     assert summary.result == "guidance makes no commands any more"

@@ -14,7 +14,7 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from tests.flight.fly import QuickVehicle
+from tests.flight.fly import QuickVehicle, attitude_rate_hz
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
@@ -142,7 +142,7 @@ async def serving(
     config = changed(
         load(CONFIGS / f"mock-{autopilot}.yaml"),
         {
-            "link": {"lockstep": False},
+            "link": {"lockstep": False, "attitude_rate_hz": attitude_rate_hz(vehicle)},
             "limits": {"max_tilt_deg": 45.0},
             "serve": {"clients": (), **serve},
         },
