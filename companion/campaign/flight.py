@@ -1,7 +1,6 @@
 """One whole flight of a campaign, in this process on one virtual clock."""
 
 import tempfile
-from collections.abc import Sequence
 from math import acos
 from pathlib import Path
 
@@ -176,8 +175,3 @@ def _placed(config: Config, place: Path) -> Config:
     path = config.flight.trajectory
     flight = config.flight.model_copy(update={"trajectory": None if path is None else place / path})
     return config.model_copy(update={"recording": recording, "flight": flight})
-
-
-def fly_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Fly cases one after the other; a row each, in order."""
-    return [fly_case(case) for case in cases]
