@@ -113,7 +113,7 @@ def page_text(results: Results) -> str:
 def headline(results: Results) -> str:
     """What was flown, and the success rate with its interval, in a sentence."""
     share = share_of(results.good)
-    return f"{results.name}: {share.count} of {share.of} {results.noun} good: {share}"
+    return f"{results.name}: {share.chosen} of {share.of} {results.noun} good: {share}"
 
 
 def missing(results: Results) -> list[str]:
@@ -157,7 +157,7 @@ def _most_influential(results: Results, found: dict[str, list[Influence]]) -> It
     if results.error in found:
         first = found[results.error][0]
         error = label(results.error).partition(",")[0]
-        share = f"{first.index:.0%} ± {first.confidence:.0%}"
+        share = f"{first.share:.0%} ± {first.confidence:.0%}"
         yield f"{first.factor} explains {share} of the variance of the {error} by itself."
         yield from _few_samples(results)
     elif results.factors:
@@ -173,8 +173,8 @@ def _most_influential(results: Results, found: dict[str, list[Influence]]) -> It
         key=lambda each: each[0].high,
     )
     if worst is not None and worst[0].share < 1.0:
-        share, name, value = worst
-        yield f"Success is lowest with {name} = {value}: {share}."
+        lowest, name, value = worst
+        yield f"Success is lowest with {name} = {value}: {lowest}."
 
 
 def _few_samples(results: Results) -> Iterator[str]:

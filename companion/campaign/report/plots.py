@@ -42,7 +42,7 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
                 "arrayminus": [_percent(each.share - each.low) for each in shares],
             },
             "marker": {"color": MEASURED, "size": 8},
-            "text": [f"{each.count} of {each.of}" for each in shares],
+            "text": [f"{each.chosen} of {each.of}" for each in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
         layout = axes(x=label(name), y=f"good {results.noun}, %")
@@ -67,7 +67,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
                 "type": "bar",
                 "name": "good" if outcome == "ok" else label(outcome),
                 "x": [each.factor for each in found],
-                "y": numbers(np.array([100.0 * each.index for each in found])),
+                "y": numbers(np.array([100.0 * each.share for each in found])),
                 "error_y": {
                     "type": "data",
                     "array": numbers(np.array([100.0 * each.confidence for each in found])),
@@ -106,9 +106,9 @@ def pareto(results: Results) -> Iterator[Plot]:
     ]
     traces[0]["marker"] |= {"line": {"color": REFERENCE, "width": 2}}
     thrust = len(names) > 2
-    for trace, part in zip(traces, (goals[front], goals[~front]), strict=True):
+    for trace, part in zip(traces, (front, ~front), strict=True):
         if thrust:
-            trace["marker"] |= _scale(part[:, 2], goals[:, 2], shown=trace is traces[0])
+            trace["marker"] |= _scale(goals[part, 2], goals[:, 2], shown=trace is traces[0])
         else:
             trace["marker"]["color"] = MEASURED if trace is traces[0] else IDEAL
     of = "error, rate use and thrust use" if thrust else "error and rate use"

@@ -24,12 +24,12 @@ class Influence(NamedTuple):
 
     Attributes:
         factor: its name.
-        index: share of the variance, 0..1.
+        share: the index, 0..1.
         confidence: half width of its 95 % interval, by bootstrap; NaN where it cannot be found.
     """
 
     factor: str
-    index: float
+    share: float
     confidence: float
 
 
@@ -57,7 +57,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     listed = zip(told, found["S1"], found["S1_conf"], strict=True)
     return sorted(
         (Influence(name, float(index), float(half)) for name, index, half in listed),
-        key=lambda each: -each.index,
+        key=lambda each: -each.share,
     )
 
 

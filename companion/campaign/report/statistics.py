@@ -19,14 +19,14 @@ class Share(NamedTuple):
     """A share of cases with its Wilson interval, which covers the true share in 95 % of campaigns.
 
     Attributes:
-        count: cases that count.
+        chosen: cases that count.
         of: all cases.
-        share: count / of; NaN for no case.
+        share: chosen / of; NaN for no case.
         low: lower end of the interval.
         high: upper end.
     """
 
-    count: int
+    chosen: int
     of: int
     share: float
     low: float

@@ -75,7 +75,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     """The first-order Sobol indices of each outcome, with their intervals."""
     factors = dict.fromkeys(each.factor for found in influences.values() for each in found)
     known = {
-        outcome: {each.factor: f"{each.index:.0%} ± {each.confidence:.0%}" for each in found}
+        outcome: {each.factor: f"{each.share:.0%} ± {each.confidence:.0%}" for each in found}
         for outcome, found in influences.items()
     }
     rows = [
