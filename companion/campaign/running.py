@@ -30,6 +30,7 @@ from companion.campaign.cluster import (
     wait_for_workers,
 )
 from companion.campaign.folder import Description
+from companion.campaign.kinematics import check_case
 from companion.campaign.loading import load
 from companion.campaign.unit import size_of_units
 from companion.campaign.versions import VersionError
@@ -124,6 +125,9 @@ class _Run:
             first = [campaign.case(next(campaign.samples()))]
             estimate.check_size(campaign, estimate.measured(kind, first), workers)
         cases = list(campaign.cases())
+        if kind == "batch":
+            for case in cases:
+                check_case(case)
         if len(cases) <= _FEW * workers:
             return len(cases), None
         case_s = estimate.measured(kind, cases)
