@@ -1,6 +1,7 @@
 """Planners and guidance of another package: found, checked, flown, limited."""
 
 import sys
+from functools import partial
 from importlib import invalidate_caches
 from math import hypot, isfinite, nan
 
@@ -12,7 +13,7 @@ from companion.config import Config
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance
 from companion.files.yaml_file import ConfigError, parse
-from companion.testing import check_guidance, check_planner, fly
+from companion.testing import check_guidance, check_planner, conformance, fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
@@ -141,6 +142,13 @@ def test_the_rest_of_a_planner_is_passed_on():
     assert spy.noted == ((1.0, 0.0, 0.0, 0.0), 0.1)
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """The vehicles of `check_guidance` boot, climb and land quickly."""
+    monkeypatch.setattr(conformance, "MockVehicle", partial(QuickVehicle, full_rate=True))
+
+
+@pytest.mark.usefixtures("quick")
 def test_guidance_of_another_package_flies_by_its_name():
     assert type(make_guidance(config("guidance: {kind: calm}"))).__name__ == "Calm"
     check_guidance("calm")
@@ -183,6 +191,7 @@ def test_bad_planners_do_not(name, why):
         check_planner(name)
 
 
+@pytest.mark.usefixtures("quick")
 def test_guidance_that_strays_does_not_conform():
     with pytest.raises(AssertionError, match="away from its reference"):
         check_guidance("drifting")
