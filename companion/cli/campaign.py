@@ -16,6 +16,13 @@ def run(options: argparse.Namespace) -> int:
     return running.run(options)
 
 
+def report(options: argparse.Namespace) -> int:
+    """Write the page about a campaign, and its results in one table."""
+    from companion.campaign.report import page  # noqa: PLC0415
+
+    return page.run(options)
+
+
 def rerun(options: argparse.Namespace) -> int:
     """Fly one case again, and say whether it is the same flight."""
     from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415

@@ -7,7 +7,7 @@ from pathlib import Path
 from companion.cli.tool_options import Commands
 
 _CAMPAIGN, _RUN = "campaign", "run"
-_SUB_COMMANDS = (_RUN, "rerun", "-h", "--help")
+_SUB_COMMANDS = (_RUN, "report", "rerun", "-h", "--help")
 
 
 def with_campaign_command(arguments: Sequence[str]) -> list[str]:
@@ -32,6 +32,7 @@ def add_campaign(commands: Commands) -> None:
     )
     kinds = campaign.add_subparsers(required=True, metavar="WHAT")
     _add_run(kinds)
+    _add_report(kinds)
     _add_rerun(kinds)
 
 
@@ -82,6 +83,18 @@ def _add_rerun(kinds: Commands) -> None:
     rerun.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
     rerun.add_argument("case", type=int, metavar="CASE", help="number in the column `case`")
     rerun.set_defaults(run="campaign.rerun")
+
+
+def _add_report(kinds: Commands) -> None:
+    report = kinds.add_parser(
+        "report",
+        help="write the page about a campaign, finished or not, and its results as one table",
+        description="Write report.html with success rates, worst cases, sensitivity, Pareto front "
+        "and distributions, and all results as results.parquet and results.csv in the folder.",
+    )
+    report.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
+    report.add_argument("--out", type=Path, metavar="FILE", help="the page (FOLDER/report.html)")
+    report.set_defaults(run="campaign.report")
 
 
 def _workers(text: str) -> int:
