@@ -59,7 +59,7 @@ def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=()):
     try:
         yield result
         process.send_signal(signal.SIGINT)
-        out, result.said = process.communicate(timeout=15)
+        out, result.said = process.communicate(timeout=60)
         assert process.returncode == 0, result.said
         result.counters = json.loads(out.splitlines()[-1])
     finally:
