@@ -9,7 +9,7 @@ from math import inf
 from companion.flight.context import FlightContext
 from companion.flight.phases import Phase, ground_phases, program_phase
 from companion.guidance import ManeuverSequence
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.safety.actions import FlightEnded
 
 _NEXT_CALL = "the program's next call"

@@ -23,7 +23,7 @@ from companion.guidance.source import CommandedSource
 from companion.guidance.trajectory import Trajectory, line
 from companion.guidance.trajectory.timed_curve import FixedHeading
 from companion.mavlink.lockstep import LockstepEventLoop
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
 
 T = TypeVar("T")

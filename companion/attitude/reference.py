@@ -113,6 +113,25 @@ def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[fl
     return aim * dt + (rate - aim) * lag * (1.0 - kept), aim + (rate - aim) * kept
 
 
+def lag_step(
+    rate: float,
+    slope: float,
+    aim: float,
+    dt: float,
+    lag: float,
+    square: float,
+    transition: tuple[float, float, float, float],
+) -> tuple[float, float, float]:
+    """One step of square·r̈ + lag·ṙ = aim − r: the integral of r over `dt`, and r and ṙ at the end.
+
+    `transition` is that of `Lag.transition`. In first order `slope` has no effect and ṙ is 0.
+    """
+    left, from_slope, falls, kept = transition
+    later = aim + left * (rate - aim) + from_slope * slope
+    steeper = falls * (rate - aim) + kept * slope
+    return aim * dt - lag * (later - rate) - square * (steeper - slope), later, steeper
+
+
 class Lag:
     """A lag of first or second order: square·r̈ + lag·ṙ = aim − r.
 
@@ -141,8 +160,11 @@ class Lag:
         if self._model is None:
             moved, later = first_order_step(rate, aim, self._lag, dt)
             return moved, later, (aim - later) / self._lag
-        left, from_slope, falls, kept = self._model.transition(dt)
-        later = aim + left * (rate - aim) + from_slope * slope
-        steeper = falls * (rate - aim) + kept * slope
-        moved = aim * dt - self._lag * (later - rate) - self._square * (steeper - slope)
-        return moved, later, steeper
+        transition = self.transition(dt)
+        return lag_step(rate, slope, aim, dt, self._lag, self._square, transition)
+
+    def transition(self, dt: float) -> tuple[float, float, float, float]:
+        """Transition matrix of the state (r − aim, ṙ) over `dt` seconds, row by row."""
+        if self._model is None:
+            return exp(-dt / self._lag), 0.0, 0.0, 0.0
+        return self._model.transition(dt)

@@ -9,7 +9,7 @@ from companion.cli.helping import helper
 from companion.cli.terminal import FlightConsole
 from companion.config.files import load
 from companion.recording.folder import flight_folder
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.report import PAGE
 
 

@@ -26,8 +26,8 @@ from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
+from companion.recording.measurements.summary import Summary
 from companion.recording.report import flight_table, words_text
-from companion.recording.summary import Summary
 
 
 def as_told(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:

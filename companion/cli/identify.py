@@ -26,7 +26,7 @@ from companion.identification import (
     vehicle_table,
 )
 from companion.recording.folder import flight_folder
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.vehicle.flight_log import read_flight_log
 
 SHIPPED = Path()

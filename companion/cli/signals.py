@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 from companion.flight.session import Session
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 
 LEAVE_AFTER = 1.0
 """A second Ctrl-C leaves only if it comes this long after the first, s: a key may bounce."""

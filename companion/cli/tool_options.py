@@ -149,6 +149,12 @@ def add_study(commands: Commands) -> None:
         "--out", type=Path, default=Path("study"), metavar="DIR", help="default: study"
     )
     study.add_argument(
+        "--workers",
+        type=whole_number(1, 256),
+        metavar="N",
+        help="processes that run studies of `all`; default: one for each core",
+    )
+    study.add_argument(
         "--json",
         action="store_true",
         help=f"for {registry.names_with_json()}: print its rows as one JSON list",
@@ -212,5 +218,16 @@ def number(least: float, most: float) -> Callable[[str], float]:
         if not least <= value <= most:
             raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
         return value
+
+    return read
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """A whole number of the command line within bounds."""
+
+    def read(text: str) -> int:
+        if not (text.isascii() and text.isdigit()) or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}")
+        return int(text)
 
     return read

@@ -58,11 +58,12 @@ def study(options: argparse.Namespace) -> int:
             " tables as CSV"
         )
     registry.check_extras(options.name)
-    from companion.study import runner  # noqa: PLC0415  needs the extra
+    from companion.study import runner, workers  # noqa: PLC0415  needs the extra
 
+    count = options.workers or workers.cores()
     console = Console(stderr=options.json)
     try:
-        page, rows = runner.run(options.name, options.case, options.out, console)
+        page, rows = runner.run(options.name, options.case, options.out, console, count)
     except KeyboardInterrupt:
         console.print(f"Interrupted; the files in {options.out} are complete.", highlight=False)
         return EXIT_FLIGHT

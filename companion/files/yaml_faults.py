@@ -3,6 +3,7 @@
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from math import degrees, radians
 from typing import Any, get_args
 
@@ -41,9 +42,14 @@ def shortened(value: Any) -> str:
     return text if len(text) <= _LONGEST_TOLD else f"{text[:_LONGEST_TOLD]}..."
 
 
-def kinds_in(annotation: Any) -> set[Any]:
+def kinds_in(annotation: Any) -> frozenset[Any]:
     """A type and the types inside it, for unions and annotated types."""
-    return {annotation}.union(*(kinds_in(part) for part in get_args(annotation)))
+    return _kinds_in(annotation)
+
+
+@cache
+def _kinds_in(annotation: Any) -> frozenset[Any]:
+    return frozenset({annotation}).union(*(kinds_in(part) for part in get_args(annotation)))
 
 
 def without_consequences(details: list[Any]) -> list[Any]:

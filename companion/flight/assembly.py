@@ -32,8 +32,8 @@ from companion.mavlink.stamp_file import StampFile
 from companion.mavlink.transport.base import Tap
 from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.realtime import Wishes
+from companion.recording.measurements.summary import LoopCounts, PredictiveFigures
 from companion.recording.recorder import FlightRecorder
-from companion.recording.summary import LoopCounts, PredictiveFigures
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
 from companion.safety.snapshot_builder import SnapshotBuilder

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from companion.flight.assembly import Assembled
 from companion.flight.context import FlightContext
-from companion.recording.course import Course, EarlyEnd
-from companion.recording.dead_time import DeadTimes
+from companion.recording.measurements.course import Course, EarlyEnd
+from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.trace import ManeuverMark
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from companion.config import Config
 from companion.identification import dead_time_by_correlation
-from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import FlightTrace
 from companion.safety.actions import internal
 

@@ -18,8 +18,8 @@ from companion.flight.environment import Environment
 from companion.flight.observer import EventRecorder, Observer
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextFrames
+from companion.recording.measurements.summary import Summary
 from companion.recording.recorder import FlightRecorder
-from companion.recording.summary import Summary
 from companion.recording.tlog import TlogWriter
 
 

@@ -40,7 +40,9 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
         _make_absolute(data, place)
     path = config.flight.trajectory
     if follows and path is not None and "trajectory" in config.flight.maneuvers:
-        data["flight"]["trajectory"] = f"{_TRAJECTORY}/{_copied(path, folder / _TRAJECTORY)}"
+        data["flight"]["trajectory"] = (
+            f"{_TRAJECTORY}/{copy_trajectory(path, folder / _TRAJECTORY)}"
+        )
     write_whole(folder / _NAME, bounded_yaml.dump(data))
 
 
@@ -86,8 +88,16 @@ def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:
         section[key] = str(Path(section[key]).absolute())
 
 
-def _copied(path: Path, folder: Path) -> str:
-    """Copy a trajectory's file, and the table that it names; returns the copy's name."""
+def copy_trajectory(path: Path, folder: Path) -> str:
+    """Copy a trajectory's file, and the table that it names, to a new folder.
+
+    Returns:
+        the name of the copy.
+
+    Raises:
+        ConfigError: the file holds no trajectory.
+        OSError: a file cannot be read or written.
+    """
     folder.mkdir()
     copy = folder / path.name
     shape = None if is_table(path) else yaml_file.load(path, TrajectoryFile)

@@ -15,7 +15,7 @@ from companion.flight.observer import Observer
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
 from companion.realtime import Wishes
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
 from companion.vehicle.link import Link
 

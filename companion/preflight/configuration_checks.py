@@ -11,7 +11,7 @@ from companion.config.doubts import doubts
 from companion.config.guidance import AUTO
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.recording.dead_time import AxisDeadTime, DeadTimes
+from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes
 from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.registry import AUTOPILOTS
 

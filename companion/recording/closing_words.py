@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from companion.recording.verdict import Check, Figures, checks, is_good
+from companion.recording.measurements.verdict import Check, Figures, checks, is_good
 from companion.recording.what_to_do import what_to_do
 
 _BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")

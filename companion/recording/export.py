@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from companion.extras import require
 from companion.recording.flight_record import FlightRecord
 from companion.recording.mcap_file.channels import CHANNELS
-from companion.recording.recorded_summary import trace_of
+from companion.recording.measurements.recorded_summary import trace_of
 
 _JOINED = ("tracking", "rates", "response")
 

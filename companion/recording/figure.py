@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from companion.extras import require
 from companion.recording.flight_record import FlightRecord, RecordError, read_flight
 from companion.recording.history import HEIGHTS, Marks, draw_history, marks_of
-from companion.recording.recorded_summary import summary_of, trace_of
-from companion.recording.response import first_order
-from companion.recording.second_order import StepRun, nearest_second_order, step_runs
+from companion.recording.measurements.recorded_summary import summary_of, trace_of
+from companion.recording.measurements.response import first_order
+from companion.recording.measurements.second_order import StepRun, nearest_second_order, step_runs
 from companion.recording.series import Series
 from companion.recording.trace import FlightTrace
 

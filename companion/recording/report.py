@@ -7,8 +7,8 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.recording.closing_words import ClosingWords
-from companion.recording.dead_time import AxisDeadTime
-from companion.recording.summary import PredictiveFigures, Summary
+from companion.recording.measurements.dead_time import AxisDeadTime
+from companion.recording.measurements.summary import PredictiveFigures, Summary
 
 
 def flight_table(summary: Summary) -> RenderableType:

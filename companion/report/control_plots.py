@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from companion.recording.response import first_order
-from companion.recording.second_order import nearest_second_order
+from companion.recording.measurements.response import first_order
+from companion.recording.measurements.second_order import nearest_second_order
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
     FLIGHTS,

@@ -14,8 +14,8 @@ from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import Event, FlightRecord, read_flight
 from companion.recording.mcap_file.fields import Row
-from companion.recording.recorded_summary import summary_of, trace_of
-from companion.recording.second_order import StepRun, step_runs
+from companion.recording.measurements.recorded_summary import summary_of, trace_of
+from companion.recording.measurements.second_order import StepRun, step_runs
 
 Floats = NDArray[np.float64]
 

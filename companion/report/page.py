@@ -1,20 +1,16 @@
 """Makes the page of one flight, or of several beside each other: one HTML file, no network."""
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
-from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
 from companion.recording.flight_record import RecordError
 from companion.report import PAGE
 from companion.report.control_plots import control_plots
 from companion.report.flight_data import FlightData, recorded
+from companion.report.html_page import rendered, require_extra
 from companion.report.motion_plots import motion_plots
 from companion.report.plots import Plot
 from companion.report.tables import Table, beside_each_other, configuration, flight_tables
@@ -44,7 +40,7 @@ def write_report(path: Path, out: Path | None = None) -> Path:
         RecordError, LogError: the flight cannot be read.
         OSError: the page cannot be written.
     """
-    _require_extra()
+    require_extra()
     flight = read(path)
     if out is None:
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
@@ -63,7 +59,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     Raises:
         MissingExtraError, RecordError, LogError, OSError: as `write_report`.
     """
-    _require_extra()
+    require_extra()
     flights = [read(path) for path in paths]
     title = " and ".join(flight.name for flight in flights)
     with _of_this_version(paths[0]):
@@ -89,11 +85,6 @@ def _of_this_version(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _require_extra() -> None:
-    for module in ("plotly", "jinja2"):
-        require(module, "report", "a report")
-
-
 def _page(
     title: str,
     words: ClosingWords | None,
@@ -102,29 +93,13 @@ def _page(
     plots: Sequence[Plot],
     settings: Table | None,
 ) -> str:
-    import jinja2  # noqa: PLC0415  an extra
-
-    here = files("companion.report")
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string((here / "page.html.j2").read_text("utf-8"))
-    plotly = files("plotly") / "package_data" / "plotly.min.js"
-    return template.render(
-        title=title,
+    return rendered(
+        "companion.report",
+        "page.html.j2",
+        title,
+        plots,
         words=words,
         flights=flights,
         tables=tables,
-        plots=plots,
-        plots_json=_script_safe([_plain(plot) for plot in plots]),
         settings=settings,
-        plotly=plotly.read_text("utf-8"),
-        version=version("mavlink-companion"),
     )
-
-
-def _plain(plot: Plot) -> dict[str, Any]:
-    return {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
-
-
-def _script_safe(data: Any) -> str:
-    """JSON inside a script element: no `<`, with which a tag could begin."""
-    return json.dumps(data, allow_nan=False).replace("<", "\\u003c")

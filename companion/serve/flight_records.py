@@ -12,7 +12,7 @@ from companion.flight.environment import Environment
 from companion.flight.flight_files import FlightFiles
 from companion.mavlink.transport.base import Tap
 from companion.recording.folder import flight_folder
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 
 
 class FlightRecords:

@@ -18,7 +18,7 @@ from companion.flight.wiring import connected
 from companion.guidance import GRAVITY
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.safety.actions import internal
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords

@@ -1,5 +1,6 @@
 """Runs studies with a progress bar, and writes their files and the page."""
 
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -7,6 +8,7 @@ from tempfile import TemporaryFile
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -20,9 +22,10 @@ from rich.progress import (
 from companion.files.yaml_file import ConfigError
 from companion.study import registry
 from companion.study.drawing import STYLE
-from companion.study.outcome import Job
+from companion.study.outcome import Job, Outcome, Tick
 from companion.study.registry import Study
 from companion.study.report import write_outcome, write_page
+from companion.study.workers import run_in_workers
 
 
 class Written(NamedTuple):
@@ -37,7 +40,9 @@ class Written(NamedTuple):
     rows: list[dict[str, Any]]
 
 
-def run(name: str, case_file: Path | None, out: Path, console: Console) -> Written:
+def run(
+    name: str, case_file: Path | None, out: Path, console: Console, workers: int = 1
+) -> Written:
     """Run one study of the registry, or `all`.
 
     Args:
@@ -45,29 +50,45 @@ def run(name: str, case_file: Path | None, out: Path, console: Console) -> Writt
         case_file: file of `--case`, or None.
         out: folder for the results.
         console: console for the progress bar.
+        workers: number of processes that run studies; the files do not depend on it.
 
     Raises:
         ConfigError: `out` or the case cannot be used, a case is missing, or the study takes none.
-        OSError: a result cannot be written.
+        OSError: a result cannot be written, or a worker was killed.
         VehicleStoppedError: the mock vehicle ended before its flight did.
     """
     jobs = {study.name: _job(study, case_file) for study in registry.chosen(name)}
     page = _prepared(out, "study" if name == registry.ALL else name)
-    outcomes = []
-    with mpl.rc_context(), _progress(console) as progress:
+    workers = min(workers, len(jobs))
+    with _progress(console) as progress:
+        total = sum(job.parts for job in jobs.values()) + 1
+        task = progress.add_task("", total=total, study="")
+        tick = partial(_tick, progress, task)
+        if workers > 1:
+            parts = {key: job.parts for key, job in jobs.items()}
+            outcomes = run_in_workers(partial(_run_named, out), parts, workers, tick)
+        else:
+            outcomes = {key: _run(job, out, partial(tick, key)) for key, job in jobs.items()}
+        progress.update(task, description=page.name, study="")
+        write_page(list(outcomes.values()), page)
+        progress.update(task, completed=total, description="done")
+    return Written(page, [row for outcome in outcomes.values() for row in outcome.rows])
+
+
+def _run_named(out: Path, name: str, tick: Tick) -> Outcome:
+    """Run a study without a case in a worker process, and write its files."""
+    outcome = _run(_job(registry.STUDIES[name], None), out, tick)
+    return replace(outcome, figure=Figure())  # the files are written; the figure is large
+
+
+def _run(job: Job, out: Path, tick: Tick) -> Outcome:
+    """Run a study and write its files."""
+    with mpl.rc_context():
         mpl.rcdefaults()  # the files must not depend on the user's matplotlibrc
         mpl.rcParams.update(STYLE)
-        total = sum(job.parts + 1 for job in jobs.values()) + 1
-        task = progress.add_task("", total=total, study="")
-        for key, job in jobs.items():
-            outcome = job.run(partial(_tick, progress, task, key))
-            write_outcome(outcome, out)
-            progress.advance(task)
-            outcomes.append(outcome)
-        progress.update(task, description=page.name, study="")
-        write_page(outcomes, page)
-        progress.update(task, advance=1, description="done")
-    return Written(page, [row for outcome in outcomes for row in outcome.rows])
+        outcome = job.run(tick)
+        write_outcome(outcome, out)
+    return outcome
 
 
 def _job(study: Study, case_file: Path | None) -> Job:

@@ -16,7 +16,7 @@ from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding
 from companion.flight.observer import Observer, Silent, decline_landing
 from companion.flight.session import Session
-from companion.recording.summary import Summary
+from companion.recording.measurements.summary import Summary
 from companion.testing.vehicle import MockVehicle
 from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
 from companion.testing.wire import open_wire, wire_to

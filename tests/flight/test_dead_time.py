@@ -11,7 +11,7 @@ from companion.config.files import load
 from companion.flight import assembly, dead_time_watch
 from companion.flight.dead_time_watch import DeadTimeWatch, RateLoop
 from companion.recording.flight_record import read_flight
-from companion.recording.recorded_summary import trace_of
+from companion.recording.measurements.recorded_summary import trace_of
 from companion.recording.trace import FlightTrace
 from tests.flight.fly import fly, mock_vehicle
 from tests.identification.vehicles import RATE_NOISE, lag_with_dead_time

@@ -8,7 +8,7 @@ import numpy as np
 
 from companion.mavlink.tlog_file import messages
 from companion.recording.flight_record import read_flight
-from companion.recording.recorded_summary import trace_of
+from companion.recording.measurements.recorded_summary import trace_of
 from tests.real.flights import MOVING, PARTS, configuration, named, shipped
 from tests.real.incidents import INCIDENTS, ten
 from tests.real.measures import straightness, tracking_errors

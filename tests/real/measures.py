@@ -13,7 +13,7 @@ from math import atan2, degrees
 import numpy as np
 
 from companion.attitude import coefficients, heading
-from companion.recording.response import measure_response
+from companion.recording.measurements.response import measure_response
 from tests.real.truth import (
     Floats,
     Truth,

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.recording.flight_record import read_flight
-from companion.recording.recorded_summary import trace_of
+from companion.recording.measurements.recorded_summary import trace_of
 from tests.real.build import REAL, ROOT
 from tests.real.measures import rms
 from tests.real.stamps import stamp_offset

@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.config.flight import FlightConfig
 from companion.flight.phases import Exit, exit_phases, flight_phases, ground_phases
 from companion.recording.closing_words import Invocation, closing_words
-from companion.recording.verdict import checks, is_good
+from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.what_to_do import BY_MONITOR, BY_PHASE
 from companion.safety.table import monitors
 from companion.vehicle.registry import AUTOPILOTS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.recording.dead_time import AxisDeadTime, DeadTimes
+from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes
 
 
 @pytest.mark.parametrize(

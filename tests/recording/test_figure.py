@@ -13,7 +13,7 @@ from companion.recording.history import HEIGHTS, Marks, Span, draw_history, mark
 from companion.recording.mcap_file.channels import MOTION, SAMPLE, SETPOINT
 from companion.recording.mcap_file.fields import CDR
 from companion.recording.mcap_file.writer import McapWriter
-from companion.recording.recorded_summary import _KEYS
+from companion.recording.measurements.recorded_summary import _KEYS
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 

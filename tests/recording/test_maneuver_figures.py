@@ -5,7 +5,7 @@ from math import nan
 import numpy as np
 import pytest
 
-from companion.recording.maneuver_figures import BEGINNING, measure_maneuvers
+from companion.recording.measurements.maneuver_figures import BEGINNING, measure_maneuvers
 from companion.recording.trace import ManeuverMark
 
 RATE = 50

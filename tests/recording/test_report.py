@@ -7,10 +7,10 @@ import pytest
 from rich.console import Console
 
 from companion.attitude import BodyRates
-from companion.recording.course import Course
-from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.measurements.course import Course
+from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.report import flight_table
-from companion.recording.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 from tests.recording.test_summary import trace_of
 

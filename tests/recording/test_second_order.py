@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from companion.recording.response import measure_response
-from companion.recording.second_order import StepRun, nearest_second_order, step_runs
+from companion.recording.measurements.response import measure_response
+from companion.recording.measurements.second_order import StepRun, nearest_second_order, step_runs
 from tests.attitude.independent import attitudes
 
 STILL = ((0.0, 0.0), (0.0, 0.0))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from companion.attitude import Coefficients, Target, attitude
-from companion.recording.dead_time import AxisDeadTime, DeadTimes, SampleAge
-from companion.recording.response import measure_response
-from companion.recording.summary import LoopCounts, Summary
+from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
+from companion.recording.measurements.response import measure_response
+from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
 

@@ -15,7 +15,7 @@ from companion.flight.observer import Silent
 from companion.mavlink.tlog_file import messages
 from companion.recording import background_file
 from companion.recording.flight_record import read_flight
-from companion.recording.recorded_summary import summary_of
+from companion.recording.measurements.recorded_summary import summary_of
 from tests.flight.fly import fly, mock_vehicle
 
 TOLD = struct.Struct("<dd")

@@ -14,7 +14,7 @@ from companion.config.files import changed, load
 from companion.recording.flight_record import read_flight
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.writer import WORDS
-from companion.recording.recorded_summary import derived_summary, summary_of
+from companion.recording.measurements.recorded_summary import derived_summary, summary_of
 from companion.replay.replay import Replay
 from tests.flight.fly import fly, mock_vehicle
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.cli.main import main
-from companion.report import PAGE, page
+from companion.report import PAGE, html_page, page
 from companion.report.plots import thinned
 from tests.flight.fly import fly, mock_vehicle
 
@@ -132,7 +132,7 @@ def test_a_summary_with_values_of_another_kind_is_one_sentence(copied, capsys):
 
 
 def test_text_of_a_log_cannot_become_a_tag():
-    assert "</script>" not in page._script_safe({"text": "</script><script>alert(1)"})
+    assert "</script>" not in html_page._script_safe({"text": "</script><script>alert(1)"})
 
 
 @settings(max_examples=30)

@@ -2,13 +2,11 @@
 
 import asyncio
 import json
-import os
-import signal
 import socket
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from math import inf
 from multiprocessing import get_context
 from pathlib import Path
@@ -26,6 +24,7 @@ from companion.mavlink import lockstep
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 from companion.study.track.tasks import Task
+from companion.study.workers import cores, interrupts_blocked
 
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
@@ -93,30 +92,20 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
     Raises:
         ConfigError, VehicleStoppedError: a flight raised it (see `fly`); no more are started.
     """
-    cores = len(os.sched_getaffinity(0))
+    count = cores()
     flown: dict[Task, Future[Tracked]] = {}
-    with ProcessPoolExecutor(min(cores, len(tasks)), get_context("spawn")) as pool:
+    with ProcessPoolExecutor(min(count, len(tasks)), get_context("spawn")) as pool:
         for task in tasks:
-            _await_a_free_core(list(flown.values()), cores)
+            _await_a_free_core(list(flown.values()), count)
             tick(str(task))
-            with _interrupts_blocked():
+            with interrupts_blocked():
                 flown[task] = pool.submit(fly, task)
         return {task: future.result() for task, future in flown.items()}
 
 
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT; processes started meanwhile inherit this, so Ctrl-C does not reach them."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-
-
-def _await_a_free_core(flights: Sequence[Future[Tracked]], cores: int) -> None:
+def _await_a_free_core(flights: Sequence[Future[Tracked]], count: int) -> None:
     flying = [flight for flight in flights if not flight.done()]
-    if len(flying) >= cores:
+    if len(flying) >= count:
         wait(flying, return_when=FIRST_COMPLETED)
     for flight in flights:
         if flight.done():

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from companion.recording.course import Course
-from companion.recording.dead_time import DeadTimes
-from companion.recording.maneuver_figures import ManeuverFigures, measure_maneuvers
-from companion.recording.response import StepResponse, measure_response
+from companion.recording.measurements.course import Course
+from companion.recording.measurements.dead_time import DeadTimes
+from companion.recording.measurements.maneuver_figures import ManeuverFigures, measure_maneuvers
+from companion.recording.measurements.response import StepResponse, measure_response
+from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import FlightTrace
-from companion.recording.verdict import checks, is_good
 
 _EXTENT = ("height_max_m", "speed_max_m_s", "tilt_max_deg")
 
@@ -115,16 +115,7 @@ class Summary:
 
     def tracking(self) -> dict[str, float]:
         """Position error on the closed-loop parts, and height error over all of control, m."""
-        rows = self.trace.tracking_rows()
-        if len(rows) == 0:
-            return dict.fromkeys(("position_rms_m", "position_max_m", "height_rms_m"), math.nan)
-        error = rows[:, 4:7] - rows[:, 1:4]
-        distance = np.linalg.norm(error[~np.isnan(rows[:, 1])], axis=1)
-        return {
-            "position_rms_m": _rms(distance),
-            "position_max_m": float(distance.max()) if len(distance) else math.nan,
-            "height_rms_m": _rms(error[:, 2]),
-        }
+        return tracking_errors(self.trace.tracking_rows())
 
     def maneuvers(self) -> tuple[ManeuverFigures, ...]:
         """The figures of each maneuver that was flown, in order."""
@@ -180,6 +171,23 @@ class Summary:
     def as_json(self) -> str:
         """`as_dict` on one line."""
         return json.dumps(self.as_dict(), allow_nan=False)
+
+
+def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
+    """Position error on the closed-loop rows, and height error over all rows, m; NaN: none.
+
+    Args:
+        rows: (N, 7) as `FlightTrace.tracking`.
+    """
+    if len(rows) == 0:
+        return dict.fromkeys(("position_rms_m", "position_max_m", "height_rms_m"), math.nan)
+    error = rows[:, 4:7] - rows[:, 1:4]
+    distance = np.linalg.norm(error[~np.isnan(rows[:, 1])], axis=1)
+    return {
+        "position_rms_m": _rms(distance),
+        "position_max_m": float(distance.max()) if len(distance) else math.nan,
+        "height_rms_m": _rms(error[:, 2]),
+    }
 
 
 def _response_as_dict(response: StepResponse | None) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from companion.least_squares import minimise
-from companion.recording.second_order import (
+from companion.recording.measurements.second_order import (
     Floats,
     SecondOrderFit,
     StepRun,

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.files.bounded_file import FileRefusedError, read_text
-from companion.recording.course import Course, EarlyEnd
 from companion.recording.flight_record import FlightRecord, as_recorded
 from companion.recording.mcap_file.channels import REASONS
-from companion.recording.summary import LoopCounts, Summary
+from companion.recording.measurements.course import Course, EarlyEnd
+from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
 
 _LONGEST = 1 << 26

@@ -1,6 +1,6 @@
 """Tracking by maneuver: a hover, a circle and open-loop steps have no error in common."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, isnan, nan
 from typing import Any
@@ -85,20 +85,46 @@ def measure_maneuvers(
         marks: of `FlightTrace.maneuvers`.
         began: when the flight began, s on our clock.
     """
+    return tuple(
+        _measured(mark.name or "", mark.time - began, part) for mark, part in _parts(rows, marks)
+    )
+
+
+def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
+    """The rows of each maneuver in closed loop, without its beginning.
+
+    Args:
+        rows: (N, 7) of `FlightTrace.tracking`.
+        marks: of `FlightTrace.maneuvers`.
+    """
+    parts = [part for _, part in _parts(rows, marks) if not _is_open_loop(part)]
+    return [part[part[:, 0] >= part[0, 0] + _beginning(part)] for part in parts]
+
+
+def _parts(rows: Floats, marks: Sequence[ManeuverMark]) -> Iterator[tuple[ManeuverMark, Floats]]:
+    """Each maneuver that was flown, and its rows."""
     ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
-    measured = []
     for mark, end in zip(marks, ends, strict=False):  # without marks there is an end too many
         part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
         if mark.name is not None and len(part) > 1:
-            measured.append(_measured(mark.name, mark.time - began, part))
-    return tuple(measured)
+            yield mark, part
+
+
+def _is_open_loop(rows: Floats) -> bool:
+    return bool(np.isnan(rows[:, 1]).any())
+
+
+def _beginning(rows: Floats) -> float:
+    """Time that is left out at the beginning of a maneuver, s."""
+    if _is_open_loop(rows):
+        return 0.0
+    return min(BEGINNING, _MOST_OF_IT * float(rows[-1, 0] - rows[0, 0]))
 
 
 def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
-    open_loop = bool(np.isnan(reference[:, 0]).any())
-    beginning = 0.0 if open_loop else min(BEGINNING, _MOST_OF_IT * duration)
+    open_loop, beginning = _is_open_loop(rows), _beginning(rows)
     early = time < time[0] + beginning
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), np.abs(error[:, 2])

@@ -1,0 +1,136 @@
+"""One vehicle behind its rate loop: dead time, slew limit and lag of each axis, compiled.
+
+Unlike the loops over many vehicles this one goes through the samples of one vehicle. Each vehicle
+may have limits, gains and a rate loop of its own, and what is stored does not grow with their
+number.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.attitude.kinematics import tilt_products
+from companion.attitude.limits import Constants
+from companion.attitude.planner import Law, LawPlanner
+from companion.attitude.rate_response import AxisResponse
+from companion.attitude.reference import Lag, lag_step
+from companion.attitude.rotation import clamp, turned
+from companion.attitude.types import Quaternion
+from companion.batch.compiler import Compiler
+from companion.batch.loops import Array
+from companion.extras import require
+
+STEP_HZ = 1000
+"""Simulation steps per second; dead times are rounded to whole steps."""
+_UNLIMITED = 1e300
+"""Slew of an axis without a slew limit, rad/s per step."""
+
+
+class StepFlight(NamedTuple):
+    """One vehicle's flight, a row for each attitude sample of the planner.
+
+    Attributes:
+        path: (samples, 2), coefficients north and east at the sample.
+        targets: (samples, 2), the target for which the sample was answered.
+        commanded: (samples, 3), commanded body rates, rad/s.
+        q: attitude at the end.
+    """
+
+    path: Array
+    targets: Array
+    commanded: Array
+    q: Quaternion
+
+
+def fly_steps(
+    planner: LawPlanner,
+    axes: Sequence[AxisResponse],
+    start: Quaternion,
+    targets: Array,
+    steps_per_sample: int,
+) -> StepFlight:
+    """Fly one vehicle from rest; it follows one target after the other.
+
+    Args:
+        planner: gives the law and its constants.
+        axes: response of roll, pitch and yaw to commanded body rates.
+        start: attitude, body → world.
+        targets: (samples, 4), admissible targets: coefficients north and east, heading in rad,
+            heading rate in rad/s.
+        steps_per_sample: simulation steps from one sample to the next.
+
+    Raises:
+        MissingExtraError: numba is not installed.
+        TypeError: the planner keeps state between samples.
+    """
+    if not isinstance(planner, LawPlanner):
+        raise TypeError(f"{type(planner).__name__} keeps state; a batch needs a planner without")
+    require("numba", "study", "a compiled batch")
+    path, commanded = np.empty((len(targets), 2)), np.empty((len(targets), 3))
+    rates, delays = _rate_loop(axes)
+    fly = _compiled(planner.law)
+    q = fly(start, targets, rates, delays, planner.constants, steps_per_sample, path, commanded)
+    return StepFlight(path, targets[:, :2], commanded, q)
+
+
+def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
+    """(3, 7) lag, square, slew per step and transition of each axis; (3,) dead times in steps."""
+    rows = []
+    for axis in (each.with_least_lag() for each in axes):
+        slew = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED
+        transition = Lag(axis.lag, axis.square).transition(1.0 / STEP_HZ)
+        rows.append((axis.lag, axis.square, slew, *transition))
+    return np.array(rows), np.array([round(axis.dead_time * STEP_HZ) for axis in axes])
+
+
+@cache
+def _compiled(law: Law) -> Callable[..., Quaternion]:
+    """The flight of one vehicle under `law`."""
+    compiler = Compiler({})
+    one_law, turn = compiler.function(law), compiler.function(turned)
+    lagged, limited = compiler.function(lag_step), compiler.function(clamp)
+    products = compiler.function(tilt_products)
+    dt = 1.0 / STEP_HZ
+
+    def fly(
+        q: Quaternion,
+        targets: Array,
+        rates: Array,
+        delays: NDArray[np.int64],
+        constants: Constants,
+        steps: int,
+        path: Array,
+        commanded: Array,
+    ) -> Quaternion:
+        length = delays.max() + 1
+        sent = np.zeros((length, 3))  # the newest commands, a ring
+        aims, now, slopes, mean = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+        k = 0
+        for sample in range(targets.shape[0]):
+            goal = targets[sample, 0], targets[sample, 1], targets[sample, 2], targets[sample, 3]
+            _, ax, ay = products(q[0], q[1], q[2], q[3])
+            path[sample, 0], path[sample, 1] = -2.0 * ay, 2.0 * ax
+            roll, pitch, yaw = one_law(q, goal, steps * dt, constants)
+            commanded[sample, 0], commanded[sample, 1], commanded[sample, 2] = roll, pitch, yaw
+            for _ in range(steps):
+                place = k % length
+                sent[place, 0], sent[place, 1], sent[place, 2] = roll, pitch, yaw
+                for axis in range(3):
+                    acting = sent[(k + length - delays[axis]) % length, axis]
+                    lag, square, slew = rates[axis, 0], rates[axis, 1], rates[axis, 2]
+                    aims[axis] += limited(acting - aims[axis], slew)
+                    transition = rates[axis, 3], rates[axis, 4], rates[axis, 5], rates[axis, 6]
+                    moved, now[axis], slopes[axis] = lagged(
+                        now[axis], slopes[axis], aims[axis], dt, lag, square, transition
+                    )
+                    mean[axis] = moved / dt
+                q = turn(q, (mean[0], mean[1], mean[2]), dt)
+                k += 1
+        return q
+
+    compiled: Any = compiler.loop(fly)
+    return compiled  # type: ignore[no-any-return]

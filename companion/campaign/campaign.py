@@ -1,0 +1,144 @@
+"""A campaign that was read: its file, its base configuration, and its cases."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from companion.campaign.campaign_file import (
+    FAULT,
+    FAULT_AFTER,
+    FAULT_PHASE,
+    NO_FAULT,
+    TRAJECTORY,
+    CampaignFile,
+    FaultScenario,
+)
+from companion.campaign.case import Case, Fault
+from companion.campaign.design import Sample, number_of_cases, samples_of
+from companion.campaign.keys import with_keys
+from companion.campaign.swept import Value, column_value
+from companion.config import Config
+from companion.files.yaml_file import ConfigError
+from companion.testing.settings import complete_mock
+
+_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
+"""Factors that are no keys of a configuration."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign.
+
+    Attributes:
+        file: what its file says; every path is a key of `files`.
+        base: configuration before the sweep, with the keys of `set`.
+        files: the text of each file that a flight reads, by its path relative to a folder.
+        name: of the file, for messages.
+    """
+
+    file: CampaignFile
+    base: Config
+    files: Mapping[str, str] = field(default_factory=dict)
+    name: str = "the campaign"
+
+    @property
+    def number_of_cases(self) -> int:
+        """The number of cases."""
+        return number_of_cases(self.file)
+
+    def samples(self) -> Iterator[Sample]:
+        """All cases before they are built, in order."""
+        return samples_of(self.file)
+
+    def cases(self) -> Iterator[Case]:
+        """All cases, in order.
+
+        Raises:
+            ConfigError: as `case`.
+        """
+        return map(self.case, self.samples())
+
+    def case(self, sample: Sample) -> Case:
+        """Build one case.
+
+        Raises:
+            ConfigError: the application or the mock vehicle refuses its configuration; the message
+                names the case and the key.
+        """
+        factors = {name: _shown(name, value) for name, value in sample.values.items()}
+        changes: dict[str, Any] = {}
+        for name, value in sample.values.items():
+            if name not in _OWN:
+                for key in self.file.sweep[name].keys or (name,):
+                    changes[key] = self._value(name, key, value)
+        try:
+            config, mock = with_keys(self.base, self._mock, changes)
+            fault = self._fault(sample.values)
+        except ConfigError as error:
+            case = Case(sample.index, sample.seed, factors, self.base, {}, None, {}, 0.0)
+            raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
+        return Case(
+            sample.index,
+            sample.seed,
+            factors,
+            config,
+            {**mock, "seed": sample.seed},
+            fault,
+            self._files_of(config),
+            self.file.limits.flight_s,
+        )
+
+    @cached_property
+    def _mock(self) -> dict[str, Any]:
+        return dict(self.base.mock or {})
+
+    def _value(self, name: str, key: str, value: Any) -> Any:
+        """The value of a key; a factor with `times_base` multiplies that of the base."""
+        if not self.file.sweep[name].times_base or value is None:
+            return value
+        base = self._base_value(key)
+        if isinstance(base, bool) or not isinstance(base, int | float):
+            raise ConfigError(
+                f"{self.name}: sweep.{name}: times_base needs a number in the base configuration,"
+                f" and {key} is {base!r:.40}"
+            )
+        return value * base
+
+    def _base_value(self, key: str) -> Any:
+        section, *path = key.split(".")
+        found: Any = self._complete_mock if section == "mock" else getattr(self.base, section, None)
+        for name in path:
+            found = found.get(name) if isinstance(found, dict) else getattr(found, name, None)
+        return found
+
+    @cached_property
+    def _complete_mock(self) -> dict[str, Any]:
+        return complete_mock(self._mock)
+
+    def _fault(self, values: Mapping[str, Any]) -> Fault | None:
+        name = values.get(FAULT, NO_FAULT)
+        if name == NO_FAULT:
+            return None
+        scenario: FaultScenario = self.file.faults[name]
+        phase = values.get(FAULT_PHASE, scenario.phase)
+        return Fault(
+            name,
+            scenario.inject,
+            phase,
+            float(values.get(FAULT_AFTER, scenario.after_s)),
+            scenario.endings(phase),
+        )
+
+    def _files_of(self, config: Config) -> dict[str, str]:
+        path = config.flight.trajectory
+        if path is None or "trajectory" not in config.flight.maneuvers:
+            return {}
+        folder = f"{path.parent.as_posix()}/"
+        return {name: text for name, text in self.files.items() if name.startswith(folder)}
+
+
+def _shown(name: str, value: Any) -> Value:
+    """A value as the results hold it; of a trajectory's file the name."""
+    return Path(value).stem if name == TRAJECTORY and value is not None else column_value(value)

@@ -1,0 +1,110 @@
+"""The YAML file of a campaign: what is flown, what is swept, and the limits."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from companion.campaign.swept import Swept
+from companion.files.yaml_file import PathKey, Section
+
+Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+Word = Annotated[str, Field(min_length=1, max_length=60)]
+Ending = Literal["ground", "ok", "landed", "held", "pilot"]
+FaultPhase = Literal["stream", "arm", "takeoff", "offboard", "maneuvers", "hand back", "land"]
+
+NO_FAULT = "none"
+"""Value of the factor `fault` for a flight without a fault."""
+FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
+"""Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
+TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
+
+
+class FaultScenario(Section):
+    """A fault of the mock vehicle that begins in a phase of the flight, and how that must end."""
+
+    inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
+    """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
+    phase: FaultPhase = "maneuvers"
+    """Phase of the flight in which they begin. The factor fault.phase replaces it."""
+    after_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.0
+    """Time from the beginning of the phase. The factor fault.after_s replaces it."""
+    ends: (
+        Annotated[tuple[Ending, ...], Field(min_length=1)]
+        | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
+    ) = ("ok",)
+    """How the flight may end, by docs/safety.md: a list for all phases, or a list for each phase.
+    ground: it never left the ground. ok: as without the fault. landed: our program landed it and
+    says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the pilot has
+    it."""
+
+    def endings(self, phase: str) -> tuple[str, ...]:
+        """The documented endings for a phase; empty where the file names none."""
+        if isinstance(self.ends, dict):
+            return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
+        return self.ends
+
+
+class CampaignLimits(Section):
+    """Limits above which a campaign is refused before it begins; `--yes` accepts any size."""
+
+    max_cases: Annotated[int, Field(ge=1, le=100_000_000)] | None = None
+    """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
+    max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
+    """Longest estimated time of the campaign."""
+    flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
+    """Longest flight, in vehicle time from boot. A longer one is ended, and is not good."""
+
+
+class CampaignFile(Section):
+    """A campaign; the top level of its YAML file."""
+
+    name: Name
+    """Name of the campaign, and of its folder."""
+    kind: Literal["flights", "batch"] = "flights"
+    """flights: whole flights of the application and the mock vehicle on one virtual clock. batch:
+    attitude kinematics of many vehicles at once."""
+    config: PathKey | dict[str, Any]
+    """Configuration on which every case is based, with its section `mock`: a file, relative to this
+    one, or its keys."""
+    seed: Annotated[int, Field(ge=0, lt=2**53)] = 1
+    """Seed of the samples, and of the noise and gusts of every flight."""
+    samples: Annotated[int, Field(ge=1, le=10_000_000)] = 1
+    """Number of samples of the distributions. Each is flown at each point of the grid. Without a
+    distribution it is the number of flights with different noise and gusts."""
+    sampling: Literal["random", "latin-hypercube", "sobol", "grid"] = "latin-hypercube"
+    """How the distributions are sampled, by SciPy's qmc. sobol needs a power of two. grid:
+    `samples` quantiles of each distribution, all combined."""
+    same_seeds: bool = False
+    """All points of the grid fly a sample with the same noise and gusts, so that planners are
+    compared in the same wind. false: every case has noise and gusts of its own."""
+    set: Annotated[dict[str, Any], Field(default_factory=dict, max_length=200)]
+    """Keys that differ from `config` in every case, dotted: limits.max_tilt_deg,
+    mock.wind.gust_m_s."""
+    sweep: Annotated[dict[str, Swept], Field(default_factory=dict, max_length=50)]
+    """Swept keys, dotted, of the application and of the mock vehicle (`mock.`). Also fault,
+    fault.phase and fault.after_s, and files for flight.trajectory, relative to this one."""
+    faults: Annotated[dict[Word, FaultScenario], Field(default_factory=dict, max_length=100)]
+    """Fault scenarios by the name that the factor `fault` uses."""
+    limits: CampaignLimits = CampaignLimits()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "CampaignFile":
+        if self.sampling == "sobol" and self.samples & (self.samples - 1):
+            power = 1 << self.samples.bit_length()
+            raise ValueError(f"sampling: sobol needs samples: {power // 2} or {power}")
+        if NO_FAULT in self.faults:
+            raise ValueError(f"faults: {NO_FAULT} is the name of a flight without a fault")
+        for key in self.set.keys() & _swept_keys(self.sweep):
+            raise ValueError(f"`{key}` stands in set and in sweep; take one of them out")
+        if self.kind == "batch" and (self.faults or FAULT in self.sweep):
+            raise ValueError("faults need kind: flights")
+        return self
+
+    @property
+    def has_samples(self) -> bool:
+        """Whether a factor is sampled."""
+        return any(swept.sampled for swept in self.sweep.values())
+
+
+def _swept_keys(sweep: dict[str, Swept]) -> "frozenset[str]":
+    return frozenset(key for name, swept in sweep.items() for key in swept.keys or (name,))

@@ -1,0 +1,63 @@
+"""One case of a campaign: its factors, and the configuration and mock vehicle they lead to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from companion.campaign.swept import Value
+from companion.config import Config
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault scenario of one flight.
+
+    Attributes:
+        name: of the scenario.
+        inject: entries as in `mock.faults`.
+        phase: of the flight in which they begin.
+        after: time from the beginning of the phase, s.
+        ends: documented endings; see `FaultScenario.ends`.
+    """
+
+    name: str
+    inject: tuple[Mapping[str, Any], ...]
+    phase: str
+    after: float
+    ends: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One case, ready to be flown in any process on any computer.
+
+    Attributes:
+        index: number in the campaign, from 0.
+        seed: of noise and gusts.
+        factors: value of each swept key, as the results hold it.
+        config: of the application. `flight.trajectory` is a key of `files`.
+        mock: the complete section `mock`, the seed included.
+        fault: None: a flight without a fault.
+        files: the text of each file that the flight reads, by its path relative to a folder.
+        flight_s: longest flight, s of vehicle time.
+    """
+
+    index: int
+    seed: int
+    factors: Mapping[str, Value]
+    config: Config
+    mock: Mapping[str, Any]
+    fault: Fault | None
+    files: Mapping[str, str]
+    flight_s: float
+
+    def described(self) -> str:
+        """The case in a message: its number and its factors."""
+        told = ", ".join(f"{key} = {_shown(value)}" for key, value in self.factors.items())
+        return f"case {self.index}" + (f" ({told})" if told else "")
+
+
+def _shown(value: Value) -> str:
+    if value is None:
+        return "null"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

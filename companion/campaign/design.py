@@ -1,0 +1,81 @@
+"""The samples of a campaign: the grid of its factors, times the samples of its distributions."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.campaign.campaign_file import CampaignFile
+
+_LARGEST_SEED = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One case before it is built.
+
+    Attributes:
+        index: number of the case, from 0.
+        seed: of its noise and gusts.
+        values: value of each factor, as the file says it.
+    """
+
+    index: int
+    seed: int
+    values: dict[str, Any]
+
+
+def number_of_cases(file: CampaignFile) -> int:
+    """The number of cases, without making them."""
+    sampled = sum(swept.sampled for swept in file.sweep.values())
+    repeats = file.samples**sampled if file.sampling == "grid" and sampled else file.samples
+    return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
+
+
+def samples_of(file: CampaignFile) -> Iterator[Sample]:
+    """All cases in order: every point of the grid with the first sample, then with the next.
+
+    A campaign that is stopped has therefore flown all points of the grid about equally often.
+    """
+    fixed = {name: swept.grid() for name, swept in file.sweep.items() if not swept.sampled}
+    sampled = {name: swept for name, swept in file.sweep.items() if swept.sampled}
+    points = [dict(zip(fixed, point, strict=True)) for point in product(*fixed.values())]
+    index = 0
+    for number, shares in enumerate(_shares(file, len(sampled))):
+        drawn = {
+            name: swept.at(float(share))
+            for (name, swept), share in zip(sampled.items(), shares, strict=True)
+        }
+        for point in points:
+            values = {**point, **drawn}
+            seed = seed_of(file.seed, number if file.same_seeds else index)
+            yield Sample(index, seed, {name: values[name] for name in file.sweep})
+            index += 1
+
+
+def seed_of(campaign_seed: int, number: int) -> int:
+    """The seed of a case, 0 to 2⁶³ − 1; the same on every computer."""
+    digest = hashlib.sha256(f"{campaign_seed}:{number}".encode()).digest()
+    return int.from_bytes(digest[:8], "big") & _LARGEST_SEED
+
+
+def _shares(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
+    """(samples, dimensions): which share of each distribution lies below each sample."""
+    count = file.samples
+    if dimensions == 0:
+        return np.empty((count, 0))
+    if file.sampling == "random":
+        return np.random.default_rng(file.seed).random((count, dimensions))
+    if file.sampling == "grid":
+        middles = (np.arange(count) + 0.5) / count
+        return np.array(list(product(middles, repeat=dimensions)))
+    from scipy.stats import qmc  # noqa: PLC0415  takes half a second to import
+
+    kind = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
+    shares: NDArray[np.float64] = kind(dimensions, rng=file.seed).random(count)
+    return shares

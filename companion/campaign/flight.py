@@ -1,0 +1,183 @@
+"""One whole flight of a campaign, in this process on one virtual clock."""
+
+import tempfile
+from collections.abc import Sequence
+from math import acos
+from pathlib import Path
+
+import numpy as np
+
+from companion.batch import can_compile
+from companion.campaign import outcomes
+from companion.campaign.case import Case, Fault
+from companion.campaign.swept import Value
+from companion.config import Config
+from companion.flight.observer import Silent
+from companion.recording.measurements.summary import Summary
+from companion.testing import MockVehicle, Truth, run, session
+
+WIRE_S = 0.0005
+"""A datagram needs this long, as over UDP, s."""
+INTERNAL_ERROR = "internal error: "
+"""Begins the result of a case in which the program itself failed."""
+_TRUTH_EVERY = 5
+"""Steps of the mock vehicle between two true positions."""
+_AFTERWARDS_S = 10.0
+"""Time for which a vehicle that is still armed is watched after the flight, s."""
+_PILOTED = ("POSCTL", "ALTCTL", "STABILIZED", "MANUAL", "LOITER", "ALT_HOLD", "STABILIZE")
+
+
+def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
+    """Fly one case; equal cases give equal rows, to the bit.
+
+    Args:
+        case: to be flown.
+        folder: for the files of a fully recorded flight; None: nothing is written.
+
+    Returns:
+        One row of the results: `case`, `seed`, the factors, and the outcomes. A case that raises an
+        error is a row, too: its `result` is the error.
+    """
+    row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
+    with tempfile.TemporaryDirectory(prefix="companion-case-") as place:
+        try:
+            return row | _Flight(case, Path(place)).fly(folder)
+        except Exception as error:
+            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}".replace(f"{place}/", "")
+            return row | outcomes.unflown(told)
+
+
+class _Flight:
+    """The flight of one case.
+
+    Args:
+        case: to be flown.
+        place: a new folder for the files that the flight reads.
+    """
+
+    def __init__(self, case: Case, place: Path) -> None:
+        for name, text in case.files.items():
+            path = place / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        self._case, self._place = case, place
+        self._config = _placed(case.config, place)
+        settings = {**case.mock, "lockstep": False}
+        self._vehicle = MockVehicle(delay_s=WIRE_S, compiled=can_compile(), **settings)
+        self._truth: list[tuple[float, ...]] = []
+        self._steps = 0
+        self._too_long = False
+
+    def fly(self, folder: Path | None) -> dict[str, Value]:
+        """Fly; returns the outcomes."""
+        vehicle, case = self._vehicle, self._case
+        vehicle.after_step.append(self._note_truth)
+        fault = _BeginFault(vehicle, case.fault)
+        flight = session(self._config, vehicle, folder, fault)
+
+        def end() -> None:
+            self._too_long = True
+            flight.leave()
+
+        vehicle.at(case.flight_s, end)
+        summary = run(vehicle, flight.fly())
+        after = vehicle.state()
+        flight_s = vehicle.time
+        vehicle.after_step.clear()
+        while vehicle.state()["armed"] and vehicle.time < flight_s + _AFTERWARDS_S:
+            vehicle.step()
+        final = vehicle.state()
+        return self._outcomes(summary, after, final, flight_s, begun=fault.begun)
+
+    def _outcomes(
+        self, summary: Summary, after: Truth, final: Truth, flight_s: float, *, begun: bool
+    ) -> dict[str, Value]:
+        figures, setpoints = summary.as_dict(), self._vehicle.setpoints
+        crashed, fault = final["crashed"], self._case.fault
+        measured = {
+            **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
+            **outcomes.response(summary),
+            **outcomes.activity(setpoints, summary, self._config),
+            "flight_s": flight_s,
+        }
+        documented = None
+        if fault is not None and begun and fault.ends:
+            documented = not crashed and _ending(after, summary.result) in fault.ends
+        result = summary.result
+        if self._too_long:
+            result = f"not over after {self._case.flight_s:g} s of vehicle time"
+        good = figures["verdict"]["good"] and not crashed and not self._too_long
+        return {
+            "ok": good,
+            "result": result.replace(f"{self._place}/", ""),
+            "failed_checks": outcomes.failed_checks(figures),
+            "phase": summary.phase,
+            "crashed": crashed,
+            "as_documented": documented,
+            **outcomes.without_nan(measured),
+            "setpoints": len(setpoints),
+            "digest": outcomes.digest(setpoints, final),
+        }
+
+    def _note_truth(self) -> None:
+        self._steps += 1
+        if self._steps % _TRUTH_EVERY == 0:
+            state = self._vehicle.state()
+            _, x, y, _ = state["q"]
+            tilt = acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y)))
+            self._truth.append((self._vehicle.time, *state["position"], tilt))
+
+
+class _BeginFault(Silent):
+    """Begins the faults of a scenario a while after a phase began.
+
+    Args:
+        vehicle: is flown.
+        fault: the scenario, or None.
+
+    Attributes:
+        begun: whether the phase was reached.
+    """
+
+    def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
+        self._vehicle, self._fault = vehicle, fault
+        self.begun = False
+        self._phase = "" if fault is None else fault.phase
+        if vehicle.autopilot == "ardupilot" and self._phase == "stream":
+            self._phase = "arm"  # ArduPilot gets its first setpoints in the air
+
+    def phase(self, name: str, waits_for: str) -> None:
+        """Inject the faults if this is their phase."""
+        if self._fault is None or self.begun or name != self._phase:
+            return
+        self.begun = True
+        at = self._vehicle.time + self._fault.after
+        for each in self._fault.inject:
+            self._vehicle.inject({**each, "at_s": at})
+
+
+def _ending(state: Truth, result: str) -> str:
+    """How a flight ended, as `FaultScenario.ends` names it."""
+    if "took over: mode" in result and state["mode"] in _PILOTED:
+        return "pilot" if state["armed"] else "ground"
+    if state["armed"]:
+        return "held"
+    if result == "ok":
+        return "ok"
+    return "ground" if state["touchdown_speed"] is None else "landed"
+
+
+def _placed(config: Config, place: Path) -> Config:
+    """The configuration with the paths of this flight.
+
+    What earlier flights learned must not change this one, so `recording.directory` is empty.
+    """
+    recording = config.recording.model_copy(update={"directory": place / "learned"})
+    path = config.flight.trajectory
+    flight = config.flight.model_copy(update={"trajectory": None if path is None else place / path})
+    return config.model_copy(update={"recording": recording, "flight": flight})
+
+
+def fly_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
+    """Fly cases one after the other; a row each, in order."""
+    return [fly_case(case) for case in cases]

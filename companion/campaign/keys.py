@@ -1,0 +1,108 @@
+"""Dotted keys of a campaign: of the application's configuration, and of the mock vehicle's."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from companion.config import Config
+from companion.files.yaml_file import ConfigError, validated
+from companion.testing.settings import complete_mock, mock_with
+
+_MOCK = "mock."
+_WITHOUT_EFFECT = (
+    "flight.arm",
+    "link.backend",
+    "link.endpoint",
+    "link.lockstep",
+    "mock.control_port",
+    "mock.endpoint",
+    "mock.faults",
+    "mock.gcs_port",
+    "mock.lockstep",
+    "mock.port",
+    "mock.seed",
+    "mock.speed",
+    "realtime",
+    "recording",
+    "serve",
+)
+"""Keys and sections that have no effect in a campaign, or that the campaign sets itself."""
+_SIGNING = ("link.signing_key_file", "mock.signing")
+
+
+def check_keys(keys: Iterable[str], base: Config, where: str) -> None:
+    """Check that each dotted key exists, and that a campaign can change it.
+
+    Args:
+        keys: dotted.
+        base: configuration whose keys are meant.
+        where: names the keys in messages.
+
+    Raises:
+        ConfigError: the message names the key, and the nearest right one.
+    """
+    for key in keys:
+        section, dot, name = key.partition(".")
+        if not (dot and section and name):
+            raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, as limits.max_tilt_deg")
+        for other in _WITHOUT_EFFECT:
+            if f"{key}.".startswith(f"{other}."):
+                raise ConfigError(
+                    f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
+                )
+        if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING):
+            raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
+        _check_exists(key, base, where)
+
+
+def _check_exists(key: str, base: Config, where: str) -> None:
+    section, _, name = key.partition(".")
+    if section == "mock":
+        # Only the complaint about the name counts: a value comes later.
+        _check_mock_key(name, dict(base.mock or {}), where)
+        return
+    model = Config.model_fields.get(section)
+    known = None if model is None else getattr(base, section)
+    if known is None or name not in type(known).model_fields:
+        validated({section: {name: 0.0}}, where, Config)
+        raise ConfigError(f"{where}: there is no key `{key}`")
+
+
+def _check_mock_key(name: str, section: dict[str, Any], where: str) -> None:
+    complete: Any = complete_mock(section)
+    *path, _ = name.split(".")
+    for part in path:
+        complete = complete.get(part) if isinstance(complete, dict) else None
+    if isinstance(complete, dict) and name.rpartition(".")[2] in complete:
+        return
+    try:
+        mock_with(section, {name: 0.0})
+    except ConfigError as error:
+        if "unknown" in str(error) or "wrong place" in str(error):
+            raise ConfigError(f"{where}: {error}") from error
+
+
+def with_keys(
+    base: Config, mock: Mapping[str, Any], changes: Mapping[str, Any]
+) -> tuple[Config, dict[str, Any]]:
+    """The configuration and the complete section `mock` with dotted keys changed.
+
+    Args:
+        base: configuration before the changes.
+        mock: its section `mock`.
+        changes: new values by dotted key.
+
+    Raises:
+        ConfigError: a value is refused; the message names the key.
+    """
+    of_mock = {key.removeprefix(_MOCK): value for key, value in changes.items() if _of_mock(key)}
+    data = base.model_dump()
+    for key, value in changes.items():
+        if not _of_mock(key):
+            section, _, name = key.partition(".")
+            data[section][name] = value
+    config = validated(data, "the configuration", Config)
+    return config, mock_with(mock, of_mock)
+
+
+def _of_mock(key: str) -> bool:
+    return key.startswith(_MOCK)

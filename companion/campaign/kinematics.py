@@ -1,0 +1,170 @@
+"""Batch kinematics: the open-loop steps of a maneuver, flown by attitude and rate loop alone.
+
+There is no position, no estimator and no link. The planner's law and the functions of the attitude
+are those of a flight, compiled. The rate loop answers as the section `vehicle` says, with dead
+time, slew limit and lag, so that this section is what the vehicle does, and not what the program
+believes. The vehicle begins level and at rest, at the heading `mock.home.heading_deg`.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from functools import lru_cache
+from math import inf, isfinite, radians
+
+import numpy as np
+
+from companion.attitude import LawPlanner, attitude
+from companion.attitude.planner import LAW_NAMES
+from companion.attitude.rate_response import AxisResponse
+from companion.attitude.representation import limited_target, wrap_angle
+from companion.attitude.types import Coefficients, Target
+from companion.batch.loops import Array
+from companion.batch.rate_loop import STEP_HZ, StepFlight, fly_steps
+from companion.batch.step_figures import StepFigures, step_figures
+from companion.campaign.case import Case
+from companion.campaign.swept import Value
+from companion.config import Config
+from companion.control.inner_loop import planner
+from companion.files.yaml_file import ConfigError
+from companion.guidance import Corners, Steps
+from companion.guidance.reference import Pose
+from companion.recording.measurements.verdict import STRAIGHTNESS
+
+MANEUVERS = ("steps", "corners")
+"""Maneuvers that have open-loop steps."""
+
+
+def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
+    """Fly cases one after the other; returns a row for each, in order.
+
+    `ok` tells whether every step stayed as near to its line as the verdict on a flight demands.
+
+    Raises:
+        ConfigError: as `check_case`.
+        MissingExtraError: numba is not installed.
+    """
+    return [_run_case(case) for case in cases]
+
+
+def check_case(case: Case) -> None:
+    """Check that a case can be flown in a batch.
+
+    Raises:
+        ConfigError: its planner keeps state, it has no open-loop maneuver, its sample rate does not
+            divide 1000 Hz, or it has a fault.
+    """
+    config, where = case.config, case.described()
+    if config.planner_name not in LAW_NAMES:
+        raise ConfigError(
+            f"{where}: kind: batch flies planners without memory ({', '.join(LAW_NAMES)}), not "
+            f"{config.planner_name}; set planner.name, or kind: flights"
+        )
+    if not set(MANEUVERS) & set(config.flight.maneuvers):
+        raise ConfigError(
+            f"{where}: kind: batch flies open-loop steps; set flight.maneuvers to [corners] or "
+            "[steps]"
+        )
+    if STEP_HZ % config.link.attitude_rate_hz:
+        raise ConfigError(
+            f"{where}: kind: batch needs a link.attitude_rate_hz that divides {STEP_HZ}, not "
+            f"{config.link.attitude_rate_hz:g}"
+        )
+    if case.fault is not None:
+        raise ConfigError(f"{where}: kind: batch has no faults; set kind: flights")
+
+
+def _run_case(case: Case) -> dict[str, Value]:
+    check_case(case)
+    config = case.config
+    law = planner(config)
+    assert isinstance(law, LawPlanner)
+    heading = wrap_angle(radians(case.mock["home"]["heading_deg"]))
+    targets = _targets(config, law.constants.longest_target, heading)
+    start = attitude(Coefficients(0.0, 0.0), heading)
+    rate_hz = config.link.attitude_rate_hz
+    flight = fly_steps(law, rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
+    figures = step_figures(flight, config.planner.gain_per_s, 1.0 / rate_hz)
+    size = float(np.hypot(*targets[:, :2].T).max())
+    return {
+        "case": case.index,
+        "seed": case.seed,
+        **case.factors,
+        **_outcomes(flight, figures, size, len(targets) / rate_hz),
+    }
+
+
+def _outcomes(
+    flight: StepFlight, figures: StepFigures, size: float, seconds: float
+) -> dict[str, Value]:
+    constants = [each for each in figures[-2:] if isfinite(each)]
+    values = {
+        "cross_axis_max": figures.cross_axis_max,
+        "model_deviation_max": figures.model_deviation_max,
+        "time_constant_s": sum(constants) / len(constants) if constants else inf,
+        "rate_rms_rad_s": figures.rate_rms,
+        "rate_max_rad_s": figures.rate_max,
+        "flight_s": seconds,
+    }
+    finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
+    straight = finite and figures.cross_axis_max <= STRAIGHTNESS * size
+    result = "ok" if straight else "not straight" if finite else "not finite"
+    return {
+        "ok": straight,
+        "result": result,
+        **{name: value if isfinite(value) else None for name, value in values.items()},
+        "setpoints": len(flight.commanded),
+        "digest": _digest(flight),
+    }
+
+
+def _digest(flight: StepFlight) -> str:
+    """SHA-256 over every commanded body rate and the attitude at the end."""
+    found = hashlib.sha256(np.ascontiguousarray(flight.commanded).data)
+    found.update(np.array(flight.q).data)
+    return found.hexdigest()
+
+
+def rate_loop(config: Config) -> list[AxisResponse]:
+    """How roll, pitch and yaw answer commanded rates; without an identified vehicle at once."""
+    return [
+        AxisResponse(
+            axis.lag or 0.0,
+            axis.dead_time or 0.0,
+            inf if axis.acceleration_limit is None else axis.acceleration_limit,
+            inf if axis.damping is None else axis.damping,
+        )
+        for axis in config.vehicle.axes.values()
+    ]
+
+
+def _targets(config: Config, longest: float, heading: float) -> Array:
+    """(samples, 4) targets of the open-loop steps, each limited as the planner limits it."""
+    name = next(each for each in config.flight.maneuvers if each in MANEUVERS)
+    scale: tuple[float, float]
+    if name == "corners":
+        corners = config.corners
+        scale = corners.north_coefficient, corners.east_coefficient
+        unit: Corners | Steps = Corners(1.0, 1.0, corners.duration_s, corners.settle_s)
+    else:
+        steps = config.steps
+        scale = steps.coefficient, steps.coefficient
+        unit = Steps(1.0, steps.duration_s, steps.settle_s)
+    wanted = _pattern(unit, config.link.attitude_rate_hz) * scale
+    targets = np.zeros((len(wanted), 4))
+    targets[:, 2] = heading
+    changes = np.flatnonzero(np.any(np.diff(wanted, axis=0), axis=1)) + 1
+    for begin, end in zip((0, *changes), (*changes, len(wanted)), strict=True):
+        north, east = wanted[begin].tolist()
+        targets[begin:end] = limited_target(Target(north, east, heading), longest)
+    return targets
+
+
+@lru_cache(maxsize=64)
+def _pattern(maneuver: Corners | Steps, rate_hz: float) -> Array:
+    """(samples, 2), the coefficients from the first open-loop step to the last; level between."""
+    pose = Pose((0.0, 0.0, 0.0), 0.0)
+    times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
+    asked = [maneuver.at(float(time), pose).coefficients for time in times]
+    steps = [k for k, coefficients in enumerate(asked) if coefficients is not None]
+    level = Coefficients(0.0, 0.0)
+    return np.array([each or level for each in asked[steps[0] : steps[-1] + 1]])

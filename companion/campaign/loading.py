@@ -1,0 +1,197 @@
+"""Reading a campaign file, with the configuration and the trajectories that it names."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import (
+    FAULT,
+    FAULT_AFTER,
+    FAULT_PHASE,
+    MANEUVERS,
+    NO_FAULT,
+    TRAJECTORY,
+    CampaignFile,
+    FaultPhase,
+)
+from companion.campaign.keys import check_keys, with_keys
+from companion.campaign.swept import Swept
+from companion.config import Config, trajectory_file
+from companion.config.files import load as load_config
+from companion.files import yaml_file
+from companion.files.yaml_file import ConfigError, validated
+from companion.flight.flown_config import copy_trajectory
+from companion.testing.settings import complete_mock
+
+FILES = "trajectories"
+"""Folder of the trajectories, in the folder of a campaign."""
+_OWN = (FAULT, FAULT_PHASE, FAULT_AFTER)
+
+
+def load(path: Path) -> Campaign:
+    """Read a campaign file, and check all keys that it names.
+
+    The values of each case are checked by `Campaign.cases`.
+
+    Raises:
+        ConfigError: a file cannot be read, or holds an unknown key or a bad value.
+    """
+    return _Reading(path).campaign()
+
+
+class _Reading:
+    """Reads one campaign file.
+
+    Args:
+        path: of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._folder = path, path.parent
+        self._file = yaml_file.load(path, CampaignFile)
+        self._files: dict[str, str] = {}
+        self._collected: dict[Path, Path] = {}
+
+    def campaign(self) -> Campaign:
+        """The campaign.
+
+        Raises:
+            ConfigError: as `load`.
+        """
+        file, name = self._file, str(self._path)
+        base = self._base()
+        swept = [
+            key
+            for key, each in file.sweep.items()
+            if key not in _OWN
+            for key in each.keys or (key,)
+        ]
+        check_keys(file.set, base, f"{name}: set")
+        check_keys(swept, base, f"{name}: sweep")
+        self._check_faults()
+        changes = dict(file.set)
+        if TRAJECTORY in {*swept, *changes} and MANEUVERS not in {*swept, *changes}:
+            changes[MANEUVERS] = ("trajectory",)
+        if isinstance(changes.get(TRAJECTORY), str):
+            changes[TRAJECTORY] = self._folder / changes[TRAJECTORY]
+        try:
+            base, mock = with_keys(base, base.mock or {}, changes)
+        except ConfigError as error:
+            raise ConfigError(f"{name}: {error}") from error
+        base = base.model_copy(update={"mock": mock})
+        base = self._flyable(base)
+        sweep = {key: self._with_files(key, each) for key, each in file.sweep.items()}
+        file = file.model_copy(update={"sweep": sweep, "set": {}})
+        return Campaign(file, base, self._files, name)
+
+    def _base(self) -> Config:
+        told = self._file.config
+        if isinstance(told, Mapping):
+            config = validated(dict(told), f"{self._path}: config", Config)
+            path = config.flight.trajectory
+            return config if path is None else _following(config, self._folder / path)
+        return load_config(self._folder / told)
+
+    def _flyable(self, base: Config) -> Config:
+        """The base as a flight in memory needs it: armed by the program, its trajectory collected.
+
+        Raises:
+            ConfigError: it needs a link that only the real vehicle has.
+        """
+        if base.link.backend != "direct":
+            raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
+        if base.link.signing_key_file is not None or (base.mock or {}).get("signing"):
+            raise ConfigError(
+                f"{self._path}: campaigns fly without signing: take out link.signing_key_file and "
+                "mock.signing"
+            )
+        armed = base.flight.model_copy(update={"arm": True})
+        base = base.model_copy(update={"flight": armed})
+        path = base.flight.trajectory
+        return base if path is None else _following(base, self._collect(path))
+
+    def _with_files(self, key: str, swept: Swept) -> Swept:
+        """The swept key with the paths of collected trajectories."""
+        if TRAJECTORY not in (swept.keys or (key,)):
+            return swept
+        known = {}
+        for kind in ("values", "choice"):
+            values = getattr(swept, kind)
+            if values is not None:
+                if not all(isinstance(value, str) for value in values):
+                    raise ConfigError(f"{self._path}: sweep.{key}: each value must be a file")
+                known[kind] = tuple(str(self._collect(self._folder / value)) for value in values)
+        return swept.model_copy(update=known)
+
+    def _collect(self, path: Path) -> Path:
+        """Take a trajectory's file and its table into the campaign; returns its name there.
+
+        Raises:
+            ConfigError: it cannot be read, or holds no trajectory.
+        """
+        if path in self._collected:
+            return self._collected[path]
+        trajectory_file.read(path)
+        taken = {name.parts[1] for name in self._collected.values()}
+        stem = next(
+            stem
+            for stem in (path.stem, *(f"{path.stem}-{number}" for number in range(2, 10_000)))
+            if stem not in taken
+        )
+        with tempfile.TemporaryDirectory(prefix="companion-campaign-") as folder:
+            copies = Path(folder) / stem
+            name = copy_trajectory(path, copies)
+            for copy in sorted(copies.iterdir()):
+                self._files[f"{FILES}/{stem}/{copy.name}"] = copy.read_text("utf-8")
+        collected = Path(FILES, stem, name)
+        self._collected[path] = collected
+        return collected
+
+    def _check_faults(self) -> None:
+        file, name = self._file, self._path
+        for scenario, told in file.faults.items():
+            for fault in told.inject:
+                if fault.keys() & {"at_s", "after_offboard_s"}:
+                    raise ConfigError(
+                        f"{name}: faults.{scenario}: phase and after_s say when it begins; "
+                        "take out at_s and after_offboard_s"
+                    )
+            try:
+                complete_mock({"faults": told.inject})
+            except ConfigError as error:
+                raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
+        self._check_words(FAULT, (NO_FAULT, *file.faults))
+        self._check_words(FAULT_PHASE, get_args(FaultPhase))
+        for key in _OWN[1:]:
+            if key in file.sweep and FAULT not in file.sweep:
+                raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
+        after = file.sweep.get(FAULT_AFTER)
+        if after is not None and not after.is_number:
+            raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
+
+    def _check_words(self, key: str, known: tuple[str, ...]) -> None:
+        swept = self._file.sweep.get(key)
+        if swept is None:
+            return
+        if not (listed := swept.values or swept.choice):
+            raise ConfigError(f"{self._path}: sweep.{key}: give a list of names")
+        for word in listed:
+            if word not in known:
+                names = ", ".join(known)
+                raise ConfigError(
+                    f"{self._path}: sweep.{key}: there is no {word!r:.60}; known: {names}"
+                )
+
+
+def _following(config: Config, path: Path) -> Config:
+    flight = config.flight.model_copy(update={"trajectory": path})
+    return config.model_copy(update={"flight": flight})
+
+
+def as_written(campaign: Campaign) -> dict[str, Any]:
+    """The campaign file as it was resolved: with the keys of its configuration and all defaults."""
+    data = campaign.file.model_dump(mode="json")
+    data["config"] = campaign.base.model_dump(mode="json")
+    return data

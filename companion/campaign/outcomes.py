@@ -1,0 +1,137 @@
+"""The outcomes of a flight: one row of the results."""
+
+import hashlib
+import struct
+from collections.abc import Mapping, Sequence
+from math import isfinite, nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.campaign.swept import Value
+from companion.config import Config
+from companion.recording.measurements.maneuver_figures import settled_parts
+from companion.recording.measurements.summary import Summary, tracking_errors
+from companion.testing import ReceivedSetpoint, Truth
+
+Floats = NDArray[np.float64]
+
+FLOAT_OUTCOMES = (
+    "position_rms_m",
+    "position_max_m",
+    "height_rms_m",
+    "estimated_rms_m",
+    "cross_axis_max",
+    "model_deviation_max",
+    "time_constant_s",
+    "rate_rms_rad_s",
+    "rate_max_rad_s",
+    "thrust_rms",
+    "saturated_share",
+    "max_tilt_rad",
+    "flight_s",
+)
+"""Outcomes of a flight that are numbers; null where they were not measured."""
+_AT_LIMIT = 0.99
+"""A rate or a thrust from this share of its limit on counts as saturated."""
+
+
+def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
+    """Tracking of the true position during the maneuvers, and by the estimate, m.
+
+    Args:
+        summary: of the flight.
+        truth: (N, 5), vehicle time s, north, east, down m, tilt rad.
+    """
+    rows = summary.trace.tracking_rows()
+    parts = settled_parts(rows, summary.trace.maneuvers)
+    figures: dict[str, float] = {}
+    if len(truth) and parts:
+        settled = np.concatenate(parts)
+        figures["estimated_rms_m"] = tracking_errors(settled)["position_rms_m"]
+        place = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
+        true = np.column_stack([settled[:, :4], *place])
+        figures.update(tracking_errors(true))
+        in_maneuvers = (truth[:, 0] >= settled[0, 0]) & (truth[:, 0] <= settled[-1, 0])
+        figures["max_tilt_rad"] = float(truth[in_maneuvers, 4].max(initial=0.0))
+    return figures
+
+
+def response(summary: Summary) -> dict[str, float]:
+    """The response to acceleration steps; NaN where none was flown."""
+    measured = summary.response()
+    if measured is None:
+        return {}
+    both = [measured.time_constant_north_s, measured.time_constant_east_s]
+    finite = [value for value in both if isfinite(value)]
+    return {
+        "cross_axis_max": measured.cross_axis_max,
+        "model_deviation_max": measured.model_deviation_max,
+        "time_constant_s": sum(finite) / len(finite) if finite else nan,
+    }
+
+
+def activity(
+    setpoints: Sequence[ReceivedSetpoint], summary: Summary, config: Config
+) -> dict[str, float]:
+    """Rates and thrust that the autopilot was sent during the maneuvers."""
+    marks = summary.trace.maneuvers
+    if not marks:
+        return {}
+    begin = marks[0].vehicle_time
+    end = next((mark.vehicle_time for mark in marks if mark.name is None), np.inf)
+    rows = np.array(
+        [(*each.rates, each.thrust) for each in setpoints if begin <= each.time < end]
+    ).reshape(-1, 4)
+    if not len(rows):
+        return {}
+    rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
+    saturated = (
+        (rates >= _AT_LIMIT * limits.max_tilt_rate)
+        | (thrust >= _AT_LIMIT * limits.max_thrust)
+        | (thrust * _AT_LIMIT <= limits.min_thrust)
+    )
+    return {
+        "rate_rms_rad_s": float(np.sqrt(np.mean(rates**2))),
+        "rate_max_rad_s": float(rates.max()),
+        "thrust_rms": float(np.std(thrust)),
+        "saturated_share": float(np.mean(saturated)),
+    }
+
+
+def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
+    """SHA-256 over every setpoint that the autopilot received, and the true state at the end."""
+    found = hashlib.sha256()
+    for each in setpoints:
+        found.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
+    motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
+    found.update(struct.pack(f"<{len(motion)}d", *motion))
+    return found.hexdigest()
+
+
+def unflown(result: str) -> dict[str, Value]:
+    """The outcomes of a case that raised an error instead of being flown."""
+    return {
+        "ok": False,
+        "result": result,
+        "failed_checks": "",
+        "phase": "",
+        "crashed": False,
+        "as_documented": None,
+        **dict.fromkeys(FLOAT_OUTCOMES),
+        "setpoints": 0,
+        "digest": "",
+    }
+
+
+def failed_checks(figures: Mapping[str, Any]) -> str:
+    """What the verdict on a flight finds fault with, with semicolons between."""
+    checks = [check["what"] for check in figures["verdict"]["checks"] if not check["good"]]
+    return "; ".join([*dict.fromkeys(checks), *(["advice"] if figures["advice"] else [])])
+
+
+def without_nan(values: Mapping[str, float]) -> dict[str, Value]:
+    """The numbers with null where they are not finite, and the missing ones as null."""
+    found = {name: values.get(name, nan) for name in FLOAT_OUTCOMES}
+    return {name: value if isfinite(value) else None for name, value in found.items()}

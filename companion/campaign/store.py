@@ -1,0 +1,208 @@
+"""The results of a campaign on the disk: a Parquet file for each unit, whole or not there."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import CampaignFile
+from companion.campaign.swept import Value
+from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+RESULTS = "results"
+"""Folder of the units, in the folder of a campaign."""
+METADATA = b"companion.campaign"
+"""Key of the schema's metadata; its value is JSON with `name`, `kind` and `factors`."""
+_UNITS = (
+    ("_rad_s", "rad/s"),
+    ("_deg_s2", "°/s²"),
+    ("_deg_s", "°/s"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_per_m", "1/m"),
+    ("_percent", "%"),
+    ("_deg", "°"),
+    ("_ms", "ms"),
+    ("_hz", "Hz"),
+    ("_kg", "kg"),
+    ("_rad", "rad"),
+    ("_m", "m"),
+    ("_s", "s"),
+)
+"""Unit by the end of a key; the first that fits."""
+_OUTCOMES = {
+    "flights": (
+        ("ok", "bool"),
+        ("result", "string"),
+        ("failed_checks", "string"),
+        ("phase", "string"),
+        ("crashed", "bool"),
+        ("as_documented", "bool"),
+        ("position_rms_m", "float64"),
+        ("position_max_m", "float64"),
+        ("height_rms_m", "float64"),
+        ("estimated_rms_m", "float64"),
+        ("cross_axis_max", "float64"),
+        ("model_deviation_max", "float64"),
+        ("time_constant_s", "float64"),
+        ("rate_rms_rad_s", "float64"),
+        ("rate_max_rad_s", "float64"),
+        ("thrust_rms", "float64"),
+        ("saturated_share", "float64"),
+        ("max_tilt_rad", "float64"),
+        ("flight_s", "float64"),
+        ("setpoints", "int64"),
+        ("digest", "string"),
+    ),
+    "batch": (
+        ("ok", "bool"),
+        ("model_deviation_max", "float64"),
+        ("time_constant_s", "float64"),
+        ("cross_axis_max", "float64"),
+        ("rate_rms_rad_s", "float64"),
+        ("rate_max_rad_s", "float64"),
+        ("digest", "string"),
+    ),
+}
+"""Columns of the outcomes by kind of campaign."""
+
+
+def schema(file: CampaignFile) -> "pa.Schema":
+    """The columns of the results, from the campaign's file alone."""
+    import pyarrow as pa  # noqa: PLC0415  an extra
+
+    factors = [(name, _type(file, name)) for name in file.sweep]
+    columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
+    described = {
+        name: {**each.described(), "unit": unit(name)} for name, each in file.sweep.items()
+    }
+    told = {"name": file.name, "kind": file.kind, "factors": described}
+    return pa.schema(
+        [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, kind in columns],
+        metadata={METADATA: json.dumps(told).encode()},
+    )
+
+
+def _type(file: CampaignFile, name: str) -> str:
+    swept = file.sweep[name]
+    if swept.is_bool:
+        return "bool"
+    return "float64" if swept.is_number else "string"
+
+
+def unit(name: str) -> str:
+    """The unit of a key or an outcome by its end; empty: none."""
+    return next((unit for end, unit in _UNITS if name.endswith(end)), "")
+
+
+def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table":
+    """Rows as a table of the campaign's columns."""
+    import pyarrow as pa  # noqa: PLC0415  an extra
+
+    columns = schema(file)
+    data = {
+        field.name: [_cell(row.get(field.name), field.type) for row in rows] for field in columns
+    }
+    return pa.table(data, schema=columns)
+
+
+def _cell(value: Value, kind: Any) -> Value:
+    text = str(kind)
+    if value is None or text == "bool":
+        return value
+    if text == "string":
+        return value if isinstance(value, str) else json.dumps(value)
+    return value
+
+
+def write_unit(
+    folder: Path,
+    file: CampaignFile,
+    number: int,
+    rows: Sequence[Mapping[str, Value]],
+    timing: Mapping[str, Any],
+) -> None:
+    """Write the rows of a unit; when this returns they are on the disk.
+
+    Args:
+        folder: of the campaign.
+        file: of the campaign.
+        number: of the unit.
+        rows: one a case, in order.
+        timing: what must not stand in the results, as it differs from run to run.
+
+    Raises:
+        OSError: it cannot be written; no part of the unit is left.
+    """
+    import pyarrow.parquet as pq  # noqa: PLC0415  an extra
+
+    path = unit_path(folder, number)
+    write_whole(path.with_suffix(".json"), json.dumps(timing) + "\n")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        pq.write_table(table(file, rows), temporary)
+        descriptor = os.open(temporary, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def unit_path(folder: Path, number: int) -> Path:
+    """The Parquet file of a unit."""
+    return folder / RESULTS / f"unit-{number:05d}.parquet"
+
+
+def finished_units(folder: Path) -> frozenset[int]:
+    """The numbers of the units whose results are on the disk."""
+    paths = (folder / RESULTS).glob("unit-*.parquet")
+    return frozenset(int(path.stem.removeprefix("unit-")) for path in paths)
+
+
+def read(folder: Path) -> "pa.Table":
+    """All results that a campaign has so far, by case.
+
+    Raises:
+        ConfigError: there are none, or a file of them is damaged.
+    """
+    import pyarrow as pa  # noqa: PLC0415  an extra
+    import pyarrow.parquet as pq  # noqa: PLC0415  an extra
+
+    numbers = sorted(finished_units(folder))
+    if not numbers:
+        raise ConfigError(f"{folder}: there are no results of a campaign")
+    try:
+        tables = [pq.read_table(unit_path(folder, number)) for number in numbers]
+        return pa.concat_tables(tables).sort_by("case")
+    except (pa.ArrowException, OSError) as error:
+        raise ConfigError(f"{folder}: the results cannot be read: {error}") from error
+
+
+def metadata(results: "pa.Table") -> dict[str, Any]:
+    """Name, kind and factors of the campaign that a table of results belongs to."""
+    told: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA])
+    return told
+
+
+def write_campaign(folder: Path, campaign: Campaign, text: str) -> None:
+    """Write `campaign.yaml` and the trajectories of a campaign to its new folder.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    (folder / RESULTS).mkdir(parents=True, exist_ok=True)
+    for name, content in campaign.files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, content)
+    write_whole(folder / "campaign.yaml", text)

@@ -1,0 +1,165 @@
+"""What a campaign file says of a swept key: its values, or how they are distributed."""
+
+from collections.abc import Mapping, Sequence
+from math import exp, isfinite, log
+from statistics import NormalDist
+from typing import Annotated, Any
+
+from pydantic import Field, field_validator, model_validator
+
+from companion.files.yaml_file import Section
+
+Value = float | int | str | bool | None
+"""A value of a factor as a row of the results holds it."""
+Pair = tuple[float, float]
+KeyName = Annotated[str, Field(max_length=100)]
+
+_GRID = ("values", "range")
+_SPREAD = ("uniform", "loguniform", "normal", "choice")
+_MOST_VALUES = 1000
+
+
+class Swept(Section):
+    """The values of a swept key. A list alone stands for `values`.
+
+    Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
+    `values` and `range` are a grid: each value is flown with every value of the other grids. The
+    others are sampled.
+    """
+
+    values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
+    """Every one of these values."""
+    range: Pair | None = None
+    """`count` values at equal distances, from the first to the second."""
+    count: Annotated[int, Field(ge=2, le=_MOST_VALUES)] | None = None
+    """Number of values of `range`."""
+    uniform: Pair | None = None
+    """Uniform between the two values."""
+    loguniform: Pair | None = None
+    """Uniform in the logarithm between the two values."""
+    normal: Pair | None = None
+    """Normal distribution: mean and standard deviation."""
+    within: Pair | None = None
+    """Bounds of `normal`; it is truncated there."""
+    choice: Annotated[tuple[Any, ...], Field(min_length=2, max_length=_MOST_VALUES)] | None = None
+    """One of these values by chance, each as likely."""
+    times_base: bool = False
+    """The values multiply the value of the base configuration, instead of replacing it."""
+    keys: Annotated[tuple[KeyName, ...], Field(min_length=1, max_length=20)] | None = None
+    """Keys that get the value, when the factor has a name of its own or changes several keys."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _list_alone(cls, told: Any) -> Any:
+        if isinstance(told, list | tuple):
+            return {"values": told}
+        if isinstance(told, dict | cls):
+            return told
+        raise ValueError("must be a list of values, or a distribution such as {uniform: [0, 8]}")
+
+    @field_validator("values", "choice")
+    @classmethod
+    def _plain_values(cls, values: Sequence[Any] | None) -> Sequence[Any] | None:
+        for value in values or ():
+            items = value if isinstance(value, list | tuple) else [value]
+            if any(isinstance(item, dict | list | tuple) for item in items):
+                raise ValueError("each value must be a number, a word, true, false, null or a list")
+            if any(isinstance(item, float) and not isfinite(item) for item in items):
+                raise ValueError("each number must be finite")
+        shown = [column_value(value) for value in values or ()]
+        if any(shown.index(value) != place for place, value in enumerate(shown)):
+            raise ValueError("a value stands there twice")
+        return values
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Swept":
+        kinds = [kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_SPREAD))}")
+        for kind in ("range", "uniform", "loguniform", "within"):
+            pair = getattr(self, kind)
+            if pair is not None and not pair[0] < pair[1]:
+                raise ValueError(f"{kind}: the first value must be below the second")
+        if self.loguniform is not None and self.loguniform[0] <= 0.0:
+            raise ValueError("loguniform: both values must be above 0")
+        if self.normal is not None and self.normal[1] <= 0.0:
+            raise ValueError("normal: the standard deviation must be above 0")
+        if (self.range is None) != (self.count is None):
+            raise ValueError("range and count go together, as in {range: [20, 40], count: 5}")
+        if self.within is not None and self.normal is None:
+            raise ValueError("within goes with normal")
+        if self.times_base and not self.is_number:
+            raise ValueError("times_base needs numbers")
+        return self
+
+    @property
+    def kind(self) -> str:
+        """`values`, `range`, `uniform`, `loguniform`, `normal` or `choice`."""
+        return next(kind for kind in (*_GRID, *_SPREAD) if getattr(self, kind) is not None)
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it is sampled; otherwise it is a grid."""
+        return self.kind in _SPREAD
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its values are numbers; a null among them is a missing number."""
+        listed = self.values or self.choice
+        return listed is None or all(
+            value is None or (isinstance(value, float | int) and not isinstance(value, bool))
+            for value in listed
+        )
+
+    @property
+    def is_bool(self) -> bool:
+        """Whether its values are true and false."""
+        listed = self.values or self.choice
+        return listed is not None and all(isinstance(value, bool) for value in listed)
+
+    def grid(self) -> tuple[Any, ...]:
+        """The values of a grid."""
+        if self.range is None:
+            return self.values or ()
+        (low, high), count = self.range, self.count or 2
+        return tuple(low + (high - low) * place / (count - 1) for place in range(count))
+
+    def at(self, share: float) -> Any:
+        """The value of a distribution below which `share` (0..1) of it lies."""
+        if self.choice is not None:
+            return self.choice[min(int(share * len(self.choice)), len(self.choice) - 1)]
+        if self.normal is not None:
+            return _normal(self.normal, self.within, share)
+        if self.loguniform is not None:
+            low, high = map(log, self.loguniform)
+            return exp(low + (high - low) * share)
+        low, high = self.uniform or (0.0, 1.0)
+        return low + (high - low) * share
+
+    def described(self) -> dict[str, Any]:
+        """Kind and values, for the metadata of the results."""
+        told = {"count": self.count, "within": self.within}
+        shown: Mapping[str, Any] = {key: value for key, value in told.items() if value is not None}
+        return {
+            "kind": self.kind,
+            "sampled": self.sampled,
+            self.kind: [column_value(value) for value in getattr(self, self.kind)],
+            **shown,
+            "times_base": self.times_base,
+        }
+
+
+def _normal(normal: Pair, within: Pair | None, share: float) -> float:
+    distribution = NormalDist(*normal)
+    low, high = (0.0, 1.0) if within is None else map(distribution.cdf, within)
+    share = min(max(low + (high - low) * share, 1e-12), 1.0 - 1e-12)
+    value = distribution.inv_cdf(share)
+    return value if within is None else min(max(value, within[0]), within[1])
+
+
+def column_value(value: Any) -> Value:
+    """A value as the results hold it: a list becomes its items with commas between them."""
+    if isinstance(value, list | tuple):
+        return ",".join(str(item) for item in value)
+    plain: Value = value
+    return plain

@@ -1,0 +1,93 @@
+"""The versions that a result depends on, and their comparison between processes."""
+
+import hashlib
+import platform
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+Versions = dict[str, str]
+"""Version by name: of the program, its source, Python, NumPy and numba."""
+
+_PACKAGE = "mavlink-companion"
+_PACKAGES = ("numpy", "numba", "scipy")
+_ROOTS = ("companion", "sitl_mock")
+_NOT_FLOWN = ("cli", "report", "live", "bench", "study", "replay", "mavsdk_link")
+"""Rooms of `companion` that no case uses: a change of them leaves the results as they are."""
+_DIGITS = 12
+
+
+class VersionError(Exception):
+    """Two processes of a campaign, or a campaign and its folder, differ in their versions."""
+
+
+@cache
+def versions() -> Versions:
+    """The versions of this process."""
+    found = {
+        "companion": _version(_PACKAGE),
+        "source": source_digest(),
+        "python": platform.python_version(),
+    }
+    return found | {name: _version(name) for name in _PACKAGES}
+
+
+def source_digest() -> str:
+    """The first digits of a SHA-256 over the source that a case runs."""
+    found = hashlib.sha256()
+    base = Path(__file__).parents[2]
+    for path in _sources(base):
+        found.update(path.relative_to(base).as_posix().encode() + b"\0")
+        found.update(path.read_bytes() + b"\0")
+    return found.hexdigest()[:_DIGITS]
+
+
+def _sources(base: Path) -> Iterator[Path]:
+    for root in _ROOTS:
+        for path in sorted((base / root).rglob("*.py")):
+            parts = path.relative_to(base).parts
+            if not (parts[0] == _ROOTS[0] and parts[1] in _NOT_FLOWN):
+                yield path
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def difference(ours: Versions, others: Versions) -> str:
+    """What differs between two sets of versions, in words; empty where nothing does."""
+    names = {"source": "the source of companion", "python": "Python"}
+    return ", ".join(
+        f"{names.get(name, name)} {others.get(name, 'unknown')} instead of {ours[name]}"
+        for name in ours
+        if others.get(name) != ours[name]
+    )
+
+
+def require_equal(ours: Versions, others: Versions, who: str) -> None:
+    """Refuse another process, or a folder, whose versions differ.
+
+    Args:
+        ours: versions that are asked for.
+        others: versions found.
+        who: has the other versions; begins the message.
+
+    Raises:
+        VersionError: says what differs.
+    """
+    found = difference(ours, others)
+    if found:
+        raise VersionError(
+            f"{who} has {found}: results of two versions must not be mixed, so install the same "
+            "version there"
+        )
+
+
+def as_found(told: Any) -> Versions:
+    """The versions that JSON or another process told, as texts."""
+    return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}

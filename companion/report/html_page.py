@@ -1,0 +1,59 @@
+"""Renders a page with plots as one HTML file that needs no network."""
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+from companion.extras import require
+from companion.report.plots import Plot
+
+
+def require_extra() -> None:
+    """Make sure that the extra `report` is installed.
+
+    Raises:
+        MissingExtraError: a package is missing; the message says how to install it.
+    """
+    for module in ("plotly", "jinja2"):
+        require(module, "report", "a report")
+
+
+def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **shown: Any) -> str:
+    """The text of a page.
+
+    Args:
+        package: whose folder holds the template; it may extend `base.html.j2` of this package, and
+            import from `parts.html.j2`.
+        template: name of the file.
+        title: of the page.
+        plots: drawn where the template shows them.
+        shown: further values for the template.
+    """
+    import jinja2  # noqa: PLC0415  an extra
+
+    folders = [
+        jinja2.PackageLoader(each, ".") for each in dict.fromkeys([package, "companion.report"])
+    ]
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(folders), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    plotly = files("plotly") / "package_data" / "plotly.min.js"
+    return environment.get_template(template).render(
+        title=title,
+        plots=plots,
+        plots_json=_script_safe([_plain(plot) for plot in plots]),
+        plotly=plotly.read_text("utf-8"),
+        version=version("mavlink-companion"),
+        **shown,
+    )
+
+
+def _plain(plot: Plot) -> dict[str, Any]:
+    return {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
+
+
+def _script_safe(data: Any) -> str:
+    """JSON inside a script element: no `<`, with which a tag could begin."""
+    return json.dumps(data, allow_nan=False).replace("<", "\\u003c")

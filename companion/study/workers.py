@@ -1,0 +1,121 @@
+"""Runs studies in worker processes, one study per process at a time."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import Any, NamedTuple
+
+from companion.study.outcome import Outcome, Tick
+
+RunStudy = Callable[[str, Tick], Outcome]
+"""Runs the study of this name and writes its files; a worker imports it by its name."""
+
+_POLL_S = 0.05
+"""Time between two looks at the progress, s."""
+
+
+class _Seams(NamedTuple):
+    """What a worker shares with the main process.
+
+    Attributes:
+        ticks: queue of (study, part), put by the workers.
+        stop: event, set when the run is interrupted.
+    """
+
+    ticks: Any
+    stop: Any
+
+
+_shared: list[_Seams] = []
+"""In a worker: its seams. Synchronised objects can only be passed when the process starts."""
+
+
+class _StoppedError(Exception):
+    """The run was interrupted; ends a study in a worker."""
+
+
+def cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def run_in_workers(
+    run_study: RunStudy, parts: Mapping[str, int], workers: int, tick: Callable[[str, str], None]
+) -> dict[str, Outcome]:
+    """Run studies in worker processes; on Ctrl-C they end after the part in progress.
+
+    Args:
+        run_study: function at the top level of a module.
+        parts: names of the studies, and the number of their parts. Studies with more parts begin
+            first, because they take longer.
+        workers: number of processes.
+        tick: called with study and part when a part begins.
+
+    Returns:
+        the outcomes by study, in the order of `parts`.
+
+    Raises:
+        OSError: a result cannot be written, or a worker was killed.
+    """
+    context = get_context("spawn")
+    seams = _Seams(context.SimpleQueue(), context.Event())
+    pool = ProcessPoolExecutor(workers, context, _begin, (seams,))
+    try:
+        with interrupts_blocked():
+            futures = {
+                name: pool.submit(_run_one, run_study, name)
+                for name in sorted(parts, key=lambda name: -parts[name])
+            }
+        _follow(list(futures.values()), seams.ticks, tick)
+        return {name: futures[name].result() for name in parts}
+    except BrokenProcessPool as error:
+        raise OSError(
+            "a worker process was killed, perhaps for lack of memory; run again with --workers 1"
+        ) from error
+    finally:
+        seams.stop.set()
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT; processes started meanwhile inherit this, so Ctrl-C does not reach them."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _follow(
+    futures: Sequence[Future[Outcome]], ticks: Any, tick: Callable[[str, str], None]
+) -> None:
+    """Pass the workers' ticks on until all studies are done or one of them failed."""
+    pending = set(futures)
+    while pending:
+        done, pending = wait(pending, timeout=_POLL_S)
+        while not ticks.empty():
+            tick(*ticks.get())
+        for future in done:
+            future.result()  # raises the study's exception
+
+
+def _begin(seams: _Seams) -> None:
+    """Begin a worker process."""
+    _shared.append(seams)
+
+
+def _run_one(run_study: RunStudy, name: str) -> Outcome:
+    """Run one study in a worker process."""
+    (seams,) = _shared
+
+    def tick(part: str) -> None:
+        if seams.stop.is_set():
+            raise _StoppedError
+        seams.ticks.put((name, part))
+
+    return run_study(name, tick)

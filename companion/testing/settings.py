@@ -1,0 +1,57 @@
+"""The section `mock` of a configuration, checked and completed by the mock vehicle's own rules."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from companion.files.yaml_file import ConfigError
+from sitl_mock.config.section import explain
+from sitl_mock.settings import MockSettings
+
+
+def complete_mock(section: Mapping[str, Any]) -> dict[str, Any]:
+    """The section `mock` with the defaults of its autopilot written out.
+
+    Raises:
+        ConfigError: an unknown key or a bad value; the message names the key.
+    """
+    try:
+        return MockSettings.model_validate(dict(section)).model_dump()
+    except ValidationError as error:
+        raise ConfigError(explain(error, MockSettings)) from error
+
+
+def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The complete section `mock` with some keys changed.
+
+    A key replaces exactly what it names. So `wind.speed_m_s` leaves the gusts as they are, and
+    `airframe: unlike-axes` with `airframe.mass_kg` is that airframe with another mass.
+
+    Args:
+        section: before the changes.
+        changes: new values by dotted key, without `mock.` in front.
+
+    Raises:
+        ConfigError: an unknown key or a bad value; the message names the key.
+    """
+    by_depth: dict[int, dict[str, Any]] = {}
+    for key, value in changes.items():
+        by_depth.setdefault(key.count("."), {})[key] = value
+    data = dict(section) | by_depth.pop(0, {})
+    complete = complete_mock(data)
+    for depth in sorted(by_depth):
+        for key, value in by_depth[depth].items():
+            _put(complete, key.split("."), value)
+        complete = complete_mock(complete)
+    return complete
+
+
+def _put(section: dict[str, Any], path: list[str], value: Any) -> None:
+    for depth, name in enumerate(path[:-1]):
+        inner = section.get(name)
+        if name in section and not isinstance(inner, dict):
+            where = ".".join(["mock", *path[: depth + 1]])
+            raise ConfigError(f"{where} is {inner!r:.40}, so mock.{'.'.join(path)} has no place")
+        section = section.setdefault(name, {})
+    section[path[-1]] = value

@@ -1,0 +1,63 @@
+"""Studies in worker processes: the outcomes, the progress, an error, and the same files."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from companion.cli.main import main
+from companion.study import runner
+from companion.study.workers import run_in_workers
+
+
+def returns_its_name(name, tick):
+    tick("only part")
+    return f"outcome of {name}"
+
+
+def fails_in_second(name, tick):
+    if name == "second":
+        raise OSError("the disk is full")
+    return name
+
+
+def is_killed(_name, _tick):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_outcomes_keep_their_order_and_every_part_is_told():
+    told = []
+    parts = {"first": 1, "second": 2}
+    outcomes = run_in_workers(returns_its_name, parts, 2, lambda *each: told.append(each))
+    assert list(outcomes.items()) == [(name, f"outcome of {name}") for name in parts]
+    assert sorted(told) == [("first", "only part"), ("second", "only part")]
+
+
+@pytest.mark.parametrize(
+    ("study", "message"), [(fails_in_second, "the disk is full"), (is_killed, "worker .* killed")]
+)
+def test_an_error_in_a_worker_ends_the_run(study, message):
+    with pytest.raises(OSError, match=message):
+        run_in_workers(study, {"first": 1, "second": 1}, 1, lambda *_: None)
+
+
+def test_the_number_of_workers_is_checked(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "all", "--workers", "0"])
+    assert ended.value.code == 2
+    assert "must be a whole number from 1 to 256" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_two_workers_write_the_files_of_one(tmp_path):
+    def files(workers) -> dict[str, bytes]:
+        out: Path = tmp_path / str(workers)
+        runner.run("all", None, out, Console(quiet=True), workers)
+        return {path.name: path.read_bytes() for path in out.iterdir()}
+
+    one = files(1)
+    assert "study.html" in one
+    assert files(2) == one
