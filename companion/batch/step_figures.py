@@ -16,8 +16,8 @@ from companion.batch.rate_loop import StepFlight
 _SHORTEST, _LONGEST = log(0.02), log(2.0)
 """Range in which the time constant is searched, logarithms of s."""
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
-_NARROWINGS = 24
-"""Steps of the golden-section search; the range left is 5e-5 of a time constant."""
+_NARROWINGS = 17
+"""Steps of the golden-section search; the range left is 0.13 % of a time constant."""
 _ASKED = 1e-3
 """Smallest target coefficient that counts as a step."""
 

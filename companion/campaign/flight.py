@@ -1,7 +1,6 @@
 """One whole flight of a campaign, in this process on one virtual clock."""
 
 import tempfile
-from collections.abc import Sequence
 from math import acos
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
 from companion.campaign.swept import Value
 from companion.config import Config
+from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Silent
 from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
@@ -42,9 +42,11 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     with tempfile.TemporaryDirectory(prefix="companion-case-") as place:
         try:
             return row | _Flight(case, Path(place)).fly(folder)
+        except ConfigError as error:  # such as a trajectory that the limits do not allow
+            told = str(error)
         except Exception as error:
-            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}".replace(f"{place}/", "")
-            return row | outcomes.unflown(told)
+            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
+        return row | outcomes.unflown(told.replace(f"{place}/", ""))
 
 
 class _Flight:
@@ -176,8 +178,3 @@ def _placed(config: Config, place: Path) -> Config:
     path = config.flight.trajectory
     flight = config.flight.model_copy(update={"trajectory": None if path is None else place / path})
     return config.model_copy(update={"recording": recording, "flight": flight})
-
-
-def fly_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Fly cases one after the other; a row each, in order."""
-    return [fly_case(case) for case in cases]

@@ -95,10 +95,13 @@ def with_keys(
         ConfigError: a value is refused; the message names the key.
     """
     of_mock = {key.removeprefix(_MOCK): value for key, value in changes.items() if _of_mock(key)}
-    data = base.model_dump()
+    # Sections without a change are not checked again, which would take most of the time.
+    data = {name: getattr(base, name) for name in Config.model_fields if name != "include"}
     for key, value in changes.items():
         if not _of_mock(key):
             section, _, name = key.partition(".")
+            if not isinstance(data[section], dict):
+                data[section] = data[section].model_dump()
             data[section][name] = value
     config = validated(data, "the configuration", Config)
     return config, mock_with(mock, of_mock)

@@ -176,16 +176,27 @@ def read(folder: Path) -> "pa.Table":
         ConfigError: there are none, or a file of them is damaged.
     """
     import pyarrow as pa  # noqa: PLC0415  an extra
-    import pyarrow.parquet as pq  # noqa: PLC0415  an extra
 
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
+    return pa.concat_tables([read_unit(folder, number) for number in numbers]).sort_by("case")
+
+
+def read_unit(folder: Path, number: int) -> "pa.Table":
+    """The results of one unit.
+
+    Raises:
+        ConfigError: the file is damaged.
+    """
+    import pyarrow as pa  # noqa: PLC0415  an extra
+    import pyarrow.parquet as pq  # noqa: PLC0415  an extra
+
+    path = unit_path(folder, number)
     try:
-        tables = [pq.read_table(unit_path(folder, number)) for number in numbers]
-        return pa.concat_tables(tables).sort_by("case")
+        return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
-        raise ConfigError(f"{folder}: the results cannot be read: {error}") from error
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
 
 
 def metadata(results: "pa.Table") -> dict[str, Any]:

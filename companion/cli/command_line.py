@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from companion.cli import tool_options
+from companion.cli.campaign_options import add_campaign, with_campaign_command
 from companion.cli.recording_options import add_recordings
 from companion.cli.tool_options import Commands, number
 
@@ -22,8 +23,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     Returns:
         The options; `typed` holds the arguments themselves.
     """
-    options = _parser().parse_args(arguments)
-    options.typed = sys.argv[1:] if arguments is None else list(arguments)
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    options = _parser().parse_args(with_campaign_command(typed))
+    options.typed = typed
     return options
 
 
@@ -46,6 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     tool_options.add_tune(commands)
     tool_options.add_benches(commands)
     tool_options.add_study(commands)
+    add_campaign(commands)
     tool_options.add_tools(commands)
     add_recordings(commands)
     tool_options.add_config(commands)

@@ -192,6 +192,8 @@ def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
 def _model_at(location: tuple[int | str, ...], model: type[BaseModel]) -> type[BaseModel]:
     """The model that the last key of a location is refused by."""
     for part in location[:-1]:
+        if str(part) not in model.model_fields:
+            continue  # a name that the user gave, or a position in a list
         field = model.model_fields[str(part)].annotation
         for kind in (field, *get_args(field)):
             if isinstance(kind, type) and issubclass(kind, BaseModel):

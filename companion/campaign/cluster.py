@@ -1,0 +1,198 @@
+"""Dask: worker processes of our own, or a cluster that exists, and what runs on them."""
+
+import logging
+import os
+import signal
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from companion.campaign.unit import Flown
+from companion.campaign.versions import VersionError, as_found, require_equal, versions
+from companion.extras import require
+from companion.files.yaml_file import ConfigError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+DEATHS = 3
+"""A unit that was on a worker when it died for the third time is given up."""
+_CONNECT_S = 10.0
+_CLOSE_S = 5.0
+_PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
+_LOCAL = {
+    "distributed.scheduler.allowed-failures": DEATHS - 1,
+    # Dask sets the variables of BLAS and OpenMP to 1 itself.
+    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": "1",
+}
+"""Settings of a cluster on this computer. One thread a worker: flights are pure Python."""
+
+
+class ClusterError(Exception):
+    """The cluster was lost, or gave up what it should run."""
+
+
+class Ended(NamedTuple):
+    """A unit that ended.
+
+    Attributes:
+        number: of the unit.
+        flown: its rows; None: it was given up.
+        reason: why it was given up.
+    """
+
+    number: int
+    flown: Flown | None
+    reason: str = ""
+
+
+def require_packages() -> None:
+    """Check that the extra `campaign` is installed.
+
+    Raises:
+        MissingExtraError: a package is missing.
+    """
+    for package in _PACKAGES:
+        require(package, "campaign", "`companion campaign`")
+
+
+def local_workers() -> int:
+    """The number of worker processes on this computer: one for each core that we may use."""
+    return len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
+    """A client of a cluster whose workers have our versions.
+
+    Args:
+        scheduler: address of an existing cluster; None: worker processes of our own, which end with
+            the context.
+        workers: number of our own worker processes; None: one a core.
+
+    Raises:
+        ConfigError: the scheduler cannot be reached.
+        VersionError: a worker or the scheduler has other versions.
+    """
+    import dask  # noqa: PLC0415  an extra
+    from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # we say it in a sentence
+    with dask.config.set(_LOCAL):
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout=_CONNECT_S)
+            except (OSError, ValueError, TypeError) as error:
+                raise ConfigError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+            cluster = None
+        else:
+            with _interrupts_blocked():
+                cluster = LocalCluster(
+                    n_workers=workers or local_workers(),
+                    threads_per_worker=1,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL + 1,
+                )
+            client = Client(cluster)
+        try:
+            _compare_versions(client)
+            yield client
+        finally:
+            with suppress(Exception):  # what matters is on the disk
+                client.close(timeout=_CLOSE_S)
+                if cluster is not None:
+                    cluster.close(timeout=_CLOSE_S)
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT here and in the threads and processes that begin now.
+
+    Ctrl-C in a terminal reaches all processes. Only the client may act on it: it ends the workers.
+    """
+    resource_tracker.ensure_running()  # it would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def wait_for_workers(client: "Client") -> None:
+    """Wait until the cluster has a worker; with a queueing system that may take long.
+
+    Raises:
+        VersionError: as `connected`.
+    """
+    client.wait_for_workers(1)
+    _compare_versions(client)
+
+
+def number_of_workers(client: "Client") -> int:
+    """The number of workers that the cluster has now."""
+    return len(client.scheduler_info(n_workers=-1)["workers"])
+
+
+def _compare_versions(client: "Client") -> None:
+    """Refuse a scheduler or workers of other versions.
+
+    Raises:
+        VersionError: says who has which.
+    """
+    told = client.get_versions()
+    ours, scheduler = (_of_dask(told[who]) for who in ("client", "scheduler"))
+    require_equal(ours, scheduler, "the Dask scheduler")
+    for address, found in client.run(versions, on_error="return").items():
+        if isinstance(found, BaseException):
+            raise VersionError(
+                f"the worker {address} cannot run this version of companion ({found}): install the "
+                "same version there"
+            )
+        require_equal(versions(), as_found(found), f"the worker {address}")
+
+
+def _of_dask(told: Mapping[str, Any]) -> dict[str, str]:
+    python = ".".join(str(told["host"]["python"]).split(".")[:2])
+    return {"python": python, "distributed": str(told["packages"]["distributed"])}
+
+
+def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[Ended]:
+    """Run tasks on the cluster; yields each unit as it ends, in any order.
+
+    Dask queues them, sends them, and repeats those whose worker died.
+
+    Args:
+        client: of the cluster.
+        tasks: function and its arguments by the number of the unit; the function returns `Flown`.
+
+    Raises:
+        ClusterError: the connection to the scheduler is lost.
+        VersionError: a worker that came later has other versions.
+    """
+    from distributed import as_completed  # noqa: PLC0415  an extra
+
+    futures = {client.submit(*task, pure=False): number for number, task in tasks.items()}
+    try:
+        for future in as_completed(futures):
+            number = futures.pop(future)
+            if future.status == "finished":
+                yield Ended(number, future.result())
+            elif future.status == "error":
+                yield Ended(number, None, _reason(future.exception()))
+            else:
+                raise ClusterError("the connection to the Dask scheduler is lost")
+            future.release()
+    finally:
+        with suppress(Exception):
+            client.cancel(list(futures), force=True)
+
+
+def _reason(error: BaseException) -> str:
+    from distributed import KilledWorker  # noqa: PLC0415  an extra
+
+    if isinstance(error, VersionError | ConfigError):
+        raise error
+    if isinstance(error, KilledWorker):
+        return "its worker died each time it was tried"
+    return f"{type(error).__name__}: {error}"

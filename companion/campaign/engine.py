@@ -1,0 +1,118 @@
+"""Runs a campaign on Dask, and writes its results as they come."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from companion.campaign import store
+from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import CampaignFile
+from companion.campaign.case import Case
+from companion.campaign.cluster import ClusterError, Ended, number_of_workers, run_tasks
+from companion.campaign.flight import INTERNAL_ERROR
+from companion.campaign.folder import Description
+from companion.campaign.unit import Row, described, fly_cases, fly_samples, ranges, size_of_units
+from companion.campaign.versions import versions
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+
+@dataclass
+class Progress:
+    """What a run has done so far.
+
+    Attributes:
+        flown: number of cases in the results, those of earlier runs included.
+        lost: cases of units that were given up, with the reason, one sentence each.
+    """
+
+    flown: int = 0
+    lost: list[str] = field(default_factory=list)
+
+
+def run(
+    client: "Client",
+    campaign: Campaign,
+    description: Description,
+    folder: Path,
+    on_unit: Callable[[Progress], None] = lambda _: None,
+) -> Progress:
+    """Run the units whose results are missing in the folder.
+
+    Each unit is written when it ends, whole or not at all. So whatever ends this function loses
+    only the units under way.
+
+    Args:
+        client: of the cluster.
+        campaign: the campaign.
+        description: of the folder.
+        folder: of the campaign; made and locked.
+        on_unit: called after each unit.
+
+    Raises:
+        ClusterError: the connection to the scheduler is lost.
+        OSError: the results cannot be written.
+        VersionError: a worker that came later has other versions.
+    """
+    units = ranges(description.cases, description.unit)
+    finished = store.finished_units(folder)
+    missing = {number: unit for number, unit in enumerate(units) if number not in finished}
+    progress = Progress(flown=sum(len(units[number]) for number in finished))
+    on_unit(progress)
+    samples = list(campaign.samples()) if missing else []
+    tasks = {
+        number: (fly_samples, campaign, [samples[index] for index in unit], versions())
+        for number, unit in missing.items()
+    }
+    for ended in run_tasks(client, tasks):
+        _keep(ended, units[ended.number], campaign, folder, progress)
+        on_unit(progress)
+    return progress
+
+
+def _keep(ended: Ended, unit: range, campaign: Campaign, folder: Path, progress: Progress) -> None:
+    if ended.flown is None:
+        cases = f"cases {unit.start} to {unit.stop - 1}"
+        progress.lost.append(f"unit {ended.number} ({cases}): {ended.reason}")
+        return
+    timing = {**described(unit), "wall_s": ended.flown.wall_s, "worker": ended.flown.worker}
+    store.write_unit(folder, campaign.file, ended.number, ended.flown.rows, timing)
+    progress.flown += len(unit)
+
+
+def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
+    """How many flights of the results ended by each fault of the program itself."""
+    if file.kind != "flights":
+        return Counter()
+    results = store.read(folder)["result"].to_pylist()
+    return Counter(result for result in results if result.startswith(INTERNAL_ERROR))
+
+
+def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
+    """The rows of cases that need not belong to a campaign, in order, without a folder.
+
+    Args:
+        client: of the cluster.
+        kind: "flights" or "batch".
+        cases: to be flown.
+        case_s: time that a case takes, s; see `companion.campaign.estimate.measured`.
+
+    Raises:
+        ClusterError: the connection to the scheduler is lost, or a unit was given up.
+        VersionError: a worker that came later has other versions.
+    """
+    size = size_of_units(len(cases), case_s, number_of_workers(client))
+    units = ranges(len(cases), size)
+    tasks = {
+        number: (fly_cases, kind, [cases[index] for index in unit], versions())
+        for number, unit in enumerate(units)
+    }
+    found: dict[int, list[Row]] = {}
+    for ended in run_tasks(client, tasks):
+        if ended.flown is None:
+            raise ClusterError(f"a unit of work was given up: {ended.reason}")
+        found[ended.number] = ended.flown.rows
+    return [row for number in range(len(units)) for row in found[number]]

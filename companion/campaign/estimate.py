@@ -1,0 +1,86 @@
+"""How long a campaign takes, and whether that is more than its limits allow."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from time import perf_counter
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.case import Case
+from companion.campaign.unit import run_cases
+from companion.files.yaml_file import ConfigError
+
+MOST_CASES = {"flights": 2000, "batch": 100_000}
+"""Largest number of cases by kind, where `limits.max_cases` is null."""
+NOUNS = {"flights": "flights", "batch": "vehicles"}
+"""What the cases of a kind are called."""
+_MEASURED = 3
+"""Number of flights that are measured."""
+_BATCH = 64
+"""Number of vehicles of the batch that is measured."""
+
+
+def measured(kind: str, cases: Sequence[Case]) -> float:
+    """The time that a case takes in one process here, s.
+
+    A first, short run, which imports and compiles, is not measured.
+
+    Args:
+        kind: "flights" or "batch".
+        cases: of the campaign; some of them are run.
+    """
+    if kind == "batch":
+        some = cases[:_BATCH]
+        run_cases(kind, some)
+    else:
+        places = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED]
+        some = [cases[place] for place in places]
+        run_cases(kind, [replace(some[0], flight_s=1.0)])
+    began = perf_counter()
+    run_cases(kind, some)
+    return (perf_counter() - began) / len(some)
+
+
+def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
+    """Refuse a campaign that is larger than its limits.
+
+    Args:
+        campaign: the campaign.
+        case_s: time that a case takes, s.
+        workers: number of workers.
+
+    Raises:
+        ConfigError: says the number of cases, the time they would take, and which key allows more.
+    """
+    cases, limits = campaign.number_of_cases, campaign.file.limits
+    most = most_cases(campaign)
+    seconds = cases * case_s / workers
+    if cases > most:
+        key, allowed = "limits.max_cases", f"{most}"
+    elif seconds > 3600.0 * limits.max_hours:
+        key, allowed = "limits.max_hours", f"{limits.max_hours:g}"
+    else:
+        return
+    raise ConfigError(
+        f"{campaign.name}: {size_in_words(campaign, seconds, workers)}, more than {key} allows"
+        f" ({allowed}): reduce it, raise {key}, or say --yes"
+    )
+
+
+def most_cases(campaign: Campaign) -> int:
+    """The largest number of cases that the campaign's limits allow."""
+    return campaign.file.limits.max_cases or MOST_CASES[campaign.file.kind]
+
+
+def size_in_words(campaign: Campaign, seconds: float, workers: int) -> str:
+    """The number of cases and the estimated time."""
+    noun = NOUNS[campaign.file.kind]
+    processes = "1 worker" if workers == 1 else f"{workers} workers"
+    return f"{campaign.number_of_cases} {noun}, about {duration(seconds)} with {processes}"
+
+
+def duration(seconds: float) -> str:
+    """A time in words, with two digits."""
+    for unit, length in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{seconds:.2g} s"

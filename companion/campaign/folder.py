@@ -1,0 +1,187 @@
+"""The folder of a campaign: made, resumed, and kept from two processes at once."""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from companion.campaign import store
+from companion.campaign.campaign import Campaign
+from companion.campaign.loading import as_written
+from companion.campaign.versions import VersionError, Versions, as_found, difference, versions
+from companion.files import bounded_yaml
+from companion.files.bounded_file import FileRefusedError, read_text
+from companion.files.bounded_yaml import YamlError
+from companion.files.write_whole import write_whole
+from companion.files.yaml_file import ConfigError
+
+RUNS = Path("runs", "campaigns")
+"""Where the folders of campaigns are made, under the working folder."""
+FILE = "campaign.yaml"
+"""Name of the campaign's resolved file in its folder."""
+_DESCRIPTION, _LOCK = "campaign.json", ".lock"
+_MOST_BYTES = 1_000_000
+_SIZE = ("max_cases", "max_hours")
+
+
+@dataclass(frozen=True)
+class Description:
+    """`campaign.json`.
+
+    Attributes:
+        name: of the campaign.
+        kind: flights or batch.
+        seed: of the campaign.
+        cases: number of cases.
+        unit: number of cases in a unit.
+        case_s: time that a case took in the client before the campaign began, s; None: unknown.
+        versions: of the program and what results depend on.
+        began: when the folder was made, ISO 8601, UTC.
+    """
+
+    name: str
+    kind: str
+    seed: int
+    cases: int
+    unit: int
+    case_s: float | None
+    versions: Versions
+    began: str
+
+
+def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:
+    """The description of a campaign that begins now."""
+    file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
+    cases = campaign.number_of_cases
+    return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
+
+
+def new_name(campaign: Campaign) -> Path:
+    """A folder for a new campaign, named by the present time in UTC."""
+    stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    return RUNS / f"{campaign.file.name}-{stamp}"
+
+
+def make(folder: Path, campaign: Campaign, description: Description) -> None:
+    """Write the folder of a new campaign.
+
+    Raises:
+        ConfigError: it cannot be written, or holds other files.
+    """
+    try:
+        if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
+            raise ConfigError(f"{folder}: holds files that are not those of a campaign")
+        store.write_campaign(folder, campaign, bounded_yaml.dump(as_written(campaign)))
+        write_whole(folder / _DESCRIPTION, json.dumps(asdict(description), indent=2) + "\n")
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
+
+
+def begun(folder: Path) -> bool:
+    """Whether the folder holds a campaign that was begun."""
+    return (folder / _DESCRIPTION).is_file()
+
+
+def read_description(folder: Path) -> Description:
+    """The description in the folder of a campaign.
+
+    Raises:
+        ConfigError: there is none, or it is damaged.
+    """
+    path = folder / _DESCRIPTION
+    try:
+        told = json.loads(read_text(path, _MOST_BYTES))
+        return Description(**{**told, "versions": as_found(told["versions"])})
+    except FileRefusedError as error:
+        raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise ConfigError(f"{path}: is damaged") from error
+
+
+def resume(folder: Path, campaign: Campaign) -> Description:
+    """Check that the folder holds this campaign, begun by this version.
+
+    Raises:
+        ConfigError: it holds another campaign.
+        VersionError: it was begun by another version.
+    """
+    description = read_description(folder)
+    _compare(folder, campaign)
+    require_version(folder, description)
+    return description
+
+
+def require_version(folder: Path, description: Description) -> None:
+    """Refuse a folder that another version has begun.
+
+    Raises:
+        VersionError: says what differs.
+    """
+    found = difference(description.versions, versions())
+    if found:
+        raise VersionError(
+            f"{folder} was begun by another version: here is {found}. Results of two versions must "
+            "not be mixed: go on with the version that began it, or begin anew with another --out"
+        )
+
+
+def _compare(folder: Path, campaign: Campaign) -> None:
+    """Compare the campaign with the file in the folder; limits may differ."""
+    path = folder / FILE
+    try:
+        before = bounded_yaml.parse(read_text(path, _MOST_BYTES))
+        # Read as the file was: a tuple becomes a list.
+        now = bounded_yaml.parse(bounded_yaml.dump(as_written(campaign)))
+    except (FileRefusedError, YamlError) as error:
+        raise ConfigError(f"{path}: {error}") from error
+    if not isinstance(before, Mapping):
+        raise ConfigError(f"{path}: is damaged")
+    changed = [key for key in now if _without_size(before, key) != _without_size(now, key)]
+    files = [name for name, text in campaign.files.items() if _text(folder / name) != text]
+    if changed or files:
+        raise ConfigError(
+            f"{folder} holds another campaign: {', '.join((*changed, *files))} differ; name "
+            "another folder with --out"
+        )
+
+
+def _without_size(data: Mapping[str, Any], key: str) -> Any:
+    """A key of a campaign file, without the limits that say how large it may be."""
+    value = data.get(key)
+    if key == "limits" and isinstance(value, Mapping):
+        return {name: each for name, each in value.items() if name not in _SIZE}
+    return value
+
+
+def _text(path: Path) -> str | None:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the folder, so that no other process runs the same campaign.
+
+    Raises:
+        ConfigError: another process holds it, or it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be written: {error.strerror}") from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(f"{folder}: another process runs this campaign") from error
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,198 @@
+"""`companion campaign report`: the page about a campaign, and its results in one table."""
+
+import argparse
+import os
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+
+from companion.campaign.cluster import require_packages
+from companion.campaign.report import plots, tables
+from companion.campaign.report.results import RATES, Results, label
+from companion.campaign.report.sensitivity import FEWEST, Influence, influences
+from companion.campaign.report.statistics import levels, share_of
+from companion.extras import require
+from companion.files.write_whole import write_whole
+from companion.report import PAGE
+from companion.report.html_page import rendered, require_extra
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+PARQUET, CSV = "results.parquet", "results.csv"
+_DONE = 0
+_GRID_LIKE, _FEW_SAMPLES = 12, 60
+"""A factor whose number of values lies between these was sampled, but not often enough to tell
+factors apart."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the page and the tables of a campaign; returns the exit code.
+
+    Args:
+        options: `folder` of the campaign, and `out`: the page, or None for `report.html` there.
+
+    Raises:
+        ConfigError: the folder holds no campaign, or no results yet.
+        MissingExtraError: an extra is missing.
+        OSError: a file cannot be written.
+    """
+    require_packages()
+    require("SALib", "campaign", "`companion campaign report`")
+    require_extra()
+    results = Results.read(options.folder)
+    page = options.out or options.folder / PAGE
+    write_whole(page, page_text(results))
+    write_tables(results.table, options.folder)
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(headline(results), markup=False)
+    for line in missing(results):
+        console.print(line, markup=False)
+    console.print(f"Open {page}", markup=False)
+    return _DONE
+
+
+def write_tables(table: "pa.Table", folder: Path) -> None:
+    """Write all results as one Parquet file and as CSV.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    import pyarrow.csv  # noqa: PLC0415  an extra
+    import pyarrow.parquet  # noqa: PLC0415
+
+    for name, write in (
+        (PARQUET, pyarrow.parquet.write_table),
+        (CSV, pyarrow.csv.write_csv),
+    ):
+        part = folder / f".{name}.{os.getpid()}"
+        try:
+            write(table, part)
+            part.replace(folder / name)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def page_text(results: Results) -> str:
+    """The page."""
+    found = {
+        name: each
+        for name in (results.error, RATES, "ok")
+        if name == "ok" or results.measured(name)
+        if (each := influences(results, name))
+    }
+    order = _order(results, found)
+    shown = [
+        *plots.success(results, order),
+        *plots.sensitivity(found),
+        *plots.pareto(results),
+        *plots.distributions(results),
+    ]
+    first = [tables.worst_cases(results), tables.crossed(results)]
+    if order:
+        first.append(tables.success_by_factor(results, order))
+    if found:
+        first.append(tables.sensitivity(found))
+    return rendered(
+        "companion.campaign.report",
+        "campaign.html.j2",
+        f"Campaign {results.name}",
+        shown,
+        headline=headline(results),
+        good=not results.true_cases("crashed") and bool(results.good.all()),
+        lines=[*missing(results), *what_to_look_at(results, found)],
+        tables=[each for each in first if each is not None],
+        cases=tables.all_cases(results),
+    )
+
+
+def headline(results: Results) -> str:
+    """What was flown, and the success rate with its interval, in a sentence."""
+    share = share_of(results.good)
+    return f"{results.name}: {share.chosen} of {share.of} {results.noun} good: {share}"
+
+
+def missing(results: Results) -> list[str]:
+    """What is missing of a campaign that is not finished."""
+    left = results.planned - results.count
+    if not left:
+        return []
+    return [
+        f"{left} of {results.planned} {results.noun} are missing. `companion campaign "
+        f"{results.folder}` goes on with them."
+    ]
+
+
+def what_to_look_at(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
+    """What was flown, and what a reader should look at first."""
+    yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
+    columns = results.columns
+    if crashed := results.true_cases("crashed"):
+        yield f"{crashed} of them crashed; they stand first in the table of worst cases."
+    documented = [value for value in columns.get("as_documented", ()) if value is not None]
+    if documented:
+        kept = sum(documented)
+        yield f"{kept} of {len(documented)} flights with a fault ended as documented."
+    reasons = Counter(
+        _reason(results, row) for row in range(results.count) if not results.good[row]
+    )
+    if reasons:
+        (reason, times) = reasons.most_common(1)[0]
+        yield f"Most frequent reason why one was not good, {times} times: {reason}."
+    yield from _most_influential(results, found)
+
+
+def _reason(results: Results, row: int) -> str:
+    columns = results.columns
+    result = str(columns["result"][row]) if "result" in columns else "ok"
+    checks = str(columns["failed_checks"][row] or "") if "failed_checks" in columns else ""
+    return checks if result == "ok" and checks else "not straight" if result == "ok" else result
+
+
+def _most_influential(results: Results, found: dict[str, list[Influence]]) -> Iterator[str]:
+    if results.error in found:
+        first = found[results.error][0]
+        error = label(results.error).partition(",")[0]
+        share = f"{first.share:.0%} ± {first.confidence:.0%}"
+        yield f"{first.factor} explains {share} of the variance of the {error} by itself."
+        yield from _few_samples(results)
+    elif results.factors:
+        yield f"Sensitivity needs at least {FEWEST} {results.noun} with different outcomes."
+    worst = min(
+        (
+            (share_of(results.good[level.cases]), name, level.name)
+            for name in results.factors
+            for level in levels(results.columns[name])
+            if level.cases.any()
+        ),
+        default=None,
+        key=lambda each: each[0].high,
+    )
+    if worst is not None and worst[0].share < 1.0:
+        lowest, name, value = worst
+        yield f"Success is lowest with {name} = {value}: {lowest}."
+
+
+def _few_samples(results: Results) -> Iterator[str]:
+    """A warning if the sampled factors had few different values."""
+    drawn = [
+        len(np.unique(column))
+        for name in results.factors
+        if (column := results.columns[name]).dtype == float
+    ]
+    largest = max(drawn, default=0)
+    if _GRID_LIKE < largest < _FEW_SAMPLES:
+        yield (
+            f"Only {largest} different samples of the distributions were flown, so sampled factors "
+            "share influence that only one of them has; raise `samples`."
+        )
+
+
+def _order(results: Results, found: dict[str, list[Influence]]) -> list[str]:
+    """The factors, the most influential first."""
+    listed = [each.factor for name in ("ok", results.error) for each in found.get(name, ())]
+    return list(dict.fromkeys([*listed, *results.factors]))

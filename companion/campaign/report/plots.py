@@ -1,0 +1,184 @@
+"""The plots of a campaign's page."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
+from companion.campaign.report.sensitivity import Influence
+from companion.campaign.report.statistics import choices, levels, pareto_front, share_of
+from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
+
+_MOST_FACTORS = 6
+_DISTRIBUTIONS = (
+    "position_rms_m",
+    "height_rms_m",
+    "model_deviation_max",
+    "cross_axis_max",
+    "time_constant_s",
+    "rate_rms_rad_s",
+    "saturated_share",
+)
+_SHOWN_SHARE = 0.995
+"""Share of the values that a distribution shows; the last bin holds the larger ones."""
+_BINS = 40
+
+
+def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
+    """Success rate by level, a plot for each of the most influential factors."""
+    for name in order[:_MOST_FACTORS]:
+        found = levels(results.columns[name])
+        shares = [share_of(results.good[level.cases]) for level in found]
+        trace: dict[str, Any] = {
+            "type": "scatter",
+            "mode": "markers",
+            "x": [level.name for level in found],
+            "y": [_percent(each.share) for each in shares],
+            "error_y": {
+                "type": "data",
+                "symmetric": False,
+                "array": [_percent(each.high - each.share) for each in shares],
+                "arrayminus": [_percent(each.share - each.low) for each in shares],
+            },
+            "marker": {"color": MEASURED, "size": 8},
+            "text": [f"{each.chosen} of {each.of}" for each in shares],
+            "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
+        }
+        layout = axes(x=label(name), y=f"good {results.noun}, %")
+        layout["xaxis"]["type"] = "category"
+        layout["yaxis"]["range"] = [-3.0, 103.0]
+        note = "Share of good cases with its 95 % Wilson interval, over all other factors."
+        yield Plot(f"Success by {name}", note, [trace], layout, 260)
+
+
+def _percent(share: float) -> float | None:
+    return round(100.0 * share, 3) if np.isfinite(share) else None
+
+
+def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
+    """The first-order Sobol indices as bars."""
+    traces = []
+    for (outcome, found), colour in zip(
+        influences.items(), (MEASURED, NEAREST, REFERENCE), strict=False
+    ):
+        traces.append(
+            {
+                "type": "bar",
+                "name": "good" if outcome == "ok" else label(outcome),
+                "x": [each.factor for each in found],
+                "y": numbers(np.array([100.0 * each.share for each in found])),
+                "error_y": {
+                    "type": "data",
+                    "array": numbers(np.array([100.0 * each.confidence for each in found])),
+                },
+                "marker": {"color": colour},
+            }
+        )
+    layout = {**axes(y="share of the variance, %"), "barmode": "group"}
+    note = (
+        "First-order Sobol index: the share of an outcome's variance that a factor explains by "
+        "itself, with its 95 % interval. What the bars leave is noise, or two factors together."
+    )
+    if traces:
+        yield Plot("Sensitivity", note, traces, layout, 360)
+
+
+def pareto(results: Results) -> Iterator[Plot]:
+    """Error against rate use, coloured by thrust use; the front is marked."""
+    columns = results.columns
+    names = [results.error, RATES, *([THRUST] if results.measured(THRUST) else [])]
+    points, titles = [], []
+    for choice in choices(results):
+        part = choice.cases
+        values = np.array([_median(columns[name][part]) for name in names])
+        if np.isfinite(values).all():
+            points.append(values)
+            good = share_of(results.good[part]).share
+            titles.append(f"{choice.name}<br>good: {100.0 * good:.1f} %")
+    if len(points) < 2:
+        return
+    goals = np.array(points)
+    front = pareto_front(goals)
+    traces = [
+        _points(name, goals[part], [titles[k] for k in np.flatnonzero(part)], size)
+        for name, part, size in (("on the front", front, 11), ("others", ~front, 6))
+    ]
+    traces[0]["marker"] |= {"line": {"color": REFERENCE, "width": 2}}
+    thrust = len(names) > 2
+    for trace, part in zip(traces, (front, ~front), strict=True):
+        if thrust:
+            trace["marker"] |= _scale(goals[part, 2], goals[:, 2], shown=trace is traces[0])
+        else:
+            trace["marker"]["color"] = MEASURED if trace is traces[0] else IDEAL
+    of = "error, rate use and thrust use" if thrust else "error and rate use"
+    note = (
+        f"A point for each choice of the program's own keys: the medians over everything else. On "
+        f"the front no other choice is better in {of} at once; read the success rate at the point."
+    )
+    layout = axes(x=label(RATES), y=label(results.error))
+    yield Plot("Pareto front", note, [t for t in traces if t["x"]], layout, 420)
+
+
+def _median(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def _points(name: str, goals: Floats, titles: list[str], size: int) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "x": numbers(goals[:, 1]),
+        "y": numbers(goals[:, 0]),
+        "text": titles,
+        "hovertemplate": "%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
+        "marker": {"size": size},
+    }
+
+
+def _scale(values: Floats, every: Floats, *, shown: bool) -> dict[str, Any]:
+    return {
+        "color": numbers(values),
+        "cmin": float(every.min()),
+        "cmax": float(every.max()),
+        "colorscale": "Viridis",
+        "showscale": shown,
+        "colorbar": {"title": {"text": "thrust use", "side": "right"}, "thickness": 12},
+    }
+
+
+def distributions(results: Results) -> Iterator[Plot]:
+    """Histograms of the outcomes, good cases and others."""
+    for name in _DISTRIBUTIONS:
+        if not results.measured(name):
+            continue
+        values = results.columns[name]
+        known = np.isfinite(values)
+        low = float(values[known].min())
+        high = float(np.quantile(values[known], _SHOWN_SHARE))
+        if high <= low:
+            continue
+        edges = np.linspace(low, high, _BINS + 1)
+        traces = []
+        for good, title, colour in ((True, "good", MEASURED), (False, "not good", REFERENCE)):
+            part = values[known & (results.good == good)]
+            counts, _ = np.histogram(np.clip(part, low, high), edges)
+            traces.append(
+                {
+                    "type": "bar",
+                    "name": title,
+                    "x": numbers(0.5 * (edges[:-1] + edges[1:])),
+                    "y": counts.tolist(),
+                    "width": float(edges[1] - edges[0]),
+                    "marker": {"color": colour},
+                }
+            )
+        layout = {**axes(x=label(name), y=results.noun), "barmode": "stack", "bargap": 0.0}
+        low_, median, high_ = np.quantile(values[known], (0.05, 0.5, 0.95))
+        note = (
+            f"Median {median:.3g}; nine of ten lie from {low_:.3g} to {high_:.3g}. The last bar "
+            "holds all larger values."
+        )
+        yield Plot(f"Distribution: {label(name)}", note, traces, layout, 260)

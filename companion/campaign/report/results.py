@@ -1,0 +1,123 @@
+"""What a campaign has found so far, as columns of NumPy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.campaign import store
+from companion.campaign.folder import read_description
+from companion.campaign.store import unit
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Floats = NDArray[np.float64]
+Column = NDArray[Any]
+
+NOUNS = {"flights": "flights", "batch": "vehicles"}
+ERRORS = ("position_rms_m", "model_deviation_max")
+"""Outcomes that may be the campaign's error: the first one that was measured."""
+RATES, THRUST = "rate_rms_rad_s", "thrust_rms"
+LABELS = {
+    "position_rms_m": "true position error, RMS",
+    "position_max_m": "true position error, largest",
+    "height_rms_m": "true height error, RMS",
+    "estimated_rms_m": "estimated position error, RMS",
+    "cross_axis_max": "distance from the line of a step",
+    "model_deviation_max": "distance from the first-order model",
+    "time_constant_s": "time constant",
+    "rate_rms_rad_s": "commanded roll-pitch rate, RMS",
+    "rate_max_rad_s": "commanded roll-pitch rate, largest",
+    "thrust_rms": "thrust, deviation from its mean, RMS",
+    "saturated_share": "share of setpoints at a limit",
+    "max_tilt_rad": "largest true tilt",
+    "flight_s": "flight time",
+}
+"""What an outcome is, for the reader."""
+
+
+def label(name: str) -> str:
+    """An outcome or a factor with its unit, for the reader."""
+    told = LABELS.get(name, name)
+    return f"{told}, {unit(name)}" if unit(name) else told
+
+
+@dataclass(frozen=True)
+class Results:
+    """The cases of a campaign that have been flown.
+
+    Attributes:
+        folder: of the campaign.
+        name: of the campaign.
+        kind: flights or batch.
+        planned: number of its cases.
+        factors: what is known of each swept key, by name.
+        table: as `store.read` returns it.
+    """
+
+    folder: Path
+    name: str
+    kind: str
+    planned: int
+    factors: Mapping[str, Any]
+    table: "pa.Table"
+
+    @classmethod
+    def read(cls, folder: Path) -> "Results":
+        """The results in a folder.
+
+        Raises:
+            ConfigError: it holds no campaign, or no results yet.
+        """
+        planned = read_description(folder).cases
+        table = store.read(folder)
+        told = store.metadata(table)
+        return cls(folder, told["name"], told["kind"], planned, told["factors"], table)
+
+    @cached_property
+    def columns(self) -> dict[str, Column]:
+        """Every column, (cases,): numbers with NaN for null, and anything else as objects."""
+        found = {}
+        for field in self.table.schema:
+            column = self.table.column(field.name)
+            if str(field.type) == "double":
+                found[field.name] = np.array(
+                    [np.nan if value is None else value for value in column.to_pylist()]
+                )
+            else:
+                found[field.name] = np.array(column.to_pylist(), dtype=object)
+        return found
+
+    @property
+    def count(self) -> int:
+        """Number of cases flown so far."""
+        return int(self.table.num_rows)
+
+    @cached_property
+    def good(self) -> NDArray[np.bool_]:
+        """(cases,) whether each was good."""
+        return np.array(self.columns["ok"], dtype=bool)
+
+    @property
+    def noun(self) -> str:
+        """What the cases are called."""
+        return NOUNS[self.kind]
+
+    @property
+    def error(self) -> str:
+        """Name of the error that the campaign is about."""
+        return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
+
+    def measured(self, name: str) -> bool:
+        """Whether a column of numbers exists and has a value."""
+        column = self.columns.get(name)
+        return column is not None and column.dtype == float and bool(np.isfinite(column).any())
+
+    def true_cases(self, name: str) -> int:
+        """Number of cases in which a column of yes, no and null says yes."""
+        return sum(value is True for value in self.columns.get(name, ()))

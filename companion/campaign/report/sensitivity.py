@@ -1,0 +1,73 @@
+"""Which factor an outcome depends on, from the cases as they are, with SALib.
+
+The first-order Sobol index of a factor is the share of the outcome's variance that would vanish if
+the factor were known. It is estimated from given samples: the cases are divided into classes of the
+factor, and the variance between the classes is compared with the whole. What two factors do only
+together is in no first-order index.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from companion.campaign.report.results import Column, Floats, Results
+
+FEWEST = 100
+"""Cases below which the indices are not worth reading."""
+_MOST = 5000
+"""At most this many cases are used, evenly chosen."""
+_SEED = 1
+
+
+class Influence(NamedTuple):
+    """The first-order Sobol index of a factor on an outcome.
+
+    Attributes:
+        factor: its name.
+        share: the index, 0..1.
+        confidence: half width of its 95 % interval, by bootstrap; NaN where it cannot be found.
+    """
+
+    factor: str
+    share: float
+    confidence: float
+
+
+def influences(results: Results, outcome: str) -> list[Influence]:
+    """The factors by their influence on an outcome, the largest first; empty for too few cases.
+
+    Args:
+        results: of the campaign.
+        outcome: a column of numbers, or `ok`.
+    """
+    values = np.array(results.columns[outcome], dtype=float)
+    rows = np.flatnonzero(np.isfinite(values))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST)).astype(int))]
+    values = values[rows]
+    told = {name: as_numbers(results.columns[name][rows], values) for name in results.factors}
+    told = {name: column for name, column in told.items() if np.ptp(column) > 0.0}
+    if len(rows) < FEWEST or not told or not np.ptp(values) > 1e-12:
+        return []
+    from SALib.analyze import delta  # noqa: PLC0415  takes a second to import
+
+    problem = {"num_vars": len(told), "names": list(told), "bounds": [[0.0, 1.0]] * len(told)}
+    found = delta.analyze(
+        problem, np.column_stack(list(told.values())), values, seed=_SEED, method="sobol"
+    )
+    listed = zip(told, found["S1"], found["S1_conf"], strict=True)
+    return sorted(
+        (Influence(name, float(index), float(half)) for name, index, half in listed),
+        key=lambda each: -each.share,
+    )
+
+
+def as_numbers(column: Column, values: Floats) -> Floats:
+    """A factor as numbers; words are numbered in the order of their mean outcome.
+
+    Without this order neighbouring words could share a class, and their difference would be lost.
+    """
+    if column.dtype == float:
+        return np.where(np.isfinite(column), column, np.nanmin(column, initial=0.0) - 1.0)
+    words = np.array([str(value) for value in column])
+    ordered = sorted(set(words), key=lambda word: float(values[words == word].mean()))
+    return np.array([float(ordered.index(word)) for word in words])

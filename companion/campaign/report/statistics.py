@@ -1,0 +1,165 @@
+"""Success rates with their intervals, levels of a factor, worst cases, and the Pareto front."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.campaign.report.results import Column, Floats, Results
+
+CONFIDENCE = 0.95
+_MOST_LEVELS = 12
+"""A factor with more different values is shown in ranges."""
+_RANGES = 5
+
+
+class Share(NamedTuple):
+    """A share of cases with its Wilson interval, which covers the true share in 95 % of campaigns.
+
+    Attributes:
+        chosen: cases that count.
+        of: all cases.
+        share: chosen / of; NaN for no case.
+        low: lower end of the interval.
+        high: upper end.
+    """
+
+    chosen: int
+    of: int
+    share: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{_percent(self.share)} % ({_percent(self.low)} to {_percent(self.high)} %)"
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    if 99.0 <= percent < 100.0 or 0.0 < percent <= 1.0:
+        return f"{percent:.2f}"
+    return f"{percent:.1f}" if 0.0 < percent < 100.0 else f"{percent:.0f}"
+
+
+def share_of(chosen: NDArray[np.bool_]) -> Share:
+    """The share of True in (cases,)."""
+    from scipy.stats import binomtest  # noqa: PLC0415  takes a second to import
+
+    count, of = int(np.sum(chosen)), len(chosen)
+    if not of:
+        return Share(0, 0, np.nan, 0.0, 1.0)
+    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
+    return Share(count, of, count / of, float(interval.low), float(interval.high))
+
+
+class Level(NamedTuple):
+    """Cases in which a factor has one value, or lies in one range.
+
+    Attributes:
+        name: the value, or the range.
+        cases: (cases,), which ones.
+    """
+
+    name: str
+    cases: NDArray[np.bool_]
+
+
+def levels(column: Column) -> list[Level]:
+    """The levels of a factor: its values if they are few, else ranges with equally many cases."""
+    known = sorted({_key(value) for value in column})
+    if column.dtype != float or len(known) <= _MOST_LEVELS:
+        keys = [_key(value) for value in column]
+        return [
+            Level(key[1], np.array([key == each for each in keys])) for key in known[:_MOST_LEVELS]
+        ]
+    edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGES + 1))
+    found = []
+    for number, (low, high) in enumerate(pairwise(edges)):
+        last = number == _RANGES - 1
+        inside = (column >= low) & ((column <= high) if last else (column < high))
+        found.append(Level(f"{low:.3g} to {high:.3g}", inside))
+    return found
+
+
+def _key(value: object) -> tuple[float, str]:
+    if isinstance(value, bool):
+        return float(value), str(value).lower()
+    if isinstance(value, int | float):
+        return float(value), f"{value:.4g}"
+    return 0.0, "null" if value is None else str(value)
+
+
+def worst(results: Results, count: int) -> list[int]:
+    """Rows of the worst cases: crashed, not as documented, not good, then the largest error."""
+    columns = results.columns
+    error = columns[results.error]
+    crashed = columns.get("crashed", np.zeros(results.count))
+    documented = columns.get("as_documented", np.full(results.count, None))
+
+    def rank(row: int) -> tuple[bool, bool, bool, float]:
+        size = error[row] if np.isfinite(error[row]) else np.inf
+        return (
+            crashed[row] is not True,
+            documented[row] is not False,
+            bool(results.good[row]),
+            -float(size),
+        )
+
+    return sorted(range(results.count), key=rank)[:count]
+
+
+def pareto_front(goals: Floats) -> NDArray[np.bool_]:
+    """(n,), which of (n, goals) are not worse in every goal than another; small is good."""
+    front = np.ones(len(goals), dtype=bool)
+    for number, own in enumerate(goals):
+        as_good = np.all(goals <= own, axis=1)
+        better = np.any(goals < own, axis=1)
+        front[number] = not np.any(as_good & better)
+    return front
+
+
+class Choice(NamedTuple):
+    """Cases with the same values of the keys that the user chooses; the others are its weather.
+
+    Attributes:
+        name: the values.
+        cases: (cases,), which ones.
+    """
+
+    name: str
+    cases: NDArray[np.bool_]
+
+
+def choices(results: Results, most: int = 300) -> list[Choice]:
+    """The choices that a campaign compares; each case by itself where a chosen key is sampled.
+
+    Keys of the mock vehicle, faults and what is flown are no choice: a result is the median over
+    them.
+    """
+    chosen = [name for name in results.factors if _is_choice(name)]
+    keys = [tuple(_key(results.columns[name][row]) for name in chosen) for row in _rows(results)]
+    known = sorted(set(keys))
+    if len(known) > most or len(known) == len(keys):
+        step = max(1, len(keys) // most)
+        return [
+            Choice(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
+            for row in range(0, len(keys), step)
+        ]
+    return [Choice(_named(chosen, key), np.array([key == each for each in keys])) for key in known]
+
+
+def _is_choice(name: str) -> bool:
+    return not name.startswith(("mock.", "fault", "flight.", "vehicle."))
+
+
+def _rows(results: Results) -> Iterator[int]:
+    yield from range(results.count)
+
+
+def _named(names: Sequence[str], key: Sequence[tuple[float, str]]) -> str:
+    return (
+        ", ".join(f"{name} = {text}" for name, (_, text) in zip(names, key, strict=True))
+        or "all cases"
+    )

@@ -1,0 +1,132 @@
+"""The tables of a campaign's page."""
+
+import shlex
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from companion.campaign.report.results import LABELS, RATES, Results, label
+from companion.campaign.report.sensitivity import Influence
+from companion.campaign.report.statistics import levels, share_of, worst
+from companion.report.tables import Table
+
+EMPTY = "–"
+_WORST = 10
+_MOST_ROWS = 200
+_MOST_FACTORS = 12
+
+
+def worst_cases(results: Results) -> Table:
+    """The worst cases, each with the command that flies it again with full recording."""
+    columns = results.columns
+    shown = [name for name in ("result", "failed_checks") if name in columns]
+    rows = [
+        (
+            str(columns["case"][row]),
+            _rerun(results, int(columns["case"][row])),
+            *(_cell(columns[name][row]) for name in (results.error, *shown)),
+            _values(results, row),
+        )
+        for row in worst(results, _WORST)
+    ]
+    header = ("case", "fly it again, recorded", label(results.error), *shown, "factors")
+    return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)
+
+
+def _rerun(results: Results, case: int) -> str:
+    if results.kind == "batch":
+        return EMPTY
+    return f"companion campaign rerun {shlex.quote(str(results.folder))} {case}"
+
+
+def _values(results: Results, row: int) -> str:
+    told = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
+    return ", ".join(told)
+
+
+def success_by_factor(results: Results, order: Sequence[str]) -> Table:
+    """Success rate and median error by level of each factor, the most influential factor first."""
+    rows = [row for name in order[:_MOST_FACTORS] for row in _by_level(results, name)]
+    documented = "as_documented" in results.columns and "fault" in results.factors
+    header = ["factor", "value", results.noun, "good (95 % interval)"]
+    header += ["ended as documented (95 % interval)"] if documented else []
+    header += [f"median {label(results.error)}", f"median {label(RATES)}"]
+    return Table("Success by factor", tuple(header), rows)
+
+
+def _by_level(results: Results, name: str) -> Iterator[tuple[str, ...]]:
+    columns = results.columns
+    for level in levels(columns[name]):
+        row = [name, level.name, str(int(level.cases.sum()))]
+        row.append(str(share_of(results.good[level.cases])))
+        if "as_documented" in columns and "fault" in results.factors:
+            told = [value for value in columns["as_documented"][level.cases] if value is not None]
+            row.append(str(share_of(np.array(told, dtype=bool))) if told else EMPTY)
+        row += [_median(columns[each][level.cases]) for each in (results.error, RATES)]
+        yield tuple(row)
+
+
+def _median(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> str:
+    known = values[np.isfinite(values)]
+    return f"{np.median(known):.3g}" if len(known) else EMPTY
+
+
+def sensitivity(influences: dict[str, list[Influence]]) -> Table:
+    """The first-order Sobol indices of each outcome, with their intervals."""
+    factors = dict.fromkeys(each.factor for found in influences.values() for each in found)
+    known = {
+        outcome: {each.factor: f"{each.share:.0%} ± {each.confidence:.0%}" for each in found}
+        for outcome, found in influences.items()
+    }
+    rows = [
+        (factor, *(known[outcome].get(factor, EMPTY) for outcome in influences))
+        for factor in factors
+    ]
+    header = ("factor", *("good" if name == "ok" else LABELS[name] for name in influences))
+    return Table("Share of the variance that a factor explains by itself", header, rows)
+
+
+def crossed(results: Results) -> Table | None:
+    """Median error and success for each pair of values of the first two factors with few values."""
+    columns = results.columns
+    few = [
+        name
+        for name in results.factors
+        if 1 < len({str(value) for value in columns[name]}) <= _MOST_FACTORS
+    ]
+    if len(few) < 2:
+        return None
+    first, second = few[0], few[1]
+    across = levels(columns[second])
+    rows = []
+    for level in levels(columns[first]):
+        cells = []
+        for other in across:
+            both = level.cases & other.cases
+            median = _median(columns[results.error][both])
+            cells.append(f"{median} ({share_of(results.good[both]).share:.0%})")
+        rows.append((level.name, *cells))
+    title = f"Median {label(results.error)} and share of good {results.noun}: {first} × {second}"
+    return Table(title, (first, *(each.name for each in across)), rows)
+
+
+def all_cases(results: Results) -> Table:
+    """The cases, at most `_MOST_ROWS` of them, evenly chosen."""
+    shown = [name for name in results.columns if name not in ("seed", "digest")]
+    count = results.count
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_ROWS)).astype(int))
+    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in chosen]
+    part = "" if len(chosen) == count else f", {len(chosen)} of {count}"
+    return Table(
+        f"Cases{part} (all of them are in results.csv and results.parquet)", tuple(shown), rows
+    )
+
+
+def _cell(value: object) -> str:
+    if value is None or value == "":
+        return EMPTY
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.4g}" if np.isfinite(value) else EMPTY
+    return str(value)

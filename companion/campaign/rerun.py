@@ -1,0 +1,81 @@
+"""One case of a campaign again, with a full recording, compared with its row of the results."""
+
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from companion.campaign import folder, store
+from companion.campaign.campaign import Campaign
+from companion.campaign.flight import fly_case
+from companion.campaign.loading import load
+from companion.campaign.swept import Value
+from companion.campaign.versions import difference, versions
+from companion.files.yaml_file import ConfigError
+from companion.recording.folder import flight_folder
+
+_CASES = "cases"
+"""Folder of the recorded flights, in the folder of a campaign."""
+
+
+class Rerun(NamedTuple):
+    """A case that was flown again.
+
+    Attributes:
+        row: its row of the results.
+        folder: its recording.
+        identical: whether it is the same flight as in the results, to the bit. A case that has no
+            results yet counts as identical.
+        lines: what to tell the user.
+    """
+
+    row: dict[str, Value]
+    folder: Path
+    identical: bool
+    lines: tuple[str, ...]
+
+
+def rerun(place: Path, index: int) -> Rerun:
+    """Fly a case again.
+
+    Args:
+        place: folder of the campaign.
+        index: number of the case.
+
+    Raises:
+        ConfigError: there is no such campaign or case, or it is no flight.
+        OSError: the recording cannot be written.
+    """
+    description = folder.read_description(place)
+    campaign = load(place / folder.FILE)
+    if campaign.file.kind != "flights":
+        raise ConfigError(f"{place}: a batch has no flights to record")
+    if not 0 <= index < description.cases:
+        raise ConfigError(f"{place}: its cases are 0 to {description.cases - 1}, not {index}")
+    case = campaign.case(next(islice(campaign.samples(), index, None)))
+    recording = flight_folder(place / _CASES / f"case-{index:05d}")
+    row = fly_case(case, recording)
+    lines = [f"{case.described()}: {row['result']}"]
+    if other := difference(description.versions, versions()):
+        lines.append(f"The campaign was flown by another version: here is {other}.")
+    before = _row(place, campaign, description, index)
+    if before is None:
+        return Rerun(row, recording, True, (*lines, "The campaign has not flown this case yet."))
+    changed = [name for name, value in before.items() if row.get(name) != value]
+    lines.append(
+        f"It differs from the campaign's flight in {', '.join(changed)}."
+        if changed
+        else f"It is the campaign's flight to the bit: digest {row['digest']}."
+    )
+    return Rerun(row, recording, not changed, tuple(lines))
+
+
+def _row(
+    place: Path, campaign: Campaign, description: folder.Description, index: int
+) -> dict[str, Any] | None:
+    """The row of a case in the results, or None."""
+    unit = index // description.unit
+    if unit not in store.finished_units(place):
+        return None
+    rows = store.read_unit(place, unit).to_pylist()
+    found: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
+    return found

@@ -1,0 +1,213 @@
+"""`companion campaign FILE`: checks it, estimates it, runs it, and says how to go on."""
+
+import argparse
+import shlex
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from companion.campaign import engine, estimate, folder, store
+from companion.campaign.campaign import Campaign
+from companion.campaign.cluster import (
+    ClusterError,
+    connected,
+    local_workers,
+    number_of_workers,
+    require_packages,
+    wait_for_workers,
+)
+from companion.campaign.folder import Description
+from companion.campaign.loading import load
+from companion.campaign.unit import check_cases, size_of_units
+from companion.campaign.versions import VersionError
+from companion.files.yaml_file import ConfigError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+DONE, FAILED = 0, 1
+_FEW = 2
+"""Up to this number of cases for each worker, how long they take is not measured before."""
+_TOLD = 3
+"""Number of lost units, and of internal errors, that are told."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the campaign of a file, or go on with the one in a folder; returns the exit code.
+
+    Raises:
+        ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
+        MissingExtraError: the extra `campaign` is not installed.
+    """
+    require_packages()
+    path: Path = options.file
+    out: Path | None = options.out
+    if path.is_dir():
+        if out is not None:
+            raise ConfigError(
+                "--out goes with a campaign's file: a folder is gone on with in place"
+            )
+        path, out = path / folder.FILE, path
+    campaign = load(path)
+    place = out or folder.new_name(campaign)
+    console = Console(highlight=False, soft_wrap=True)
+    try:
+        return _Run(campaign, place, options, console).run()
+    except VersionError as error:
+        raise ConfigError(str(error)) from error
+
+
+class _Run:
+    """One run of a campaign.
+
+    Args:
+        campaign: is run.
+        place: its folder, locked.
+        options: of the command line.
+        console: to which it is told.
+    """
+
+    def __init__(
+        self, campaign: Campaign, place: Path, options: argparse.Namespace, console: Console
+    ) -> None:
+        self._campaign, self._place, self._console = campaign, place, console
+        self._options = options
+        self._noun = estimate.NOUNS[campaign.file.kind]
+
+    def run(self) -> int:
+        """Run it; returns the exit code."""
+        begun = folder.begun(self._place)
+        if begun:
+            folder.resume(self._place, self._campaign)
+        number, case_s = (0, None) if begun else self._checked()
+        try:
+            with (
+                _interruptible(),
+                connected(self._options.scheduler, self._options.workers) as client,
+            ):
+                if not number_of_workers(client):
+                    self._console.print("waiting for the cluster's first worker…")
+                    wait_for_workers(client)
+                workers = number_of_workers(client)
+                with folder.locked(self._place):
+                    description = self._begun(number, case_s, workers)
+                    self._console.print(f"Dask's dashboard: {client.dashboard_link}")
+                    return self._shown(client, description)
+        except KeyboardInterrupt:
+            return self._stopped("interrupted")
+        except ClusterError as error:
+            return self._stopped(str(error))
+
+    def _checked(self) -> tuple[int, float | None]:
+        """Check every case; returns their number, and the time that one takes, s (None: unknown).
+
+        Raises:
+            ConfigError: a case is refused, or the campaign is larger than its limits.
+        """
+        campaign, kind = self._campaign, self._campaign.file.kind
+        workers = self._options.workers or local_workers()
+        if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
+            # Only one case: to check all would take long, and they are not flown.
+            first = [campaign.case(next(campaign.samples()))]
+            estimate.check_size(campaign, estimate.measured(kind, first), workers)
+        cases = list(campaign.cases())
+        check_cases(kind, cases)
+        if len(cases) <= _FEW * workers:
+            return len(cases), None
+        case_s = estimate.measured(kind, cases)
+        if not self._options.yes:
+            estimate.check_size(campaign, case_s, workers)
+        return len(cases), case_s
+
+    def _begun(self, cases: int, case_s: float | None, workers: int) -> Description:
+        """The campaign in its folder: the one that was begun there, or a new one."""
+        if folder.begun(self._place):
+            return folder.resume(self._place, self._campaign)
+        unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
+        description = folder.describe(self._campaign, unit, case_s)
+        folder.make(self._place, self._campaign, description)
+        words = f"{cases} {self._noun}"
+        if case_s is not None:
+            words = estimate.size_in_words(self._campaign, cases * case_s / workers, workers)
+        self._console.print(f"{words}; results in {self._place}")
+        return description
+
+    def _shown(self, client: "Client", description: Description) -> int:
+        """Run it with a progress bar; returns the exit code."""
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=self._console) as bar:
+            task = bar.add_task(self._noun, total=description.cases)
+
+            def show(progress: engine.Progress) -> None:
+                bar.update(task, completed=progress.flown)
+
+            progress = engine.run(client, self._campaign, description, self._place, show)
+        return self._finished(progress, description)
+
+    def _finished(self, progress: engine.Progress, description: Description) -> int:
+        """Say how the run ended; returns the exit code."""
+        say = self._console.print
+        for sentence in progress.lost[:_TOLD]:
+            say(f"not flown: {sentence}", markup=False)
+        if progress.flown < description.cases:
+            return self._stopped(f"{len(progress.lost)} units were given up")
+        errors = engine.internal_errors(self._place, self._campaign.file)
+        for error, times in errors.most_common(_TOLD):
+            say(
+                f"{times} of the {self._noun} failed by the program's own fault: {error}",
+                markup=False,
+            )
+        say(f"{progress.flown} {self._noun} are in {self._place}; see them with")
+        say(f"  companion campaign report {shlex.quote(str(self._place))}")
+        return FAILED if errors else DONE
+
+    def _stopped(self, why: str) -> int:
+        """Say how to go on; returns the exit code."""
+        if not folder.begun(self._place):
+            self._console.print(f"{why}; nothing was begun", markup=False)
+            return FAILED
+        units = len(store.finished_units(self._place))
+        command = f"companion campaign {shlex.quote(str(self._place))}"
+        if self._options.scheduler:
+            command += f" --scheduler {self._options.scheduler}"
+        self._console.print(
+            f"{why}; the results of {units} units are kept. Go on with\n  {command}", markup=False
+        )
+        return FAILED
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """SIGTERM ends the campaign as Ctrl-C does; while it ends, neither comes through."""
+
+    def interrupt(number: int, frame: FrameType | None) -> NoReturn:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    before = {each: signal.signal(each, interrupt) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)

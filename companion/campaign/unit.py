@@ -1,0 +1,122 @@
+"""A unit of work: some cases that one worker flies, one after the other."""
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any, NamedTuple
+
+from companion.campaign.campaign import Campaign
+from companion.campaign.case import Case
+from companion.campaign.design import Sample
+from companion.campaign.flight import fly_case
+from companion.campaign.swept import Value
+from companion.campaign.versions import Versions, require_equal, versions
+
+Row = dict[str, Value]
+SECONDS = 5.0
+"""A unit takes about this long, s: long against the time to send it, short if it is lost."""
+_UNITS_PER_WORKER = 4
+"""At least this number of units for each worker, so that all end at about the same time."""
+
+
+class Flown(NamedTuple):
+    """What a worker returns.
+
+    Attributes:
+        rows: one a case, in order.
+        wall_s: time that each case took, s; of a batch: one number for all.
+        worker: address of the worker.
+    """
+
+    rows: list[Row]
+    wall_s: list[float]
+    worker: str
+
+
+def fly_samples(campaign: Campaign, samples: Sequence[Sample], expected: Versions) -> Flown:
+    """Build the cases of some samples, and fly them.
+
+    Raises:
+        VersionError: this process has other versions than the client.
+    """
+    require_equal(expected, versions(), f"the worker {_worker()}")
+    return _flown(campaign.file.kind, [campaign.case(sample) for sample in samples])
+
+
+def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> Flown:
+    """Fly cases that were built by the client, as `fly_samples`."""
+    require_equal(expected, versions(), f"the worker {_worker()}")
+    return _flown(kind, cases)
+
+
+def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
+    """The rows of cases in this process, in order.
+
+    Args:
+        kind: "flights" or "batch".
+        cases: to be flown.
+    """
+    return _flown(kind, cases).rows
+
+
+def _flown(kind: str, cases: Sequence[Case]) -> Flown:
+    rows: list[Row] = []
+    wall_s: list[float] = []
+    for part in [cases] if kind == "batch" else [[case] for case in cases]:
+        began = perf_counter()
+        rows += _of_kind(kind)(part)
+        wall_s.append(round(perf_counter() - began, 4))
+    return Flown(rows, wall_s, _worker())
+
+
+def check_cases(kind: str, cases: Sequence[Case]) -> None:
+    """Check that cases can be run as this kind.
+
+    Raises:
+        ConfigError: a case cannot; the message names it.
+    """
+    if kind == "batch":
+        from companion.campaign.kinematics import check_case  # noqa: PLC0415  imports much
+
+        for case in cases:
+            check_case(case)
+
+
+def _of_kind(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
+    if kind == "flights":
+        return lambda cases: [fly_case(case) for case in cases]
+    from companion.campaign.kinematics import run_cases as fly_batch  # noqa: PLC0415  as above
+
+    return fly_batch
+
+
+def _worker() -> str:
+    """The address of the worker that runs this code."""
+    from distributed import get_worker  # noqa: PLC0415  an extra
+
+    try:
+        return str(get_worker().address)
+    except ValueError:
+        return "this process"
+
+
+def size_of_units(cases: int, case_s: float, workers: int) -> int:
+    """The number of cases in a unit.
+
+    Args:
+        cases: number of cases of the campaign.
+        case_s: time that a case takes, s.
+        workers: number of workers.
+    """
+    by_time = int(SECONDS / max(case_s, 1e-6))
+    by_share = -(-cases // (_UNITS_PER_WORKER * workers))
+    return max(1, min(by_time, by_share))
+
+
+def ranges(cases: int, size: int) -> list[range]:
+    """The numbers of the cases of each unit, in order."""
+    return [range(first, min(first + size, cases)) for first in range(0, cases, size)]
+
+
+def described(numbers: range) -> dict[str, Any]:
+    """The cases of a unit for its timing file."""
+    return {"first": numbers.start, "last": numbers.stop - 1}

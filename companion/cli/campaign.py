@@ -1,0 +1,34 @@
+"""The command `campaign` and its sub-commands."""
+
+import argparse
+from pathlib import Path
+
+from rich.console import Console
+
+from companion.cli.exit_codes import EXIT_FLIGHT, EXIT_OK
+from companion.cli.flying import page_about
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run a campaign, or go on with one."""
+    from companion.campaign import running  # noqa: PLC0415  no other command needs it
+
+    return running.run(options)
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write the page about a campaign, and its results in one table."""
+    from companion.campaign.report import page  # noqa: PLC0415
+
+    return page.run(options)
+
+
+def rerun(options: argparse.Namespace) -> int:
+    """Fly one case again, and say whether it is the same flight."""
+    from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415
+
+    console = Console(highlight=False, soft_wrap=True)
+    again = fly_again(options.folder, options.case)
+    for text in (*again.lines, f"Recorded in {again.folder}", page_about(Path(again.folder))):
+        console.print(text, markup=False)
+    return EXIT_OK if again.identical else EXIT_FLIGHT

@@ -1,0 +1,103 @@
+"""The options of `companion campaign` and its sub-commands."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from companion.cli.tool_options import Commands
+
+_CAMPAIGN, _RUN = "campaign", "run"
+_SUB_COMMANDS = (_RUN, "report", "rerun", "-h", "--help")
+
+
+def with_campaign_command(arguments: Sequence[str]) -> list[str]:
+    """The arguments with `campaign FILE` written out as `campaign run FILE`."""
+    told = list(arguments)
+    place = next((n for n, word in enumerate(told) if not word.startswith("-")), len(told))
+    if told[place : place + 1] == [_CAMPAIGN] and not (
+        told[place + 1 : place + 2] and told[place + 1] in _SUB_COMMANDS
+    ):
+        told.insert(place + 1, _RUN)
+    return told
+
+
+def add_campaign(commands: Commands) -> None:
+    """Add `campaign` with its sub-commands."""
+    campaign = commands.add_parser(
+        _CAMPAIGN,
+        help="fly many flights over swept keys, on all cores or a cluster (extra `campaign`)",
+        description="`companion campaign FILE` runs a campaign: flights of the mock vehicle in "
+        "memory, over swept keys of the configuration and of the vehicle. Write the file as those "
+        "in configs/campaigns; docs/campaigns.md explains it.",
+    )
+    kinds = campaign.add_subparsers(required=True, metavar="WHAT")
+    _add_run(kinds)
+    _add_report(kinds)
+    _add_rerun(kinds)
+
+
+def _add_run(kinds: Commands) -> None:
+    run = kinds.add_parser(_RUN, help="run a campaign; the word `run` may be left out")
+    run.add_argument(
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="the campaign's file, or the folder of a campaign that was stopped",
+    )
+    run.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="for the results (runs/campaigns/NAME-TIME); a campaign begun there goes on",
+    )
+    add_cluster_options(run)
+    run.add_argument(
+        "--yes", action="store_true", help="run it however many cases it has and long it takes"
+    )
+    run.set_defaults(run="campaign.run")
+
+
+def add_cluster_options(command: argparse.ArgumentParser) -> None:
+    """Add `--scheduler` and `--workers`."""
+    where = command.add_mutually_exclusive_group()
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on this Dask cluster, such as tcp://10.0.0.1:8786",
+    )
+    where.add_argument(
+        "--workers",
+        type=_workers,
+        metavar="NUMBER",
+        help="worker processes on this computer (one for each core)",
+    )
+
+
+def _add_rerun(kinds: Commands) -> None:
+    rerun = kinds.add_parser(
+        "rerun",
+        help="fly one case again, with a full recording and its report",
+        description="Fly one case of a campaign again, record it as `companion fly` does, write "
+        "its report, and check that it is the same flight to the bit. Exit code 1: it differs.",
+    )
+    rerun.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
+    rerun.add_argument("case", type=int, metavar="CASE", help="number in the column `case`")
+    rerun.set_defaults(run="campaign.rerun")
+
+
+def _add_report(kinds: Commands) -> None:
+    report = kinds.add_parser(
+        "report",
+        help="write the page about a campaign, finished or not, and its results as one table",
+        description="Write report.html with success rates, worst cases, sensitivity, Pareto front "
+        "and distributions, and all results as results.parquet and results.csv in the folder.",
+    )
+    report.add_argument("folder", type=Path, metavar="FOLDER", help="the campaign's folder")
+    report.add_argument("--out", type=Path, metavar="FILE", help="the page (FOLDER/report.html)")
+    report.set_defaults(run="campaign.report")
+
+
+def _workers(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1024:
+        raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
+    return int(text)
