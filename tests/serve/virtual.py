@@ -11,9 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion import testing
 from companion.config.files import changed, load
 from companion.serve.session import ServeSession
-from tests.flight.fly import QuickVehicle
+from tests.flight.fly import QuickVehicle, attitude_rate_hz
 
 CONFIGS = Path(__file__).parents[2] / "configs"
+MAVLINK_2 = 0xFD
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
 
 
@@ -21,8 +22,34 @@ def mock(autopilot, *, lockstep=False, **settings):
     return QuickVehicle(lockstep=lockstep, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
 
 
+UNREAD = {
+    dialect.MAVLINK_MSG_ID_ATTITUDE,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+}
+"""No scene asks a client for these, and they are most of what it gets."""
+
+
+def read(data):
+    """The frames that a client decodes, of whole frames of MAVLink 2."""
+    kept, at = b"", 0
+    while at < len(data):
+        assert data[at] == MAVLINK_2
+        length = data[at + 1] + (25 if data[at + 2] & 1 else 12)  # with or without a signature
+        frame = data[at : at + length]
+        if int.from_bytes(frame[7:10], "little") not in UNREAD:
+            kept += frame
+        at += length
+    return kept
+
+
 class MemoryClient(testing.Program):
-    """A program that says what the tests need."""
+    """A program that says what the tests need, and reads what they look at."""
+
+    def _flush(self):
+        while self._waiting:
+            data, _ = self._take(100_000)
+            self.heard += self._parser.parse_buffer(read(data)) or ()
 
     def texts(self):
         """What our component said; the pieces of long texts joined."""
@@ -109,7 +136,11 @@ async def serving(
     """A session over the vehicle in memory."""
     config = changed(
         load(CONFIGS / f"mock-{autopilot}.yaml"),
-        {"limits": {"max_tilt_deg": 45.0}, "serve": serve},
+        {
+            "link": {"attitude_rate_hz": attitude_rate_hz(vehicle)},
+            "limits": {"max_tilt_deg": 45.0},
+            "serve": serve,
+        },
         "the test",
     )
     note = (lambda _: None) if notes is None else notes.append
