@@ -31,7 +31,7 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
     try:
         family, address, named = await udp_address(endpoint)
     except EndpointError as error:
-        raise EndpointError(f"serve.clients: {where}: {error}") from error
+        raise EndpointError(refusal(where, error)) from error
     opened = socket.socket(family, socket.SOCK_DGRAM)
     opened.setblocking(False)
     try:
