@@ -74,7 +74,7 @@ class Changes:
         self.flown = start
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
-        self._start = self._now = self._from = start
+        self._start = self._now = self._from = self._settled = start
         self._earlier: list[Config] = []
         self._made_before = 0
         self._retuning: Retuning | None = None
@@ -105,12 +105,15 @@ class Changes:
     def change(self, values: Values, by: str) -> str:
         """Begin to change to these values; returns what changes, in words.
 
+        While another change still takes effect, both together must not be too large.
+
         Raises:
             ChangeRefusedError: a key must not change in flight, a value is not valid, or the
                 change is too large. Nothing has changed.
         """
         try:
             wanted = changed_in_flight(self._start, self.wanted, values, by)
+            require_moderate(self._settled, wanted, by)
             require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
@@ -167,7 +170,8 @@ class Changes:
                 yield
         finally:
             self._retuning = self._began = None
-            self._now, self.note = self.wanted, outside
+            self._now = self._settled = self.wanted
+            self.note = outside
 
     def step(self, now: float) -> None:
         """Go on with a change that is under way; the guidance loop calls this at each step."""
@@ -182,7 +186,7 @@ class Changes:
             self._began = None
             self.note(internal(error))
         if share >= 1.0:
-            self._began = None
+            self._began, self._settled = None, self.wanted
 
     def _begin(self, wanted: Config, by: str) -> str:
         """Begin the way from the present values to `wanted`.
@@ -206,7 +210,7 @@ class Changes:
         now = asyncio.get_running_loop().time()
         self._from, self.wanted, self._began = self._now, wanted, now
         if self._retuning is None:
-            self._now, self._began = wanted, None
+            self._now, self._settled, self._began = wanted, wanted, None
         change = Change(now, by, keys)
         self.made.append(change)
         self.note(str(change))
