@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from contextlib import contextmanager
 from itertools import pairwise
 from math import degrees
 
@@ -9,10 +10,13 @@ import pytest
 
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
-from companion.config.files import changed
+from companion.config.files import changed, load
 from companion.config.in_flight import changeable, differences
 from companion.control.retuning import between
-from companion.flight.changes import SLEW, ChangeRefusedError, Changes
+from companion.control.slew import SLEW
+from companion.flight.changes import ChangeRefusedError, Changes
+from companion.recording.flight_record import read_flight
+from companion.replay.replay import Replay
 from tests.flight.fly import mock_vehicle, run, session_for
 
 _HOVER = {"duration_s": 4.0}
@@ -121,6 +125,30 @@ def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():
     assert {each.name for each in differences(before, after)} == {"guidance.position_weight_per_s4"}
 
 
+def test_a_second_change_counts_together_with_one_that_still_takes_effect():
+    """Two changes by 2.5 each are one by 6.25, until the first is in effect."""
+
+    class Loops:
+        @contextmanager
+        def stepped_by(self, _):
+            yield
+
+        def apply(self, _):
+            pass
+
+    async def fly():
+        changes = Changes(Config())
+        with changes.applied_by(Loops(), lambda _: None, None):
+            changes.change({"planner": {"gain_per_s": 2.0}}, "the page")
+            with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
+                changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
+            assert changes.wanted.planner.gain_per_s == 2.0
+            changes.step(asyncio.get_running_loop().time() + SLEW)
+            changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
+
+    asyncio.run(fly())
+
+
 def test_safety_is_not_changeable():
     sections = {section for section, _ in changeable()}
     assert sections == {"planner", "limits", "guidance"}
@@ -187,3 +215,6 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
     assert told["changes"][1]["keys"]["guidance.position_weight_per_s4"] == [150.0, None]
     assert set(texts) <= {event["text"] for event in told["events"]}
     assert told["tracking"]["position_max_m"] < 0.1
+    replay = Replay(read_flight(tmp_path), load(tmp_path / "config.yaml"))
+    assert not replay.follows_record
+    assert [each for each in replay.run() if not each.same] == []

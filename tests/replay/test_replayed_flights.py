@@ -105,8 +105,8 @@ def test_other_readers_read_the_files(good):
             newest = message
         metadata = {each.name: each.metadata for each in reader.iter_metadata()}
     assert newest is not None
-    of_ardupilot = {"/attitude_target", "/alarm"}  # nothing of these happens in this flight
-    assert set(counts) == {*(channel.topic for channel in CHANNELS), *WORDS} - of_ardupilot
+    elsewhere = {"/attitude_target", "/alarm", "/change"}  # nothing of these in this flight
+    assert set(counts) == {*(channel.topic for channel in CHANNELS), *WORDS} - elsewhere
     assert schemas["/tf"] == "foxglove_msgs/msg/FrameTransform"
     assert counts["/setpoint"] == summary["setpoints"]
     assert metadata["flight"]["plan"] == "configuration"
@@ -155,8 +155,10 @@ def test_a_flight_is_exported_as_csv_and_parquet(good, tmp_path, capsys):
     parquet = pytest.importorskip("pyarrow.parquet")
     for kind in ("csv", "parquet"):
         assert main(["export", str(folder), f"--{kind}", "--into", str(tmp_path)]) == 0
-    assert str(tmp_path / "tracking.csv") in capsys.readouterr().out
     rows = read_flight(folder).rows("guidance")
+    told = capsys.readouterr().out
+    assert str(tmp_path / "tracking.csv") in told
+    assert f"{tmp_path / 'guidance.csv'}  {len(rows):,} rows" in told
     for name in ("estimated_north_m", "time_s"):
         csv_column = np.genfromtxt(tmp_path / "guidance.csv", delimiter=",", names=True)[name]
         np.testing.assert_array_equal(csv_column, rows[name])
