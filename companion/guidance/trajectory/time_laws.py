@@ -229,7 +229,7 @@ _Piece = tuple[float, Progress, float]
 
 
 def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
-    """Join pieces of constant jerk, each (duration s, jerk), into one motion that begins at rest."""
+    """Join pieces (duration s, constant jerk) into one motion that begins at rest."""
     pieces = []
     start, state = 0.0, Progress(0.0)
     for duration, jerk in jerks:
