@@ -4,6 +4,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.keys import with_keys
@@ -22,6 +24,10 @@ Values = Mapping[str, Any]
 """Value of each searched key."""
 _UNSEEN = 1_000_003
 """Added to the campaign's seed for the cases that the search does not see."""
+
+
+_SPREAD = 0.15
+"""Standard deviation of the candidates near a start, as a share of the range."""
 
 
 class Start(NamedTuple):
@@ -97,6 +103,25 @@ def starts(campaign: Campaign, tune: Tune) -> Iterator[Start]:
     }
     present = _present(campaign.base, tune.search)
     yield Start("companion tune", within({**present, **told}, tune.search))
+
+
+def near(start: Start, search: Mapping[str, Swept], count: int, seed: int) -> Iterator[Start]:
+    """Candidates around a start: each value moved by a normal share of its range.
+
+    The optimum is more often near a reasonable start than anywhere in the ranges.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        moved = dict(start.values)
+        for key, value in start.values.items():
+            swept = search[key]
+            if swept.loguniform is not None:
+                low, high = swept.loguniform
+                moved[key] = value * (high / low) ** float(rng.normal(0.0, _SPREAD))
+            elif swept.uniform is not None:
+                low, high = swept.uniform
+                moved[key] = value + (high - low) * float(rng.normal(0.0, _SPREAD))
+        yield Start(f"near {start.name}", within(moved, search))
 
 
 def _analysed(config: Config) -> Config:

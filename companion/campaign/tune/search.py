@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
-from companion.campaign.tune.candidates import Start, Values, cases, starts, suggested, within
+from companion.campaign.tune.candidates import (
+    Start,
+    Values,
+    cases,
+    near,
+    starts,
+    suggested,
+    within,
+)
 from companion.campaign.tune.scores import Row, Score, scored
 from companion.campaign.tune.section import Tune
 from companion.files.yaml_file import ConfigError
@@ -22,6 +30,8 @@ Fly = Callable[[Sequence[Case]], Sequence[Row]]
 STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _NAME = "tune"
+_STARTS, _FEWEST_NEAR = 2, 4
+"""Number of starts, and smallest number of candidates near the last of them."""
 _FIRST_SHARE = 4
 """A candidate flies the first 1/4 of its cases, at least `_FEWEST`, before the others."""
 _FEWEST = 2
@@ -108,22 +118,30 @@ class Search:
         near = good[: max(3, len(good) // 10)]
         return Found(tried, tried - len(whole), good[0] if good else None, near)
 
+    @property
+    def _near(self) -> int:
+        """Number of candidates near the start that are tried first."""
+        return max(_FEWEST_NEAR, len(self._tune.search))
+
     def _sampler(self, number: int) -> Any:
         return self._optuna.samplers.TPESampler(
             seed=self._campaign.file.seed + number,
             multivariate=True,
-            n_startup_trials=max(10, 2 * len(self._tune.search)),
+            n_startup_trials=_STARTS + self._near,
         )
 
     def _take_up(self) -> None:
         """Begin with the starts, or continue: a candidate that was interrupted is tried again."""
         states = self._optuna.trial.TrialState
         if not self._study.trials:
-            for start in starts(self._campaign, self._tune):
+            begin = list(starts(self._campaign, self._tune))
+            seed, search = self._campaign.file.seed, self._tune.search
+            for start in (*begin, *near(begin[-1], search, self._near, seed)):
                 self._enqueue(start)
         for trial in self._study.get_trials(states=(states.RUNNING,)):
             self._study.tell(trial.number, state=states.FAIL)
-            self._study.enqueue_trial(trial.params, user_attrs={"again": trial.number})
+            known = {**trial.system_attrs.get("fixed_params", {}), **trial.params}
+            self._study.enqueue_trial(known, user_attrs={"again": trial.number})
 
     def _enqueue(self, start: Start) -> None:
         self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
