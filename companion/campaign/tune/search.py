@@ -96,7 +96,7 @@ class Search:
             sampler=self._sampler(0),
             load_if_exists=True,
         )
-        self._take_up()
+        self._begin()
 
     def run(self, trials: int, on_trial: Callable[[Found], None] = lambda _: None) -> Found:
         """Try candidates until there are `trials` of them, those of earlier runs included."""
@@ -104,7 +104,7 @@ class Search:
             on_trial(self.found())
             # Each trial has its own seed, so an interruption does not change the candidates.
             self._study.sampler = self._sampler(len(self._ended()))
-            self._try(self._study.ask())
+            self._try(self._interrupted() or self._study.ask())
         return self.found()
 
     def found(self) -> Found:
@@ -130,21 +130,21 @@ class Search:
             n_startup_trials=_STARTS + self._near,
         )
 
-    def _take_up(self) -> None:
-        """Begin with the starts, or continue: a candidate that was interrupted is tried again."""
-        states = self._optuna.trial.TrialState
+    def _begin(self) -> None:
+        """Let a new search begin with the starts."""
         if not self._study.trials:
             begin = list(starts(self._campaign, self._tune))
             seed, search = self._campaign.file.seed, self._tune.search
             for start in (*begin, *near(begin[-1], search, self._near, seed)):
                 self._enqueue(start)
-        for trial in self._study.get_trials(states=(states.RUNNING,)):
-            self._study.tell(trial.number, state=states.FAIL)
-            known = {**trial.system_attrs.get("fixed_params", {}), **trial.params}
-            self._study.enqueue_trial(known, user_attrs={"again": trial.number})
 
     def _enqueue(self, start: Start) -> None:
         self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
+
+    def _interrupted(self) -> "Trial | None":
+        """The candidate whose flights were interrupted, to be tried again."""
+        running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
+        return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
 
     def _ended(self) -> "list[FrozenTrial]":
         """The trials that came to an end, pruned or not."""
