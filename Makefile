@@ -33,8 +33,9 @@ test: lint bytecode  ## style, types, import rules, then the tests
 test-all: lint bytecode  ## the same with every test, also what only proves more widely what others prove
 	$(PYTEST)
 
-bytecode: $(VENV)/.test  ## pytest's byte code of the tests, once: every worker would make its own
+bytecode: $(VENV)/.test  ## byte code of the tests and numba's of the mock: every worker would make its own
 	@$(BIN)/python -m pytest --collect-only -p no:cacheprovider > /dev/null || true  # the tests tell it
+	@$(BIN)/python -c 'from companion.testing import MockVehicle as M; M(compiled=True).run(0.1)'
 
 matrix: $(VENV)/.test  ## every fault in every phase of a flight, in about three minutes
 	$(BIN)/python -m pytest -n 2 tests/flight/test_fault_matrix.py

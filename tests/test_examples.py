@@ -8,6 +8,7 @@ import re
 import runpy
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -52,7 +53,7 @@ def output(folder: Path, program: str) -> str:
     with pytest.MonkeyPatch.context() as patch, contextlib.chdir(folder):
         patch.setattr(sys, "argv", [program])
         patch.setattr(sys, "path", [str(EXAMPLES), *sys.path[1:]])
-        patch.setattr(testing, "MockVehicle", QuickVehicle)
+        patch.setattr(testing, "MockVehicle", partial(QuickVehicle, full_rate=True))
         with contextlib.redirect_stdout(said):
             runpy.run_path(str(EXAMPLES / program), run_name="__main__")
     return said.getvalue()

@@ -75,6 +75,7 @@ class Campaign:
                     changes[key] = self._value(name, key, value)
         try:
             config, mock = with_keys(self.base, self._mock, changes)
+            _check_flyable(config)
             fault = self._fault(sample.values)
         except ConfigError as error:
             case = Case(sample.index, sample.seed, factors, self.base, {}, None, {}, 0.0)
@@ -127,7 +128,7 @@ class Campaign:
             name,
             scenario.inject,
             phase,
-            float(values.get(FAULT_AFTER, scenario.after_s)),
+            float(values.get(FAULT_AFTER, scenario.after(phase))),
             scenario.endings(phase),
         )
 
@@ -137,6 +138,14 @@ class Campaign:
             return {}
         folder = f"{path.parent.as_posix()}/"
         return {name: text for name, text in self.files.items() if name.startswith(folder)}
+
+
+def _check_flyable(config: Config) -> None:
+    if config.guidance.kind == "nmpc":
+        raise ConfigError(
+            "guidance.kind: nmpc solves in a process of its own, for which the virtual clock of a "
+            "campaign does not wait; compare it by `companion study track`"
+        )
 
 
 def _shown(name: str, value: Any) -> Value:

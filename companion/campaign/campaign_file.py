@@ -17,6 +17,16 @@ NO_FAULT = "none"
 """Value of the factor `fault` for a flight without a fault."""
 FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
+_AFTER = {
+    "stream": 0.0,
+    "arm": 0.0,
+    "takeoff": 0.8,
+    "offboard": 1.3,
+    "maneuvers": 0.3,
+    "hand back": 0.02,
+    "land": 0.3,
+}
+"""Time from the beginning of a phase to a fault, where a scenario does not say it, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
 
 
@@ -27,8 +37,10 @@ class FaultScenario(Section):
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. They begin together."""
     phase: FaultPhase = "maneuvers"
     """Phase of the flight in which they begin. The factor fault.phase replaces it."""
-    after_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.0
-    """Time from the beginning of the phase. The factor fault.after_s replaces it."""
+    after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
+    """Time from the beginning of the phase. The factor fault.after_s replaces it. null: as in the
+    table of docs/safety.md: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in
+    maneuvers and land, 0.02 s in hand back."""
     ends: (
         Annotated[tuple[Ending, ...], Field(min_length=1)]
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
@@ -37,6 +49,10 @@ class FaultScenario(Section):
     ground: it never left the ground. ok: as without the fault. landed: our program landed it and
     says why. held: the autopilot flies it, by our command or its own failsafe. pilot: the pilot has
     it."""
+
+    def after(self, phase: str) -> float:
+        """Time from the beginning of a phase to the fault, s."""
+        return _AFTER[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
         """The documented endings for a phase; empty where the file names none."""

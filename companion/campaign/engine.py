@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from companion.campaign import store
 from companion.campaign.campaign import Campaign
+from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, Ended, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
@@ -25,15 +26,11 @@ class Progress:
 
     Attributes:
         flown: number of cases in the results, those of earlier runs included.
-        good: number of cases of this run that were good.
         lost: cases of units that were given up, with the reason, one sentence each.
-        errors: how many cases of this run failed by each internal error.
     """
 
     flown: int = 0
-    good: int = 0
     lost: list[str] = field(default_factory=list)
-    errors: Counter[str] = field(default_factory=Counter)
 
 
 def run(
@@ -84,10 +81,14 @@ def _keep(ended: Ended, unit: range, campaign: Campaign, folder: Path, progress:
     timing = {**described(unit), "wall_s": ended.flown.wall_s, "worker": ended.flown.worker}
     store.write_unit(folder, campaign.file, ended.number, ended.flown.rows, timing)
     progress.flown += len(unit)
-    progress.good += sum(bool(row["ok"]) for row in ended.flown.rows)
-    for row in ended.flown.rows:
-        if str(row.get("result", "")).startswith(INTERNAL_ERROR):
-            progress.errors[str(row["result"])] += 1
+
+
+def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
+    """How many flights of the results ended by each fault of the program itself."""
+    if file.kind != "flights":
+        return Counter()
+    results = store.read(folder)["result"].to_pylist()
+    return Counter(result for result in results if result.startswith(INTERNAL_ERROR))
 
 
 def rows(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:

@@ -11,6 +11,7 @@ from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
 from companion.campaign.swept import Value
 from companion.config import Config
+from companion.files.yaml_file import ConfigError
 from companion.flight.observer import Silent
 from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
@@ -41,9 +42,11 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     with tempfile.TemporaryDirectory(prefix="companion-case-") as place:
         try:
             return row | _Flight(case, Path(place)).fly(folder)
+        except ConfigError as error:  # such as a trajectory that the limits do not allow
+            told = str(error)
         except Exception as error:
-            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}".replace(f"{place}/", "")
-            return row | outcomes.unflown(told)
+            told = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
+        return row | outcomes.unflown(told.replace(f"{place}/", ""))
 
 
 class _Flight:

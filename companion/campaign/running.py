@@ -30,9 +30,8 @@ from companion.campaign.cluster import (
     wait_for_workers,
 )
 from companion.campaign.folder import Description
-from companion.campaign.kinematics import check_case
 from companion.campaign.loading import load
-from companion.campaign.unit import size_of_units
+from companion.campaign.unit import check_cases, size_of_units
 from companion.campaign.versions import VersionError
 from companion.files.yaml_file import ConfigError
 
@@ -125,9 +124,7 @@ class _Run:
             first = [campaign.case(next(campaign.samples()))]
             estimate.check_size(campaign, estimate.measured(kind, first), workers)
         cases = list(campaign.cases())
-        if kind == "batch":
-            for case in cases:
-                check_case(case)
+        check_cases(kind, cases)
         if len(cases) <= _FEW * workers:
             return len(cases), None
         case_s = estimate.measured(kind, cases)
@@ -172,16 +169,17 @@ class _Run:
         say = self._console.print
         for sentence in progress.lost[:_TOLD]:
             say(f"not flown: {sentence}", markup=False)
-        for error, times in progress.errors.most_common(_TOLD):
+        if progress.flown < description.cases:
+            return self._stopped(f"{len(progress.lost)} units were given up")
+        errors = engine.internal_errors(self._place, self._campaign.file)
+        for error, times in errors.most_common(_TOLD):
             say(
                 f"{times} of the {self._noun} failed by the program's own fault: {error}",
                 markup=False,
             )
-        if progress.flown < description.cases:
-            return self._stopped(f"{len(progress.lost)} units were given up")
         say(f"{progress.flown} {self._noun} are in {self._place}; see them with")
         say(f"  companion campaign report {shlex.quote(str(self._place))}")
-        return FAILED if progress.errors else DONE
+        return FAILED if errors else DONE
 
     def _stopped(self, why: str) -> int:
         """Say how to go on; returns the exit code."""

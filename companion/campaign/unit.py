@@ -1,7 +1,6 @@
 """A unit of work: some cases that one worker flies, one after the other."""
 
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -15,7 +14,6 @@ from companion.campaign.versions import Versions, require_equal, versions
 Row = dict[str, Value]
 SECONDS = 5.0
 """A unit takes about this long, s: long against the time to send it, short if it is lost."""
-_BATCH = "companion.campaign.kinematics"
 _UNITS_PER_WORKER = 4
 """At least this number of units for each worker, so that all end at about the same time."""
 
@@ -70,12 +68,25 @@ def _flown(kind: str, cases: Sequence[Case]) -> Flown:
     return Flown(rows, wall_s, _worker())
 
 
+def check_cases(kind: str, cases: Sequence[Case]) -> None:
+    """Check that cases can be run as this kind.
+
+    Raises:
+        ConfigError: a case cannot; the message names it.
+    """
+    if kind == "batch":
+        from companion.campaign.kinematics import check_case  # noqa: PLC0415  imports much
+
+        for case in cases:
+            check_case(case)
+
+
 def _of_kind(kind: str) -> Callable[[Sequence[Case]], list[Row]]:
     if kind == "flights":
         return lambda cases: [fly_case(case) for case in cases]
-    # It compiles what flights do not need.
-    run: Callable[[Sequence[Case]], list[Row]] = import_module(_BATCH).run_cases
-    return run
+    from companion.campaign.kinematics import run_cases as fly_batch  # noqa: PLC0415  as above
+
+    return fly_batch
 
 
 def _worker() -> str:

@@ -5,6 +5,7 @@ All of it comes from the sections themselves, so a key is described in one place
 
 import textwrap
 from collections.abc import Iterable, Iterator
+from functools import cache
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -75,18 +76,26 @@ def sections() -> dict[str, type[BaseModel]]:
 def keys(config: Config) -> Iterator[Key]:
     """Every key, with its value in a configuration."""
     values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
+    for section, described in _descriptions().items():
+        for name, words in described.items():
+            yield Key(section, name, values[section][name], defaults[section][name], *words)
+
+
+@cache
+def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
+    """Unit, range and meaning of every key, by section and name."""
+    described: dict[str, dict[str, tuple[str, str, str]]] = {}
     for section, model in sections().items():
         schema = model.model_json_schema()["properties"]
-        for name, field in model.model_fields.items():
-            yield Key(
-                section,
-                name,
-                values[section][name],
-                defaults[section][name],
+        described[section] = {
+            name: (
                 next((unit for end, unit in _UNITS.items() if name.endswith(end)), ""),
                 _allowed(schema[name]),
                 _one_line(field.description or ""),
             )
+            for name, field in model.model_fields.items()
+        }
+    return described
 
 
 def differences(config: Config) -> Iterator[Key]:

@@ -64,12 +64,23 @@ class ExpectedResponse:
         """The largest sensible gain, for the user."""
         if self.quickest_gain is None:
             return "the quickest sensible gain is not known before `companion identify`"
-        remedy = "; lower it, for the response overshoots and is hardly quicker"
-        return (
-            f"planner.gain_per_s is {self.gain:g}, and {self.quickest_gain:.1f} is the quickest "
-            f"sensible one ({LARGEST_PRODUCT} / (lag + dead time))"
-            f"{remedy if self.too_quick else ''}"
-        )
+        return _gain_sentence(self.gain, self.quickest_gain)
+
+
+def gain_warning(config: Config) -> str | None:
+    """For the user, if one of our planners has a gain above the largest sensible one."""
+    gain, quickest = config.planner.gain_per_s, sensible_gain(config)
+    if config.planner_name not in PLANNER_NAMES or gain <= quickest:
+        return None
+    return _gain_sentence(gain, quickest)
+
+
+def _gain_sentence(gain: float, quickest: float) -> str:
+    remedy = "; lower it, for above that the response overshoots and the hold may swing"
+    return (
+        f"planner.gain_per_s is {gain:g}, and {quickest:.1f} is the quickest sensible one "
+        f"({LARGEST_PRODUCT} / (lag + dead time)){remedy if gain > quickest else ''}"
+    )
 
 
 def expected_response(config: Config) -> ExpectedResponse:

@@ -15,7 +15,7 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY, HoverThrust, InnerResponse, ThrustSettings
 
 LARGEST_PRODUCT = 0.45
-"""Largest sensible gain · (lag + dead time); above it, a higher gain is hardly quicker."""
+"""Largest sensible gain · (lag + dead time); above it, the response overshoots."""
 
 
 def planner(config: Config) -> Planner:

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 
+from companion.control.expected_response import gain_warning
 from companion.flight.assembly import Assembled
 from companion.flight.context import FlightContext
 from companion.recording.measurements.course import Course, EarlyEnd
@@ -78,6 +79,7 @@ def course_of(
         deadline=config.deadman.deadline,
         lockstep=not reporter.real_time,
         advice=advised,
+        gain_warning=gain_warning(config),
         settings=_settings(context),
         changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
     )

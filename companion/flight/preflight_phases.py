@@ -1,5 +1,6 @@
 """The phases on the ground, one coroutine each, and how arming is undone."""
 
+from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
 from companion.flight.commands import (
     command_if_ours,
@@ -42,6 +43,9 @@ async def checks(context: FlightContext) -> None:
     # Positions are sent only once the estimator has one, so the rates are counted now.
     context.detail = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(Stage.GROUND)
+    warning = gain_warning(context.config)
+    if warning is not None:
+        context.note(warning)
     note_heartbeat_rate(context, evidence)
     _require_inside_map(context)
     report_offboard_loss(context, evidence.survey.values)

@@ -1,6 +1,6 @@
 """Maneuver `identify`: doublets that measure the response to body rates and thrust."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from companion.attitude import BodyRates
@@ -91,14 +91,17 @@ class Doublets:
     climb_step: float
     settle: float
     name: str = "identify"
+    _doublets: tuple[_Doublet, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_doublets", self._parts())
 
     @property
     def duration(self) -> float:
         """All doublets with their rests, and the position hold before each and at the end, s."""
         return self.settle + sum(part.duration + self.settle for part in self._doublets)
 
-    @property
-    def _doublets(self) -> tuple[_Doublet, ...]:
+    def _parts(self) -> tuple[_Doublet, ...]:
         tilt, yaw = self.tilt_rate, self.yaw_rate
         rates = [
             _Doublet(step, BodyRates(*(size * rate for rate in axis)))

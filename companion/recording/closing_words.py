@@ -71,7 +71,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
     lines = [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
-    lines += [f"! {text}" for text in advice]
+    lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
     lines += _together([check for check in judged if check.good])
     return headline, [*lines, _extent(figures)]
 
@@ -107,8 +107,14 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         f"  when: {_when(end)}",
         f"  vehicle now: {_vehicle(figures['at_the_end'])}",
         f"  what to do: {remedy}",
-        *(f"! {text}" for text in figures["advice"]),
+        *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
     ]
+
+
+def _gain_warning(figures: Figures) -> list[str]:
+    """What does not make a flight bad: the gain is above the largest sensible one."""
+    warning = figures.get("gain_warning")
+    return [] if warning is None else [warning]
 
 
 def _when(end: dict[str, Any]) -> str:

@@ -1,12 +1,12 @@
 """How the vehicle obeyed: coefficients, steps, body rates, thrust and latency."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from companion.recording.measurements.response import first_order
-from companion.recording.measurements.second_order import nearest_second_order
-from companion.report.flight_data import FlightData
+from companion.recording.measurements.second_order import StepRun, nearest_second_order
+from companion.report.flight_data import FlightData, Floats
 from companion.report.plots import (
     FLIGHTS,
     IDEAL,
@@ -15,6 +15,7 @@ from companion.report.plots import (
     REFERENCE,
     Plot,
     axes,
+    limit_lines,
     line,
     over_time,
     time_axis,
@@ -30,13 +31,40 @@ def control_plots(flight: FlightData) -> Iterator[Plot]:
     yield from (plot for plot in (*found, _thrust(flight), _latency(flight)) if plot.traces)
 
 
+def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
+    """The first doublet of each flight beside its nearest linear model; nothing without steps."""
+    traces = []
+    for number, flight in enumerate(flights):
+        if flight.runs:
+            run, model = flight.runs[0], nearest_second_order(flight.runs)
+            time, along, colour = (
+                run.time - run.time[0],
+                _along(run),
+                FLIGHTS[number % len(FLIGHTS)],
+            )
+            traces.append(line(f"{flight.name}: measured", time, run.measured @ along, colour))
+            nearest = f"{flight.name}: nearest model, {1e3 * model.dead_time:.0f} ms dead time"
+            traces.append(line(nearest, time, model.path(run) @ along, colour, dash="dash"))
+            traces.append(
+                line(f"{flight.name}: target", time, run.target @ along, colour, dash="dot")
+            )
+    note = "The first doublet of each flight along its direction. Dashed: the nearest linear model."
+    if traces:
+        yield Plot("Step responses", note, traces, axes(x="time, s", y="acceleration / thrust"))
+
+
+def _along(run: StepRun) -> Floats:
+    """The direction of a doublet in the plane of the coefficients, (2,)."""
+    direction: Floats = run.target[0] / max(float(np.hypot(*run.target[0])), 1e-9)
+    return direction
+
+
 def _step_response(flight: FlightData) -> Plot:
     """The first doublet along its own direction, with the ideal and the nearest linear model."""
     if not flight.runs:
         return Plot("", "", [])
     run, model = flight.runs[0], nearest_second_order(flight.runs)
-    along = run.target[0] / max(float(np.hypot(*run.target[0])), 1e-9)
-    time = run.time - run.time[0]
+    along, time = _along(run), run.time - run.time[0]
     nearest = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
     traces = [
         line("target", time, run.target @ along, REFERENCE, dash="dot"),
@@ -77,7 +105,7 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
         note = (
             "Horizontal acceleration per specific thrust: what guidance asks, what the tilt gives."
         )
-        yield Plot(f"Acceleration coefficient, {axis}", note, traces, layout, 280)
+        yield Plot(f"Acceleration coefficient, {axis}", note, traces, layout, 300)
 
 
 def _rates(flight: FlightData) -> Iterator[Plot]:
@@ -87,9 +115,11 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
             for which, colour in (("commanded", REFERENCE), ("measured", MEASURED))
             if which in flight.curves
         ]
+        if traces:
+            traces += limit_lines([flight], "rate")
         layout = time_axis([flight], y="rate, °/s")
         note = "The measured rate follows the commanded one after dead time and lag of the vehicle."
-        yield Plot(f"Body rate, {axis}", note, traces, layout, 240)
+        yield Plot(f"Body rate, {axis}", note, traces, layout, 280)
 
 
 def _thrust(flight: FlightData) -> Plot:
@@ -99,15 +129,16 @@ def _thrust(flight: FlightData) -> Plot:
     traces = [over_time("sent", curve, 0, MEASURED)]
     if curve.values.shape[1] > 1:
         traces.append(over_time("learned at hover", curve, 1, NEAREST, dash="dash"))
+    traces += limit_lines([flight], "thrust")
     layout = time_axis([flight], y="thrust, 0..1")
-    return Plot("Thrust", "Normalised collective thrust.", traces, layout, 260)
+    return Plot("Thrust", "Normalised collective thrust.", traces, layout, 280)
 
 
 def _latency(flight: FlightData) -> Plot:
     curve = flight.curves.get("latency")
     if curve is None or not curve.values.any():  # In virtual time there is no latency.
         return Plot("", "", [])
-    traces = [over_time("latency", curve, 0, MEASURED)]
+    traces = [over_time("latency", curve, 0, MEASURED), *limit_lines([flight], "latency")]
     layout = time_axis([flight], y="latency, ms")
     note = "From the arrival of a sample to its setpoint, in this program."
-    return Plot("Latency", note, traces, layout, 240)
+    return Plot("Latency", note, traces, layout, 280)

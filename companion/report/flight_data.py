@@ -9,13 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.config import Config
 from companion.config.files import load
 from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import Event, FlightRecord, read_flight
+from companion.recording.flight_record import FlightRecord, read_flight
 from companion.recording.mcap_file.fields import Row
+from companion.recording.mcap_file.happenings import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.second_order import StepRun, step_runs
+from companion.report.early_end import EarlyEnd, early_end
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +67,7 @@ class FlightData:
         differences: keys of the configuration that are not the default; None where unknown.
         runs: the open-loop steps, in vehicle time.
         gain: p of the planner, 1/s; NaN where unknown.
+        end: where and why the flight ended early; None: it did not, or it is not known.
     """
 
     name: str
@@ -76,6 +80,7 @@ class FlightData:
     differences: tuple[Key, ...] | None = None
     runs: list[StepRun] = field(default_factory=list)
     gain: float = float("nan")
+    end: EarlyEnd | None = None
 
 
 def recorded(folder: Path) -> FlightData:
@@ -86,6 +91,7 @@ def recorded(folder: Path) -> FlightData:
     """
     record = read_flight(folder)
     figures, provisional = summary_of(record)
+    config = _configuration(folder)
     return FlightData(
         name=folder.resolve().name,
         curves={name: curve for name, curve in _curves(record).items() if len(curve.time)},
@@ -94,9 +100,10 @@ def recorded(folder: Path) -> FlightData:
         phases=spans([(each.time, each.name) for each in record.phases], record.duration),
         maneuvers=_maneuvers(record),
         events=tuple(each for each in record.events if each.source != "phase"),
-        differences=_differences(folder),
+        differences=None if config is None else tuple(differences(config)),
         runs=step_runs(trace_of(record).response_rows()),
         gain=float(record.metadata["flight"].get("gain_per_s", "nan")),
+        end=early_end(figures, record, config),
     )
 
 
@@ -111,11 +118,12 @@ def _maneuvers(record: FlightRecord) -> tuple[Span, ...]:
     return tuple(span for span in spans(marks, record.duration) if span.name)
 
 
-def _differences(folder: Path) -> tuple[Key, ...] | None:
+def _configuration(folder: Path) -> Config | None:
+    """As flown; None where an older program wrote it, or it was not written whole."""
     try:
-        return tuple(differences(load(folder / "config.yaml")))
+        return load(folder / "config.yaml")
     except ConfigError:
-        return None  # An older program wrote it, or it was not written whole.
+        return None
 
 
 def _curves(record: FlightRecord) -> dict[str, Curve]:

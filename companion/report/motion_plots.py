@@ -3,14 +3,18 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
+    CROSSED,
     FLIGHTS,
     MEASURED,
     REFERENCE,
     Plot,
     axes,
     evenly,
+    limit_lines,
     line,
     numbers,
     over_time,
@@ -18,6 +22,8 @@ from companion.report.plots import (
 )
 
 _NORTH, _EAST, _HEIGHT = range(3)
+_EYE = {"x": 1.5, "y": -1.9, "z": 1.1}
+"""From the south-east and above, so far away that the titles of the axes are in the picture."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
@@ -45,10 +51,24 @@ def _plan(flights: Sequence[FlightData]) -> Plot:
                 colour = REFERENCE if first else _colour(flights, number)
                 name = _name(flights, flight, "flown" if which == "position" else which)
                 traces.append(line(name, place[:, _EAST], place[:, _NORTH], colour, dash=dash))
+    traces += [*_place_of_end(flights), *limit_lines(flights, "track")]
     layout = axes(x="east, m", y="north, m")
     layout["yaxis"]["scaleanchor"] = "x"
     note = "The track from above. In open-loop steps the vehicle has no reference and drifts."
     return Plot("Track", note, traces, layout, 420)
+
+
+def _place_of_end(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
+    """A cross where a single flight ended early."""
+    flight = flights[0]
+    if len(flights) > 1 or flight.end is None or "position" not in flight.curves:
+        return []
+    curve = flight.curves["position"]
+    row = min(int(np.searchsorted(curve.time, flight.end.time)), len(curve.time) - 1)
+    north, east = curve.values[row : row + 1, _NORTH], curve.values[row : row + 1, _EAST]
+    marker = {"symbol": "x", "size": 11, "color": CROSSED}
+    cross = line("ended early", east, north, CROSSED, mode="markers", marker=marker)
+    return [{**cross, "hovertext": flight.end.reason}]
 
 
 def _space(flights: Sequence[FlightData]) -> Plot:
@@ -69,18 +89,22 @@ def _space(flights: Sequence[FlightData]) -> Plot:
                     "line": {"color": _colour(flights, number), "width": 4},
                 }
             )
-    scene = {**axes(x="east, m", y="north, m", z="height, m"), "aspectmode": "data"}
+    scene = {
+        **axes(x="east, m", y="north, m", z="height, m"),
+        "aspectmode": "data",
+        "camera": {"eye": _EYE},
+    }
     return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 420)
 
 
 def _height(flights: Sequence[FlightData]) -> Plot:
-    traces = _lines(flights, "motion", "height above home")
+    traces = _lines(flights, "motion", "height above home") + limit_lines(flights, "height")
     layout = time_axis(flights, y="height, m")
     return Plot("Height", "Height above home over the whole flight.", traces, layout)
 
 
 def _error(flights: Sequence[FlightData]) -> Plot:
-    traces = _lines(flights, "error", "distance from the reference")
+    traces = _lines(flights, "error", "distance from the reference") + limit_lines(flights, "error")
     layout = time_axis(flights, y="error, m")
     note = "Distance from the reference by the autopilot's estimate; a gap has no reference."
     return Plot("Tracking error", note, traces, layout)
@@ -103,6 +127,7 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
             traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
             traces.append(over_time(tilt, motion, 2, colour, dash="dot", yaxis="y2"))
+    traces += limit_lines(flights, "speed") + limit_lines(flights, "tilt", yaxis="y2")
     layout = time_axis(flights, y="speed, m/s", y2="tilt, °")
     layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}
     return Plot("Speed and tilt", "Solid: speed. Dotted: tilt.", traces, layout)

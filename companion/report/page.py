@@ -8,7 +8,7 @@ from companion.files.write_whole import write_whole
 from companion.recording.closing_words import ClosingWords, closing_words
 from companion.recording.flight_record import RecordError
 from companion.report import PAGE
-from companion.report.control_plots import control_plots
+from companion.report.control_plots import compared_steps, control_plots
 from companion.report.flight_data import FlightData, recorded
 from companion.report.html_page import rendered, require_extra
 from companion.report.motion_plots import motion_plots
@@ -63,7 +63,7 @@ def write_comparison(paths: Sequence[Path], out: Path) -> Path:
     flights = [read(path) for path in paths]
     title = " and ".join(flight.name for flight in flights)
     with _of_this_version(paths[0]):
-        plots = list(motion_plots(flights))
+        plots = [*compared_steps(flights), *motion_plots(flights)]
         page = _page(title, None, flights, beside_each_other(flights), plots, None)
     write_whole(out, page)
     return out
@@ -99,7 +99,14 @@ def _page(
         title,
         plots,
         words=words,
+        verdicts=_verdicts(flights),
         flights=flights,
         tables=tables,
         settings=settings,
     )
+
+
+def _verdicts(flights: Sequence[FlightData]) -> list[tuple[str, ClosingWords]]:
+    """The words about each flight of which a summary is known, by its name."""
+    known = [(flight.name, flight.figures) for flight in flights if flight.figures is not None]
+    return [(name, closing_words(figures, None)) for name, figures in known]

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from companion.report.early_end import EarlyEnd
 from companion.report.flight_data import Curve, FlightData, Floats, Span
 
 MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
+CROSSED = "#c1121f"
+"""Of an early end, and of the limit that was crossed."""
 FLIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """One colour for each flight of a comparison."""
-_MOST_POINTS = 3000
-"""Most points of a line: twice the pixels of a wide screen."""
+_MOST_POINTS = 2000
+"""Most points of a line: more than a wide screen has pixels."""
 _SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
 """Of the maneuvers, in turn."""
 _DIGITS = 5
@@ -95,29 +98,107 @@ def axes(**titles: str) -> dict[str, Any]:
 
 
 def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
-    """Layout of a plot over whole flights; the maneuvers of a single flight are shaded."""
+    """Layout of a plot over whole flights.
+
+    The maneuvers of a single flight are shaded and named above the plot, and its early end is
+    marked.
+    """
     layout = axes(x="time, s", **titles)
     ends = [flight.phases[-1].end for flight in flights if flight.phases]
     if ends:
         layout["xaxis"]["range"] = [0.0, max(ends)]
-    return {**layout, **_shaded(flights[0].maneuvers)} if len(flights) == 1 else layout
+    if len(flights) > 1:
+        return layout
+    maneuvers, end = flights[0].maneuvers, flights[0].end
+    mark = {"shapes": [], "annotations": []} if end is None else end_mark(end)
+    shades = [_shade(span, number) for number, span in enumerate(maneuvers)]
+    return {
+        **layout,
+        "shapes": [*shades, *mark["shapes"]],
+        "annotations": [*map(_name_above, maneuvers), *mark["annotations"]],
+    }
 
 
-def _shaded(spans: tuple[Span, ...]) -> dict[str, Any]:
-    shapes = [
-        {
-            "type": "rect",
-            "xref": "x",
-            "yref": "paper",
-            "x0": span.begin,
-            "x1": span.end,
-            "y0": 0,
-            "y1": 1,
-            "fillcolor": _SHADES[number % len(_SHADES)],
-            "line": {"width": 0},
-            "layer": "below",
-            "label": {"text": span.name, "textposition": "top center", "font": {"size": 11}},
-        }
-        for number, span in enumerate(spans)
+def end_mark(end: EarlyEnd, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
+    """A line and a label at an early end, as part of a layout; the label at the foot or above."""
+    label = {**_end_label(end), "y": 1.0 if above else 0.0}
+    return {"shapes": [_upright(end.time)], "annotations": [label]}
+
+
+def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
+    """Lines at the limit that ended a single flight early, if `curve` is what it bounds."""
+    end = flights[0].end if len(flights) == 1 else None
+    if end is None or end.limit is None or end.limit.curve != curve:
+        return []
+    limit, last = end.limit, flights[0].phases[-1].end if flights[0].phases else end.time
+    if limit.outline:
+        north, east = np.array(limit.outline).T
+        return [line(f"limit: {limit.key}", east, north, CROSSED, dash="dash", **more)]
+    return [
+        line(
+            f"limit: {limit.key}",
+            np.array([0.0, last]),
+            np.array([level, level]),
+            CROSSED,
+            dash="dash",
+            showlegend=number == 0,
+            **more,
+        )
+        for number, level in enumerate(limit.levels)
     ]
-    return {"shapes": shapes}
+
+
+def _shade(span: Span, number: int) -> dict[str, Any]:
+    return {
+        "type": "rect",
+        "xref": "x",
+        "yref": "paper",
+        "x0": span.begin,
+        "x1": span.end,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": _SHADES[number % len(_SHADES)],
+        "line": {"width": 0},
+        "layer": "below",
+    }
+
+
+def _name_above(span: Span) -> dict[str, Any]:
+    """The name of a maneuver; the page leaves it out where it is wider than the maneuver."""
+    return {
+        "x": 0.5 * (span.begin + span.end),
+        "y": 1.0,
+        "yref": "paper",
+        "yanchor": "bottom",
+        "showarrow": False,
+        "text": span.name,
+        "name": f"{span.end - span.begin:.3f}",
+        "font": {"size": 11},
+    }
+
+
+def _upright(time: float) -> dict[str, Any]:
+    return {
+        "type": "line",
+        "xref": "x",
+        "yref": "paper",
+        "x0": time,
+        "x1": time,
+        "y0": 0,
+        "y1": 1,
+        "line": {"color": CROSSED, "width": 1.5},
+    }
+
+
+def _end_label(end: EarlyEnd) -> dict[str, Any]:
+    """When the flight ended, beside the line; why, when pointed at."""
+    return {
+        "x": end.time,
+        "yref": "paper",
+        "xanchor": "right",
+        "yanchor": "bottom",
+        "showarrow": False,
+        "text": f"ended {end.time:.1f} s",
+        "hovertext": end.reason,
+        "font": {"size": 11, "color": CROSSED},
+    }

@@ -1,12 +1,15 @@
 """The tables of the page: maneuvers, figures, configuration, and flights beside each other."""
 
 import json
+import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
+from companion.config.reference import Key
 from companion.report.flight_data import FlightData
 
 _EMPTY = "–"
+_PORT = re.compile(r":\d+$")
 
 
 class Table(NamedTuple):
@@ -51,7 +54,12 @@ def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
     keys = [
         None
         if flight.differences is None
-        else {f"{key.section}.{key.name}": _value(key.value) for key in flight.differences}
+        else {
+            f"{key.section}.{key.name}": value
+            for key in flight.differences
+            for value, default in [_compared(key)]
+            if value != default
+        }
         for flight in flights
     ]
     changed = sorted({key for each in keys for key in each or {}})
@@ -65,6 +73,14 @@ def beside_each_other(flights: Sequence[FlightData]) -> list[Table]:
         Table("Keys that differ", ("key", *names), differ),
     ]
     return [table for table in tables if table.rows]
+
+
+def _compared(key: Key) -> tuple[str, str]:
+    """Value and default of a key; of an endpoint without the port, for `demo` takes a free one."""
+    value, default = _value(key.value), _value(key.default)
+    if key.name != "endpoint":
+        return value, default
+    return _PORT.sub("", value), _PORT.sub("", default)
 
 
 def _figures(figures: Any) -> Table:
@@ -120,6 +136,7 @@ def _maneuvers(figures: Any) -> Table:
         ("level_max_m", "level max, m", "{:.3f}"),
         ("height_rms_m", "height RMS, m", "{:.3f}"),
         ("height_max_m", "height max, m", "{:.3f}"),
+        ("swing_rms_deg", "quick roll and pitch, ° RMS", "{:.1f}"),
         ("drift_max_m", "drift in open loop, m", "{:.1f}"),
     )
     rows = [

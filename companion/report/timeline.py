@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from companion.report.flight_data import FlightData, Span
-from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes
+from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
 
 _COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
 """Of an event, by its level."""
@@ -33,7 +33,11 @@ def timeline(flight: FlightData) -> Iterator[Plot]:
     layout = axes(x="time, s")
     layout["yaxis"] = {"categoryorder": "array", "categoryarray": list(_LANES)}
     layout |= {"barmode": "overlay", "showlegend": False}
-    yield Plot("Timeline", "Point at a mark to read the event.", traces, layout, 240)
+    note = "Point at a mark to read the event."
+    if flight.end is not None:
+        layout |= end_mark(flight.end, above=True)
+        note = f"{flight.end.sentence()} {note}"
+    yield Plot("Timeline", note, traces, layout, 240)
 
 
 def _bars(lane: str, spans: tuple[Span, ...]) -> dict[str, Any]:

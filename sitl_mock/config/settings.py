@@ -70,8 +70,9 @@ class VehicleSettings(Section):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Vehicle seconds per wall second; lockstep ignores it."""
-    inner_loop_hz: Literal[250, 800] = 250
-    """Limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE instead."""
+    inner_loop_hz: Literal[100, 250, 800] = 250
+    """Limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE instead. 100 (PX4's
+    IMU_INTEG_RATE allows it) was not recorded; it is the quickest to simulate."""
     exact_rates: bool | None = None
     """Send at every slot; PX4's loop skips some at the full rate. Null: only in lockstep."""
     burst_ms: NonNegative = 0.0

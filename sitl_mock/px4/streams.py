@@ -4,13 +4,13 @@ A slot comes every 4 ms with a 250 Hz inner loop, every 2.5 ms with 800 Hz. So t
 differs from the requested one. The rules below reproduce the rates measured on PX4: requested
 100/200/400/500/1000 Hz gave 99/124/191/189/199 with the 250 Hz loop and 98/196/392/392/392 with 800
 Hz; 250 Hz gave 190 to 235, in steps of 4 and 8 ms; a position at 50 Hz comes in steps of 16 and
-24 ms.
+24 ms. With a 100 Hz loop, which was not measured, a slot comes every 10 ms.
 """
 
 from collections.abc import Mapping
 from random import Random
 
-SLOT_US = {250: 4000, 800: 2500}
+SLOT_US = {100: 10_000, 250: 4000, 800: 2500}
 """Slot period in us of vehicle time by inner loop rate in Hz."""
 
 HEARTBEAT, LOCAL_POSITION_NED, CURRENT_MODE = 0, 32, 436

@@ -14,8 +14,8 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.follow import HeldFigure
 from companion.guidance.source import CommandedSource
-from companion.testing import MockVehicle, connect, run
-from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QUICK_PARAMETERS, merged
+from companion.testing import connect, run
+from tests.flight.fly import CONFIGS, OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
 from tests.flight.test_tracking import FAST
 
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
@@ -53,11 +53,6 @@ def flown(program, mock, folder=None, **changes):
     return run(mock, main()), told.events
 
 
-def mock_vehicle(autopilot="px4"):
-    """A mock that takes off and lands quickly."""
-    return MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
-
-
 @BOTH
 def test_it_takes_off_flies_to_places_and_lands(autopilot):
     at = []
@@ -73,7 +68,7 @@ def test_it_takes_off_flies_to_places_and_lands(autopilot):
         at.append(abs(vehicle.state.heading - 0.5 * pi))
         await vehicle.land()
 
-    mock = mock_vehicle(autopilot)
+    mock = QuickVehicle(autopilot)
     summary, _ = flown(program, mock)
     state = mock.state()
     assert summary.result == "ok"
@@ -97,7 +92,7 @@ def test_accelerations_from_a_coroutine_stop_the_vehicle_where_it_wants(autopilo
         errors.append(np.abs(there - vehicle.state.position_ned).max())
         await vehicle.land()
 
-    mock = mock_vehicle(autopilot)
+    mock = QuickVehicle(autopilot)
     summary, _ = flown(program, mock)
     assert summary.result == "ok"
     assert errors[0] < 0.15
@@ -131,7 +126,7 @@ def test_references_from_a_coroutine_are_followed_as_the_built_in_ones_are(
 
     error = {}
     for program in (built_in, streamed):
-        mock = mock_vehicle()
+        mock = QuickVehicle()
         summary, _ = flown(program, mock, **quick)
         assert summary.result == "ok"
         error[program.__name__] = summary.tracking()["position_rms_m"]
@@ -182,7 +177,7 @@ def test_a_program_that_fails_leaves_the_vehicle_held_and_handed_back(
         async with vehicle.control() as control:
             await fault(control)
 
-    mock = mock_vehicle(autopilot)
+    mock = QuickVehicle(autopilot)
     with pytest.raises(error):
         flown(program, mock, tmp_path)
     state = mock.until(lambda state: hypot(*state["velocity"][:2]) < 0.3)
@@ -198,7 +193,7 @@ def test_after_a_hard_line_the_hold_comes_to_rest(autopilot):
     path = CONFIGS / f"mock-{autopilot}.yaml"
     quick = {"limits": {"max_tilt_deg": 45.0, "max_tilt_rate_deg_s": 200.0}}
     quick["safety"] = {"max_body_rate_deg_s": 700.0}
-    mock, speeds = MockVehicle(config=path), []
+    mock, speeds = QuickVehicle(config=path, full_rate=True), []
 
     async def main():
         async with connect(changed(load(path), quick, "test"), mock) as vehicle:
@@ -226,7 +221,7 @@ def test_a_pilot_who_takes_over_ends_the_program_at_once(tmp_path):
                 control.accelerate((0.0, 0.0, 0.0))
                 seen.append(1)
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     with pytest.raises(companion.FlightEnded, match="took over: mode POSCTL"):
         flown(program, mock, tmp_path)
     assert mock.state()["mode"] == "POSCTL"
@@ -245,7 +240,7 @@ def test_what_the_limits_do_not_allow_is_refused_and_the_vehicle_holds_on(tmp_pa
         assert dist(here, vehicle.state.position_ned) < 0.1
         await vehicle.land()
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     summary, _ = flown(program, mock)
     assert summary.result == "ok"
 
@@ -254,7 +249,7 @@ def test_a_program_that_ends_in_the_air_hands_back(tmp_path):
     async def program(vehicle):
         await vehicle.take_off()
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     summary, told = flown(program, mock)
     state = mock.state()
     assert summary.result == "ok"
@@ -267,7 +262,7 @@ def test_before_take_off_nothing_flies(tmp_path):
         with pytest.raises(companion.FlightEnded, match="take off first"):
             await vehicle.hold(1.0)
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     summary, _ = flown(program, mock)
     assert mock.state()["armed"] is False
     assert summary.result == "ok"
@@ -283,7 +278,7 @@ def test_a_take_off_that_is_cancelled_leaves_nothing_flying_unheld(autopilot, af
             async with asyncio.timeout(after):
                 await vehicle.take_off()
 
-    mock = mock_vehicle(autopilot)
+    mock = QuickVehicle(autopilot)
     with suppress(companion.FlightEnded):
         flown(program, mock)
     mock.run(5.0)
@@ -299,7 +294,7 @@ def test_a_cancelled_call_hands_back():
         async with asyncio.timeout(1.0):
             await vehicle.hold(60.0)
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     with pytest.raises(TimeoutError):
         flown(program, mock)
     assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", True)
@@ -318,7 +313,7 @@ def test_two_calls_at_once_and_a_second_take_off_are_refused():
         await first
         await vehicle.land()
 
-    summary, _ = flown(program, mock_vehicle())
+    summary, _ = flown(program, QuickVehicle())
     assert summary.result == "ok"
 
 
@@ -334,7 +329,7 @@ def test_an_observer_that_raises_costs_nothing():
             await vehicle.land()
         return vehicle.summary
 
-    mock = mock_vehicle()
+    mock = QuickVehicle()
     assert run(mock, main()).result == "ok"
     assert not mock.state()["armed"]
 
@@ -352,7 +347,7 @@ def test_no_acceleration_keeps_the_velocity_against_drag():
                     speeds.append(state.velocity_ned[0])
         await vehicle.land()
 
-    flown(program, mock_vehicle())
+    flown(program, QuickVehicle())
     assert max(speeds) - speeds[-1] < 0.5  # a drag of 1/s alone would leave a fifth of it
 
 

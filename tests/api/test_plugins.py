@@ -1,6 +1,7 @@
 """Planners and guidance of another package: found, checked, flown, limited."""
 
 import sys
+from functools import partial
 from importlib import invalidate_caches
 from math import hypot, isfinite, nan
 
@@ -12,8 +13,8 @@ from companion.config import Config
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance
 from companion.files.yaml_file import ConfigError, parse
-from companion.testing import MockVehicle, check_guidance, check_planner, fly
-from tests.flight.fly import QUICK_FLIGHT, QUICK_PARAMETERS, merged
+from companion.testing import check_guidance, check_planner, conformance, fly
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
 from companion.attitude.first_order import first_order
@@ -100,7 +101,7 @@ def config(text):
 
 @pytest.mark.parametrize("name", ["mine", "remembering"])
 def test_a_planner_of_another_package_flies_by_its_name(name):
-    vehicle = MockVehicle("px4", prearm_delay_s=0.2, parameters=QUICK_PARAMETERS["px4"])
+    vehicle = QuickVehicle("px4")
     summary = fly(merged(QUICK_FLIGHT, {"planner": {"name": name}}), vehicle)
     assert (summary.result, summary.planner) == ("ok", name)
     assert summary.tracking()["position_max_m"] < 0.5
@@ -141,6 +142,13 @@ def test_the_rest_of_a_planner_is_passed_on():
     assert spy.noted == ((1.0, 0.0, 0.0, 0.0), 0.1)
 
 
+@pytest.fixture
+def quick(monkeypatch):
+    """The vehicles of `check_guidance` boot, climb and land quickly."""
+    monkeypatch.setattr(conformance, "MockVehicle", partial(QuickVehicle, full_rate=True))
+
+
+@pytest.mark.usefixtures("quick")
 def test_guidance_of_another_package_flies_by_its_name():
     assert type(make_guidance(config("guidance: {kind: calm}"))).__name__ == "Calm"
     check_guidance("calm")
@@ -183,6 +191,7 @@ def test_bad_planners_do_not(name, why):
         check_planner(name)
 
 
+@pytest.mark.usefixtures("quick")
 def test_guidance_that_strays_does_not_conform():
     with pytest.raises(AssertionError, match="away from its reference"):
         check_guidance("drifting")
@@ -191,7 +200,7 @@ def test_guidance_that_strays_does_not_conform():
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_guidance_that_is_not_finite_is_never_sent_and_the_vehicle_is_handed_back(autopilot):
     """It begins to return NaN on its way along the circle."""
-    vehicle = MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+    vehicle = QuickVehicle(autopilot)
     flight = {"guidance": {"kind": "broken"}, "flight": {"maneuvers": ["circle"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
     assert summary.result == "guidance makes no commands any more"

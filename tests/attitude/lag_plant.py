@@ -42,6 +42,7 @@ class LagPlant:
         row, column = np.indices(self.rates.shape)
         steps = int(np.ceil(dt / LONGEST_STEP - 1e-9))
         h = dt / steps
+        turns = []
         for step in range(steps):
             now = self._time + step * h - self._dead_time
             which = np.searchsorted(times, now + 1e-9, side="right") - 1
@@ -49,7 +50,8 @@ class LagPlant:
             turned = self._answer(commands[which, row, column], first)
             later = np.minimum(which + 1, len(commands) - 1)
             turned = turned + self._answer(commands[later, row, column], h - first)
-            self.r = self.r * Rotation.from_rotvec(turned + np.asarray(push) * h)
+            turns.append(turned + np.asarray(push) * h)
+        self.r = self.r * one_after_the_other(np.array(turns))
         self._time += dt
         self.true_rates = self.rates + push
 
@@ -59,6 +61,19 @@ class LagPlant:
         turned = command * seconds + (self.rates - command) * self._lag * (1.0 - kept)
         self.rates = command + (self.rates - command) * kept
         return turned
+
+
+def one_after_the_other(turns):
+    """The product of the rotations by (S, N, 3) rotation vectors, of each of N bodies."""
+    count = turns.shape[1]
+    product = Rotation.from_rotvec(turns.reshape(-1, 3))
+    while (left := len(product) // count) > 1:
+        index = np.arange(left * count).reshape(left, count)
+        pairs = index[: left - left % 2]
+        joined = product[pairs[::2].ravel()] * product[pairs[1::2].ravel()]
+        last = [product[index[-1]]] if left % 2 else []
+        product = Rotation.concatenate([joined, *last])
+    return product
 
 
 @dataclass

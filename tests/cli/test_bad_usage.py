@@ -58,7 +58,7 @@ def test_a_host_that_is_none_is_no_endpoint(scheme, host, tmp_path):
     with pytest.raises(EndpointError, match="endpoint"):
         parse_endpoint(f"udpin://0.0.0.0:14540?peer={host}")
     config = tmp_path / "c.yaml"
-    config.write_text("")
+    config.write_text("flight: {maneuvers: [hover]}")
     assert main(["fly", "--config", str(config), "--endpoint", f"{scheme}://{host}:14540"]) == 2
     assert start_vehicle(["--endpoint", f"tcpin://{host}:14540", "--check"]) == 2
 

@@ -10,7 +10,7 @@ import yaml
 
 from companion import demo
 from companion.cli.main import main
-from tests.flight.fly import QUICK_PARAMETERS, merged
+from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
 
 
 @pytest.fixture
@@ -37,7 +37,8 @@ def quick_demo(folder: Path) -> str:
         "include": str(demo.default_config().with_name(shipped["include"])),
         "steps": {"duration_s": 0.5, "settle_s": 0.5},
         "flight": {"takeoff_height_m": 2.0},
-        "mock": {"prearm_delay_s": 0.2, "parameters": QUICK_PARAMETERS["px4"]},
+        "link": {"attitude_rate_hz": float(LOOP_HZ)},
+        "mock": {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]},
     }
     path = folder / "quick.yaml"
     path.write_text(yaml.safe_dump(merged(shipped, mine)))

@@ -36,7 +36,7 @@ def run(capsys, *arguments):
 def config_for(folder, endpoint, **changes):
     path = folder / "my.yaml"
     places = {
-        "link": {"endpoint": endpoint, "lockstep": True},
+        "link": {"endpoint": endpoint, "lockstep": True, "attitude_rate_hz": 250.0},
         "recording": {"directory": str(folder / "flights")},
         "planner": {"name": "model-following"},
         "identify": {"settle_s": 1.0},
@@ -50,7 +50,7 @@ def config_for(folder, endpoint, **changes):
 def flown(tmp_path_factory):
     """A folder with a configuration and one flight of `identify`, and what that printed."""
     folder = tmp_path_factory.mktemp("identify")
-    with mock_vehicle(folder, seed=2) as mock:
+    with mock_vehicle(folder, full_rate=True, seed=2) as mock:
         config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
         done = subprocess.run(
             [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],
@@ -279,7 +279,7 @@ def test_a_flight_that_failed_is_not_fitted(capsys, tmp_path):
 
 
 def test_an_interrupted_flight_is_not_fitted(tmp_path):
-    with mock_vehicle(tmp_path) as mock:
+    with mock_vehicle(tmp_path, full_rate=True) as mock:
         config = config_for(tmp_path, f"udpin://127.0.0.1:{mock.port}")
         process = subprocess.Popen(
             [sys.executable, "-m", "companion", "identify", "--config", str(config), "--json"],

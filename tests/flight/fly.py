@@ -17,7 +17,21 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 WIRE_S = 0.0005
 """A datagram needs this long over UDP on a busy computer, s."""
 
-QUICK_MOCK = {"gcs_port": 0, "prearm_delay_s": 0.2}
+LOOP_HZ = 100
+"""Rate of the autopilot's loop and of attitude, Hz, in flights whose point is not the rate."""
+
+FULL_RATE = {
+    "px4": {"inner_loop_hz": 250, "lockstep": {"period_ms": 4}},
+    "ardupilot": {"parameters": {"SCHED_LOOP_RATE": 400.0}, "lockstep": {"period_ms": 4}},
+}
+"""The loop of a vehicle as it is by default: for flights that measure what is flown."""
+
+QUICK_MOCK = {
+    "gcs_port": 0,
+    "prearm_delay_s": 0.2,
+    "inner_loop_hz": LOOP_HZ,
+    "lockstep": {"period_ms": 1000 // LOOP_HZ},
+}
 QUICK_PARAMETERS = {
     "px4": {
         "MPC_TKO_RAMP_T": 0.3,
@@ -37,11 +51,13 @@ QUICK_PARAMETERS = {
         "LAND_SPEED": 150.0,
         "WPNAV_SPEED_DN": 300.0,
         "WPNAV_ACCEL_Z": 300.0,
+        "SCHED_LOOP_RATE": float(LOOP_HZ),
     },
 }
 QUICK_FLIGHT = {
     "flight": {"arm": True, "takeoff_height_m": 2.0, "maneuvers": ["hover"]},
     "hover": {"duration_s": 3.0},
+    "link": {"attitude_rate_hz": float(LOOP_HZ)},
     "guidance": {"drag_per_s": 1.0},
     "thrust": {"hover_thrust": 0.49},
 }
@@ -60,20 +76,36 @@ def merged(base, changes):
     return out
 
 
-def quick_vehicle(autopilot, settings):
+def quick_vehicle(autopilot, settings, *, full_rate=False):
     """The section `mock` of a vehicle that boots, climbs and lands quickly."""
     quick = {**QUICK_MOCK, "autopilot": autopilot, "parameters": QUICK_PARAMETERS[autopilot]}
-    return merged(quick, settings)
+    return merged(merged(quick, FULL_RATE[autopilot] if full_rate else {}), settings)
+
+
+def attitude_rate_hz(mock):
+    """The rate of attitude to ask this vehicle for: at most 250 Hz, at most its loop's."""
+    settings = mock.settings
+    loop_hz = {
+        "px4": settings.inner_loop_hz,
+        "ardupilot": settings.parameters.get("SCHED_LOOP_RATE", 400.0),
+    }
+    return min(250.0, float(loop_hz[mock.autopilot]))
 
 
 class QuickVehicle(testing.MockVehicle):
-    """A mock vehicle that boots, climbs and lands quickly; else as its file and settings say."""
+    """A mock vehicle that boots, climbs and lands quickly; else as its file and settings say.
 
-    def __init__(self, autopilot=None, *, config=None, **settings):
+    Without lockstep, samples are answered as they come, as over UDP.
+    """
+
+    def __init__(self, autopilot=None, *, config=None, full_rate=False, lockstep=True, **others):
         told = {} if config is None else bounded_yaml.parse(config.read_text("utf-8"))["mock"]
         autopilot = autopilot or told.get("autopilot", "px4")
-        known = merged(merged(told, settings), {"autopilot": autopilot})
-        super().__init__(**merged(quick_vehicle(autopilot, {}), known))
+        stepping = {"enabled": lockstep} if isinstance(lockstep, bool) else lockstep
+        delay_s = others.pop("delay_s", 0.0)
+        known = merged(told, {**others, "autopilot": autopilot, "lockstep": stepping})
+        known = quick_vehicle(autopilot, known, full_rate=full_rate)
+        super().__init__(delay_s=delay_s, compiled=can_compile(), **known)
 
 
 def quick_flight(autopilot, changes, **link):
@@ -85,19 +117,16 @@ def quick_flight(autopilot, changes, **link):
 
 @contextmanager
 def mock_vehicle(folder=None, *, in_lockstep=False, autopilot="px4", delay_s=WIRE_S, **settings):
-    """A mock vehicle in memory; `folder` is there because those of `sockets` need it.
+    """A quick vehicle in memory; `folder` is there because those of `sockets` need it.
 
-    Samples are answered as they come, as over UDP. In lockstep fly those flights whose test counts
-    on the moment of a telemetry message.
+    In lockstep fly those flights whose test counts on the moment of a telemetry message.
     """
-    known = quick_vehicle(autopilot, settings)
-    stepping = {"enabled": in_lockstep, **known.pop("lockstep", {})}
-    compiled = can_compile()
-    yield testing.MockVehicle(delay_s=delay_s, lockstep=stepping, compiled=compiled, **known)
+    stepping = {"enabled": in_lockstep, **settings.pop("lockstep", {})}
+    yield QuickVehicle(autopilot, delay_s=delay_s, lockstep=stepping, **settings)
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
-    config = quick_flight(mock.autopilot, changes)
+    config = quick_flight(mock.autopilot, changes, attitude_rate_hz=attitude_rate_hz(mock))
     return testing.session(config, mock, folder, observer, ask_landing)
 
 

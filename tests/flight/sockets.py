@@ -17,7 +17,7 @@ from companion.flight.observer import Silent
 from companion.flight.session import Session
 from companion.mavlink import lockstep
 from tests.flight import mock_start
-from tests.flight.fly import merged, quick_flight, quick_vehicle
+from tests.flight.fly import LOOP_HZ, merged, quick_flight, quick_vehicle
 
 lockstep._SPIN_S = 0.0  # the cores are busy with other flights
 
@@ -27,9 +27,9 @@ QUICK = {"speed": 20.0, "lockstep": {"patience_s": 0.5}}
 class Mock:
     """A running mock vehicle and its control channel."""
 
-    def __init__(self, process, port, control_port, config, in_lockstep, autopilot):
+    def __init__(self, process, port, control_port, config, in_lockstep, autopilot, rate_hz):
         self.process, self.port, self.config = process, port, config
-        self.in_lockstep, self.autopilot = in_lockstep, autopilot
+        self.in_lockstep, self.autopilot, self.rate_hz = in_lockstep, autopilot, rate_hz
         self._address = ("127.0.0.1", control_port)
 
     def ask(self, request):
@@ -65,18 +65,18 @@ class Mock:
 
 
 @contextmanager
-def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings):
+def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", full_rate=False, **settings):
     """Start a mock on free ports; its words go to `folder`/mock.log."""
+    rate_hz = 250.0 if full_rate else float(LOOP_HZ)
     port, control_port = free_port(), free_port()
     config, words = folder / "mock.yaml", folder / "mock.log"
-    config.write_text(
-        bounded_yaml.dump({"mock": quick_vehicle(autopilot, merged(QUICK, settings))})
-    )
+    section = quick_vehicle(autopilot, merged(QUICK, settings), full_rate=full_rate)
+    config.write_text(bounded_yaml.dump({"mock": section}))
     arguments = ["--headless", "--config", str(config)]
     arguments += ["--port", str(port), "--control-port", str(control_port)]
     process = mock_start.start(arguments + ["--lockstep"] * in_lockstep, words)
     try:
-        yield Mock(process, port, control_port, config, in_lockstep, autopilot)
+        yield Mock(process, port, control_port, config, in_lockstep, autopilot, rate_hz)
     finally:
         process.terminate()
         process.join(10.0)
@@ -84,8 +84,9 @@ def mock_vehicle(folder: Path, *, in_lockstep=True, autopilot="px4", **settings)
 
 
 def session_for(mock, folder: Path, observer=None, ask_landing=None, **changes):
-    endpoint = f"udpin://127.0.0.1:{mock.port}"
-    config = quick_flight(mock.autopilot, changes, endpoint=endpoint, lockstep=mock.in_lockstep)
+    link = {"lockstep": mock.in_lockstep, "attitude_rate_hz": mock.rate_hz}
+    link["endpoint"] = f"udpin://127.0.0.1:{mock.port}"
+    config = quick_flight(mock.autopilot, changes, **link)
     folder.mkdir(exist_ok=True)
     return Session(config, folder, observer or Silent(), ask_landing or decline)
 

@@ -36,7 +36,7 @@ def commands(summary):
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ardupilot")
-    with mock_vehicle(folder, autopilot="ardupilot", seed=7) as mock:
+    with mock_vehicle(folder, autopilot="ardupilot", full_rate=True, seed=7) as mock:
         summary = fly(mock, folder / "log", **MANEUVERS)
         assert not mock.state()["crashed"]
     return summary
@@ -93,7 +93,8 @@ def test_the_response_is_straight_and_the_circle_is_followed(flown):
 def test_thrust_that_would_be_taken_for_something_else_is_refused_on_the_ground(
     tmp_path, parameters, words
 ):
-    with mock_vehicle(tmp_path, autopilot="ardupilot", parameters=parameters) as mock:
+    vehicle = {"autopilot": "ardupilot", "full_rate": True, "parameters": parameters}
+    with mock_vehicle(tmp_path, **vehicle) as mock:
         summary = fly(mock, tmp_path / "log", link={"attitude_rate_hz": 500.0})
         assert not mock.state()["armed"]
     assert summary.phase == "checks"
@@ -161,7 +162,7 @@ def test_without_telemetry_nothing_is_sent_and_the_autopilot_levels_by_itself(tm
 
 def test_the_step_past_level_is_straight_by_what_attitude_target_tells(tmp_path):
     """The axes of the rates lead the body by up to 8°; without ATTITUDE_TARGET it bends by 0.03."""
-    with mock_vehicle(tmp_path, autopilot="ardupilot", seed=7) as mock:
+    with mock_vehicle(tmp_path, autopilot="ardupilot", full_rate=True, seed=7) as mock:
         summary = fly(
             mock,
             tmp_path / "log",

@@ -26,7 +26,7 @@ def takeover(tmp_path, after, **settings):
         at = ceil(mock.state()["time"]) + 2.0 + after
         mock.inject({"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at})
 
-    with mock_vehicle(tmp_path, **settings, in_lockstep=True) as mock:
+    with mock_vehicle(full_rate=True, **settings, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result

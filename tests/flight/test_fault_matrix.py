@@ -19,7 +19,7 @@ AUTOPILOTS = ("px4", "ardupilot")
 PILOTED = {"px4": "POSCTL", "ardupilot": "LOITER"}
 """What the pilot's mode is called."""
 PHASES = ("stream", "takeoff", "offboard", "maneuvers", "hand back", "land")
-AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.02, 0.3), strict=True))
+AFTER = dict(zip(PHASES, (0.0, 0.8, 1.3, 0.3, 0.0, 0.3), strict=True))
 """How long after the phase began the fault does, s; offboard begins with a judgement of 1 s."""
 
 GROUND, OK, LANDED, HELD, PILOT = "ground", "ok", "landed", "held", "pilot"

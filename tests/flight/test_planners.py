@@ -63,7 +63,7 @@ def test_it_flies_lands_and_disarms(flown):
     _, summary = flown
     assert summary.result == "ok", summary.events
     assert summary.phase == "disarm"
-    assert summary.counts.setpoints == summary.counts.samples > 4000
+    assert summary.counts.setpoints == summary.counts.samples > 1600
     assert summary.tracking()["height_rms_m"] < 0.05
 
 

@@ -42,7 +42,7 @@ def test_attitude_lowered_once_is_asked_for_again_and_flown_on(tmp_path, autopil
         summary = fly(mock, tmp_path / "log", Lowers(mock, ATTITUDE_QUATERNION, hz, 1), **CIRCLE)
     assert summary.result == "ok", summary.events
     (told,) = asked_again(summary)
-    assert told == "ATTITUDE_QUATERNION comes too rarely: requesting 250 Hz again"
+    assert told == "ATTITUDE_QUATERNION comes too rarely: requesting 100 Hz again"
     assert summary.tracking()["position_max_m"] < 1.0
 
 

@@ -9,8 +9,8 @@ from pymavlink import mavutil
 from companion.flight.observer import Silent
 from companion.recording.closing_words import closing_words
 from companion.recording.flight_record import read_flight
-from companion.testing import MockVehicle, fly
-from tests.flight.fly import QUICK_FLIGHT, QUICK_MOCK, QUICK_PARAMETERS, merged
+from companion.testing import fly
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 SHORT = {
     "flight": {"maneuvers": ["hover", "steps"]},
@@ -34,10 +34,9 @@ class Watching(Silent):
 
 
 def flown(folder, **changes):
-    quick = {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]}
     observer = Watching()
     config = merged(merged(QUICK_FLIGHT, SHORT), changes)
-    return fly(config, MockVehicle("px4", **quick), folder, observer), observer
+    return fly(config, QuickVehicle(), folder, observer), observer
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +121,7 @@ def test_the_state_is_shown_in_every_phase(good):
     flying = [state for state in observer.states if state.maneuver == "hover"]
     assert len(flying) == pytest.approx(20, abs=3)
     assert all(state.monitored and state.alarms == () for state in flying)
-    assert flying[-1].rate == pytest.approx(250.0, rel=0.05)
+    assert flying[-1].rate == pytest.approx(100.0, rel=0.05)
     assert {state.latency for state in observer.states} == {None}  # in lockstep
     times = [state.time for state in observer.states]
     assert np.diff(times) == pytest.approx(0.1, abs=0.05)
@@ -162,8 +161,7 @@ def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
         def status(self, status):
             raise ZeroDivisionError("the screen")
 
-    quick = {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]}
     config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
-    summary = fly(config, MockVehicle("px4", **quick), tmp_path, Broken())
+    summary = fly(config, QuickVehicle(), tmp_path, Broken())
     assert summary.result == "ok"
     assert any("ZeroDivisionError('the screen')" in text for _, text in summary.events)

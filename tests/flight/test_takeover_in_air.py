@@ -13,9 +13,9 @@ from companion.flight.plan import TakeoverPlan
 from companion.flight.wiring import connected
 from companion.guidance import Reference
 from companion.guidance.source import CommandedSource
-from companion.testing import MockVehicle, environment, open_wire, run
+from companion.testing import environment, open_wire, run
 from companion.vehicle.link import Link
-from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QUICK_PARAMETERS, merged
+from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
 
 ARM, TAKEOFF, SET_MODE = 400, 22, 176
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
@@ -26,7 +26,7 @@ HEIGHT = 4.0
 
 def in_the_air(autopilot):
     """A mock that a ground station armed and let take off."""
-    mock = MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+    mock = QuickVehicle(autopilot)
     mock.run(4.0)
     if autopilot == "ardupilot":
         mock.command(SET_MODE, CUSTOM_MODE, GUIDED)
@@ -104,7 +104,7 @@ def test_a_source_that_falls_silent_is_held_and_handed_back(autopilot):
 
 @BOTH
 def test_a_vehicle_on_the_ground_is_not_taken_over(autopilot):
-    mock = MockVehicle(autopilot, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS[autopilot])
+    mock = QuickVehicle(autopilot)
     mock.run(4.0)
     if autopilot == "ardupilot":
         mock.command(SET_MODE, CUSTOM_MODE, GUIDED)

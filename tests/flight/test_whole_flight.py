@@ -21,7 +21,7 @@ def twice(tmp_path_factory):
     summaries = []
     for number in range(2):
         folder = tmp_path_factory.mktemp(f"flight{number}")
-        with mock_vehicle(folder, seed=7, in_lockstep=True) as mock:
+        with mock_vehicle(folder, full_rate=True, seed=7, in_lockstep=True) as mock:
             summaries.append(fly(mock, folder / "log", **MANEUVERS))
             assert not mock.state()["crashed"]
     return summaries
@@ -89,7 +89,7 @@ def test_it_flies_in_gusty_wind_on_a_half_empty_battery(tmp_path):
         "wind": {"speed_m_s": 2.0, "from_deg": 40.0, "gust_m_s": 0.7, "vertical_gust_m_s": 0.3},
         "battery": {"initial_remaining": 0.5},
     }
-    with mock_vehicle(tmp_path, **settings, in_lockstep=True) as mock:
+    with mock_vehicle(full_rate=True, **settings, in_lockstep=True) as mock:
         summary = fly(mock, tmp_path / "log", **MANEUVERS)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events

@@ -33,8 +33,8 @@ def joined(stack, folder, autopilot, wire, signs, **settings):
     if WIRES[wire] is not None:
         made = stack.enter_context(wire_like(WIRES[wire]))
         ours["endpoint"], theirs["endpoint"] = made.endpoint, made.vehicle[1]
-    settings |= theirs
-    mock = stack.enter_context(mock_vehicle(folder, autopilot=autopilot, **settings))
+    settings |= theirs | {"autopilot": autopilot, "full_rate": True}
+    mock = stack.enter_context(mock_vehicle(folder, **settings))
     mock.state()  # it is there
     return mock, ours
 

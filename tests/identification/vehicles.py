@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
@@ -55,14 +56,23 @@ def lag_with_dead_time(times, commanded, lag, dead_time, *, gain=1.0, slew=np.in
     step = 1e-4
     fine = np.arange(times[0], times[-1] + step, step)
     held = np.searchsorted(times, fine + 0.5 * step - dead_time, side="right") - 1
-    asked = float(commanded[0])
-    reached, rates = asked, []
-    for target in commanded[np.maximum(held, 0)].tolist():
-        rates.append(reached)
-        before = asked
-        asked += min(max(target - asked, -slew * step), slew * step)
-        reached += (0.5 * (before + asked) - reached) * step / (lag + 0.5 * step)
-    return gain * np.interp(times, fine, rates)
+    start = float(commanded[0])
+    asked = np.concatenate(([start], _slewed(start, commanded[np.maximum(held, 0)], slew * step)))
+    share = step / (lag + 0.5 * step)
+    means = 0.5 * (asked[:-1] + asked[1:]) - start
+    reached = lfilter([0.0, share], [1.0, share - 1.0], means)
+    return gain * np.interp(times, fine, start + reached)
+
+
+def _slewed(start, targets, most):
+    """What follows the targets by at most so much in each step."""
+    if most == np.inf:
+        return targets
+    asked, reached = start, []
+    for target in targets.tolist():
+        asked += min(max(target - asked, -most), most)
+        reached.append(asked)
+    return np.array(reached)
 
 
 def loop_with_dead_time(times, commanded, *, frequency, damping, dead_time, gain=1.0, slew=np.inf):
@@ -70,14 +80,11 @@ def loop_with_dead_time(times, commanded, *, frequency, damping, dead_time, gain
     step = 2e-4
     fine = np.arange(times[0], times[-1] + step, step)
     held = np.searchsorted(times, fine + 0.5 * step - dead_time, side="right") - 1
-    asked = rate = float(commanded[0])
-    change, rates = 0.0, []
-    for target in commanded[np.maximum(held, 0)].tolist():
-        rates.append(rate)
-        asked += min(max(target - asked, -slew * step), slew * step)
-        change += step * (frequency**2 * (asked - rate) - 2.0 * damping * frequency * change)
-        rate += step * change
-    return gain * np.interp(times, fine, rates)
+    start = float(commanded[0])
+    asked = _slewed(start, commanded[np.maximum(held, 0)], slew * step) - start
+    kept, pull = 1.0 - 2.0 * damping * frequency * step, (frequency * step) ** 2
+    rates = lfilter([0.0, pull], [1.0, pull - 1.0 - kept, kept], asked)
+    return gain * np.interp(times, fine, start + rates)
 
 
 def mock_axis(axis, doublets, *, rate_hz=100, seed=1, delay=0.002):

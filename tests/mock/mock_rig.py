@@ -5,9 +5,16 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.batch import can_compile
 from sitl_mock.link.framing import Framer, decode
+from sitl_mock.physics.vehicle_step import PythonPlant
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
+
+if can_compile():
+    from sitl_mock.physics.compiled import CompiledPlant as Plant
+else:
+    Plant = PythonPlant
 
 HOVER = 0.4903
 IGNORE_ATTITUDE = 128
@@ -30,7 +37,7 @@ class Rig:
             settings.setdefault("prearm_delay_s", 0.2)
         settings.setdefault("lockstep", {"enabled": True})
         settings.setdefault("gcs_port", 0)
-        self.simulation = Simulation(MockSettings.model_validate(settings))
+        self.simulation = Simulation(MockSettings.model_validate(settings), plant=Plant)
         self.framer = Framer(255, 190) if gcs else Framer(1, 191)
         self.heartbeat_type = dialect.MAV_TYPE_GCS if gcs else dialect.MAV_TYPE_ONBOARD_CONTROLLER
         self.received: list[tuple[float, Any]] = []

@@ -24,7 +24,7 @@ NO_PORT = 1
 def shipped(family, settings):
     """Of configs/mock-FAMILY.yaml, the parameters, and other settings."""
     mock = yaml.safe_load((CONFIGS / f"mock-{family}.yaml").read_text())["mock"]
-    return merged({"parameters": mock["parameters"]}, settings)
+    return merged({"parameters": mock["parameters"], "full_rate": True}, settings)
 
 
 @contextmanager

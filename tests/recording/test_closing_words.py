@@ -131,6 +131,29 @@ def test_a_figure_that_was_not_measured_is_no_fault(what):
     assert is_good(figures)
 
 
+SWING = {"swing_rms_deg": 11.9, "swing_period_s": 0.43, "swing_regularity": 0.92}
+
+
+def test_a_hover_that_swings_is_not_good_and_wind_is_no_swing():
+    told, _ = words(changed(["maneuvers", 0], {**HOVER, **SWING}))
+    assert (told.good, told.lines[0][:56]) == (
+        False,
+        "! hover: swings by 11.9° RMS every 0.43 s (limit 3°); lo",
+    )
+    assert "planner.gain_per_s or the weights guidance.position_weight_per_s4" in told.lines[0]
+    assert is_good(changed(["maneuvers", 0], {**HOVER, **SWING, "swing_regularity": 0.5}))
+    assert is_good(changed(["maneuvers", 0], {**HOVER, **SWING, "swing_rms_deg": 2.9}))
+    unknown = {**SWING, "swing_period_s": None, "swing_regularity": None}
+    assert is_good(changed(["maneuvers", 0], {**HOVER, **unknown}))
+
+
+def test_a_gain_above_the_sensible_one_is_told_after_good_and_bad_flights():
+    figures = {**GOOD, "gain_warning": "planner.gain_per_s is 10, and 5.2 is …"}
+    told, _ = words(figures)
+    assert (told.good, told.lines[0]) == (True, "! planner.gain_per_s is 10, and 5.2 is …")
+    assert words({**figures, **ENDED})[0].lines[-1] == told.lines[0]
+
+
 def test_in_lockstep_the_latency_is_not_judged():
     slow = changed(["latency_us", "p99"], 99_000.0)
     assert not is_good(slow)

@@ -30,6 +30,8 @@ STEPS = rows(
 )
 LINE = rows(118.0, 10.0, lambda time: (2.0 * time, 0.0, -5.0), lambda time: (2.0 * time, 0.2, -4.8))
 ALL = np.array(HOVER + STEPS + LINE)
+TIMES = np.arange(100.0, 128.0, 0.004)
+RATES = np.column_stack([TIMES, 0.6 * np.sin(6.28 * TIMES), 0.8 * np.cos(6.28 * TIMES)])
 MARKS = [
     ManeuverMark(50.0, 100.0, "hover"),
     ManeuverMark(60.0, 110.0, "steps"),
@@ -39,7 +41,7 @@ MARKS = [
 
 
 def test_each_maneuver_is_measured_by_itself():
-    hover, steps, line = measure_maneuvers(ALL, MARKS, began=40.0)
+    hover, steps, line = measure_maneuvers(ALL, RATES, MARKS, began=40.0)
     assert [one.name for one in (hover, steps, line)] == ["hover", "steps", "line"]
     assert [one.begin for one in (hover, steps, line)] == [10.0, 20.0, 28.0]
     assert hover.duration == pytest.approx(10.0, abs=0.03)
@@ -47,20 +49,29 @@ def test_each_maneuver_is_measured_by_itself():
     assert (line.height_rms, line.speed) == pytest.approx((0.2, 2.0))
 
 
+def test_the_swing_is_measured_but_in_open_loop():
+    hover, steps, line = measure_maneuvers(ALL, RATES, MARKS, 0.0)
+    swing = pytest.approx(np.degrees(1.0 / 6.28 / 2**0.5), rel=0.02)
+    for closed in (hover, line):
+        assert closed.as_dict()["swing_rms_deg"] == swing
+        assert closed.swing.period == pytest.approx(1.0, abs=0.01)
+    assert steps.as_dict()["swing_rms_deg"] is steps.as_dict()["swing_period_s"] is None
+
+
 def test_the_beginning_is_left_out_and_told_apart():
-    hover, *_ = measure_maneuvers(ALL, MARKS, 0.0)
+    hover, *_ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
     assert hover.beginning == BEGINNING
     assert (hover.level_rms, hover.level_max) == pytest.approx((0.03, 0.03))
     assert hover.beginning_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
 
 
 def test_of_a_short_maneuver_a_quarter_is_left_out():
-    (short,) = measure_maneuvers(ALL[: 4 * RATE + 1], MARKS[:1], 0.0)
+    (short,) = measure_maneuvers(ALL[: 4 * RATE + 1], RATES, MARKS[:1], 0.0)
     assert short.beginning == pytest.approx(1.0)
 
 
 def test_open_loop_has_no_level_error_but_a_drift_and_a_height():
-    _, steps, _ = measure_maneuvers(ALL, MARKS, 0.0)
+    _, steps, _ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
     assert steps.open_loop
     assert np.isnan([steps.level_rms, steps.level_max, steps.speed]).all()
     assert steps.drift == pytest.approx(0.5 * 7.98)
@@ -70,13 +81,13 @@ def test_open_loop_has_no_level_error_but_a_drift_and_a_height():
 
 
 def test_what_was_not_recorded_is_not_measured():
-    assert measure_maneuvers(np.empty((0, 7)), [], 0.0) == ()
-    assert measure_maneuvers(np.empty((0, 7)), MARKS, 0.0) == ()
-    assert [one.name for one in measure_maneuvers(ALL[:RATE], MARKS, 0.0)] == ["hover"]
+    assert measure_maneuvers(np.empty((0, 7)), RATES, [], 0.0) == ()
+    assert measure_maneuvers(np.empty((0, 7)), RATES, MARKS, 0.0) == ()
+    assert [one.name for one in measure_maneuvers(ALL[:RATE], RATES, MARKS, 0.0)] == ["hover"]
 
 
 def test_a_thrust_that_another_program_commands_has_no_height_error():
     thrust = np.array(rows(0.0, 4.0, lambda _: (nan, nan, nan), lambda _: (0.0, 0.0, -5.0)))
-    (one,) = measure_maneuvers(thrust, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
+    (one,) = measure_maneuvers(thrust, RATES, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
     assert np.isnan([one.height_rms, one.height_max]).all()
     assert one.as_dict()["height_rms_m"] is None

@@ -1,5 +1,8 @@
 """The page about a flight: from its record, a cut-off record or a `.tlog`; and of two flights."""
 
+import base64
+import dataclasses
+import gzip
 import json
 import re
 import shutil
@@ -10,7 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.cli.main import main
+from companion.config import Config
+from companion.recording.flight_record import read_flight
 from companion.report import PAGE, html_page, page
+from companion.report.control_plots import control_plots
+from companion.report.early_end import early_end
+from companion.report.flight_data import recorded
+from companion.report.motion_plots import motion_plots
 from companion.report.plots import thinned
 from tests.flight.fly import fly, mock_vehicle
 
@@ -19,6 +28,13 @@ FLIGHT = {
     "hover": {"duration_s": 2.0},
     "steps": {"duration_s": 0.5, "settle_s": 1.0},
     "circle": {"laps": 0.5},
+}
+
+SWINGING = {
+    "flight": {"maneuvers": ["hover", "steps"]},
+    "hover": {"duration_s": 4.0},
+    "guidance": {"position_weight_per_s4": 4000.0, "velocity_weight_per_s2": 60.0},
+    "safety": {"max_speed_m_s": 1.2, "speed_action": "land"},
 }
 
 
@@ -71,11 +87,82 @@ def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(fol
     assert 1.8 < max(heights) < 2.3
     measured = next(t for t in plots["Step response"]["traces"] if t["name"] == "measured")
     assert max(measured["y"]) == pytest.approx(0.25, abs=0.05)
-    assert [shape["label"]["text"] for shape in plots["Height"]["layout"]["shapes"]] == [
+    assert [one["text"] for one in plots["Height"]["layout"]["annotations"]] == [
         "hover",
         "steps",
         "circle",
     ]
+
+
+def test_the_page_holds_plotly_packed(folder):
+    """A page had 5.8 MB with Plotly as it is."""
+    path = page.write_report(folder)
+    packed = re.search(r'<script id="plotly" type="text/plain">(.*?)</script>', path.read_text())
+    assert b"plotly.js v" in gzip.decompress(base64.b64decode(packed[1]))[:200]
+    assert path.stat().st_size < 3.0e6
+
+
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory):
+    """The folder of a flight that swung in hover and became too fast in its steps."""
+    flown = tmp_path_factory.mktemp("flights") / "failed"
+    flown.mkdir()
+    with mock_vehicle() as mock:
+        summary = fly(mock, flown, **SWINGING)
+    assert summary.course.early_end.monitor == "speed"
+    return flown
+
+
+def test_a_failed_flight_shows_where_it_ended_and_the_limit_it_crossed(failed):
+    plots = plots_of(page.write_report(failed))
+    told = json.loads((failed / "summary.json").read_text())
+    time = told["early_end"]["time_s"]
+    for title in ("Timeline", "Height", "Speed and tilt", "Body rate, roll"):
+        layout = plots[title]["layout"]
+        assert layout["shapes"][-1]["x0"] == time, title
+        assert layout["annotations"][-1]["hovertext"] == told["result"]
+    names = {trace["name"] for plot in plots.values() for trace in plot["traces"]}
+    assert "limit: safety.max_speed_m_s" in names
+    speeds = next(t for t in plots["Speed and tilt"]["traces"] if "limit" in t["name"])
+    assert speeds["y"] == [1.2, 1.2]
+    cross = next(t for t in plots["Track"]["traces"] if t["name"] == "ended early")
+    assert cross["mode"] == "markers"
+    assert re.search(r"The flight ended early at \d+\.\d s: \S", body(failed / PAGE))
+
+
+def test_weights_that_are_too_large_make_a_swing_and_no_good_flight(failed):
+    """The stranger's flight: 16° of tilt back and forth, and it was called good."""
+    checks = json.loads((failed / "summary.json").read_text())["verdict"]["checks"]
+    swing = next(one for one in checks if one["found"].startswith("swings by"))
+    assert (swing["what"], swing["good"]) == ("hover", False)
+    assert "lower planner.gain_per_s" in swing["remedy"]
+
+
+@pytest.mark.parametrize(
+    ("monitor", "reason", "curve", "key"),
+    [
+        ("tilt", "60° of tilt", "tilt", "limits.max_tilt_deg + safety.tilt_margin_deg"),
+        ("fence", "9 m off, beyond limits.fence_radius_m", "track", "limits.fence_radius_m"),
+        ("braking", "0.5 m, below limits.fence_floor_m", "height", "limits.fence_floor_m"),
+        ("fence", "40 m up, above limits.fence_ceiling_m", "height", "limits.fence_ceiling_m"),
+        ("fence", "outside the polygon", "track", "safety.fence_polygon_m"),
+        ("thrust", "at limits.max_thrust", "thrust", "limits.min_thrust, max_thrust"),
+    ],
+)
+def test_each_limit_is_drawn_where_it_is_crossed(folder, monitor, reason, curve, key):
+    record, end = read_flight(folder), {"time_s": 9.0, "monitor": monitor}
+    polygon = ((-5.0, -5.0), (5.0, -5.0), (0.0, 5.0))
+    config = Config.model_validate({"safety": {"fence_polygon_m": polygon}})
+    found = early_end({"early_end": end, "result": reason}, record, config)
+    assert (found.limit.curve, found.limit.key) == (curve, key)
+    assert bool(found.limit.outline) == (curve == "track")
+    flight = dataclasses.replace(recorded(folder), end=found)
+    drawn = [t["name"] for p in (*motion_plots([flight]), *control_plots(flight)) for t in p.traces]
+    assert f"limit: {key}" in drawn
+    assert (
+        early_end({"early_end": {**end, "monitor": "gps"}, "result": ""}, record, config).limit
+        is None
+    )
 
 
 def test_a_record_that_was_cut_off_makes_a_page_that_says_so(copied):
@@ -102,12 +189,17 @@ def test_a_tlog_alone_makes_a_page(folder, tmp_path):
 def test_flights_stand_beside_each_other(folder, copied, tmp_path):
     config = copied / "config.yaml"
     config.write_text(config.read_text().replace("gain_per_s: 5.0", "gain_per_s: 6.0"))
+    config.write_text(re.sub(r"(endpoint: .*):\d+", r"\1:50123", config.read_text()))
     changed = "gain_per_s: 6.0" in config.read_text()
     out = page.write_comparison([folder, copied], tmp_path / "compare.html")
     text = body(out)
     assert "2 flights beside each other" in text
     assert "<th>one</th><th>copy</th>" in text
     assert ("planner.gain_per_s" in text) == changed
+    assert "link.endpoint" not in text, "only its port differs"
+    assert text.count("The flight was ") == 2, "the verdict of each"
+    steps = {trace["name"] for trace in plots_of(out)["Step responses"]["traces"]}
+    assert {"one: measured", "copy: measured", "copy: target"} <= steps
     names = {trace["name"] for trace in plots_of(out)["Track"]["traces"]}
     assert {"one: flown", "copy: flown"} <= names
 
@@ -142,7 +234,7 @@ def test_thinning_keeps_the_extremes_and_the_gaps(seed, count, missing):
     values = random.normal(size=count)
     values[random.random(count) < missing] = np.nan
     kept = thinned(values)
-    assert len(kept) <= 3 * 3000
+    assert len(kept) <= 3 * 2000
     assert (np.diff(kept) > 0).all()
     if not np.isnan(values).all():
         assert np.nanmax(values[kept]) == np.nanmax(values)

@@ -11,6 +11,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
+from companion.batch import can_compile
 from tests.serve.setpoint_judge import AT_ONCE, HAND_BACK, HOLD, TIMEOUT, SetpointJudge
 from tests.serve.virtual import (
     ALL,
@@ -328,7 +329,7 @@ async def damaged(scene):
     message = dialect.MAVLink_set_position_target_local_ned_message(
         0, 1, 1, 1, ALL, 20.0, 0.0, -5.0, 0, 0, 0, 0, 0, 0, 0, 0
     )
-    raw = bytearray(message.pack(scene.script.mav))
+    raw = bytearray(message.pack(scene.script.packer))
     raw[20] ^= 0x55
 
     def send(_):
@@ -406,7 +407,7 @@ def documented():
 def test_every_fault_of_a_client_ends_in_its_documented_state(autopilot):
     # The limits of these scenes were measured after the take-off of the shipped vehicle.
     config = CONFIGS / f"mock-{autopilot}.yaml"
-    vehicle = testing.MockVehicle(lockstep=False, config=config)
+    vehicle = testing.MockVehicle(lockstep=False, config=config, compiled=can_compile())
     seen = {}
 
     async def whole():

@@ -52,6 +52,7 @@ class Course:
         deadline: longest latency allowed, `deadman.deadline_ms`, s.
         lockstep: whether the vehicle waited for us, so that no latency means anything.
         advice: each key to set that differs from what was measured, one sentence each.
+        gain_warning: if the gain is above the largest sensible one, one sentence.
         settings: these keys and what to set them to, as for `--set`.
         changes: made in flight, each with `time_s`, `by` and `keys`: the values before and after.
     """
@@ -67,6 +68,7 @@ class Course:
     deadline: float = 0.004
     lockstep: bool = False
     advice: tuple[str, ...] = ()
+    gain_warning: str | None = None
     settings: dict[str, str] = field(default_factory=dict)
     changes: tuple[dict[str, Any], ...] = ()
 
@@ -82,6 +84,7 @@ class Course:
             "at_the_end": {"armed": self.armed, "mode": self.mode},
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),
+            "gain_warning": self.gain_warning,
             "settings": self.settings,
             "changes": list(self.changes),
         }

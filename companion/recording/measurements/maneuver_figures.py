@@ -1,13 +1,14 @@
 """Tracking by maneuver: a hover, a circle and open-loop steps have no error in common."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import inf, isnan, nan
+from dataclasses import dataclass, replace
+from math import degrees, inf, isnan, nan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.recording.measurements.swing import NOT_MEASURED, SHORTEST, Swing, measure_swing
 from companion.recording.trace import ManeuverMark
 
 Floats = NDArray[np.float64]
@@ -17,6 +18,8 @@ BEGINNING = 2.0
 before, which is no error of this maneuver."""
 _MOST_OF_IT = 0.25
 """At most this share of a maneuver is left out."""
+_AT_REST = 0.05
+"""A reference that never moves faster is at rest, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ class ManeuverFigures:
         beginning_max: largest distance in the part left out, m.
         drift: largest level distance from where it began, m.
         speed: largest of the reference, m/s.
+        swing: of roll and pitch; not measured in open loop.
     """
 
     name: str
@@ -53,6 +57,7 @@ class ManeuverFigures:
     beginning_max: float
     drift: float
     speed: float
+    swing: Swing = NOT_MEASURED
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; what was not measured is null."""
@@ -67,6 +72,9 @@ class ManeuverFigures:
             "beginning_max_m": self.beginning_max,
             "drift_max_m": self.drift,
             "reference_speed_max_m_s": self.speed,
+            "swing_rms_deg": degrees(self.swing.rms),
+            "swing_period_s": self.swing.period,
+            "swing_regularity": self.swing.regularity,
         }
         return {
             "name": self.name,
@@ -76,18 +84,21 @@ class ManeuverFigures:
 
 
 def measure_maneuvers(
-    rows: Floats, marks: Sequence[ManeuverMark], began: float
+    rows: Floats, rates: Floats, marks: Sequence[ManeuverMark], began: float
 ) -> tuple[ManeuverFigures, ...]:
     """Measure each maneuver that was flown.
 
     Args:
         rows: (N, 7) of `FlightTrace.tracking`.
+        rates: (M, 3) vehicle time, s, and measured roll and pitch rate, rad/s.
         marks: of `FlightTrace.maneuvers`.
         began: when the flight began, s on our clock.
     """
-    return tuple(
-        _measured(mark.name or "", mark.time - began, part) for mark, part in _parts(rows, marks)
-    )
+    measured = []
+    for mark, part in _parts(rows, marks):
+        figures = _measured(mark.name or "", mark.time - began, part)
+        measured.append(replace(figures, swing=_swing(figures, rates, part[0, 0], part[-1, 0])))
+    return tuple(measured)
 
 
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
@@ -119,6 +130,16 @@ def _beginning(rows: Floats) -> float:
     if _is_open_loop(rows):
         return 0.0
     return min(BEGINNING, _MOST_OF_IT * float(rows[-1, 0] - rows[0, 0]))
+
+
+def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:
+    """The swing of a maneuver from `begin` to `end`, s; steps in open loop have none."""
+    if figures.open_loop:
+        return NOT_MEASURED
+    if figures.duration - figures.beginning >= SHORTEST:
+        begin += figures.beginning
+    part = rates[(rates[:, 0] >= begin) & (rates[:, 0] <= end)]
+    return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _AT_REST)
 
 
 def _measured(name: str, begin: float, rows: Floats) -> ManeuverFigures:

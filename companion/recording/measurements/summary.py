@@ -16,6 +16,8 @@ from companion.recording.measurements.response import StepResponse, measure_resp
 from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import FlightTrace
 
+_ROLL_AND_PITCH = [0, 6, 7]
+"""Columns of `FlightTrace.rates`: vehicle time, measured roll and pitch rate."""
 _EXTENT = ("height_max_m", "speed_max_m_s", "tilt_max_deg")
 
 
@@ -124,7 +126,8 @@ class Summary:
     @cached_property
     def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
         trace = self.trace
-        return measure_maneuvers(trace.tracking_rows(), trace.maneuvers, self.course.began)
+        rates = trace.rates_rows()[:, _ROLL_AND_PITCH]
+        return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.course.began)
 
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s)."""

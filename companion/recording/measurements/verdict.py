@@ -10,6 +10,10 @@ LEVEL_RMS, LEVEL_RMS_PER_SPEED = 0.15, 0.02
 """Largest level RMS error of a maneuver: at rest, m, and per speed of the reference, s."""
 HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
+SWING_RMS = 3.0
+"""Largest RMS of a swing of roll and pitch, °."""
+SWING_REGULARITY = 0.7
+"""From this autocorrelation on, roll and pitch swing; below, wind and noise turn the vehicle."""
 STRAIGHTNESS = 0.03
 """Largest distance from a step's line, as a share of the step."""
 MODEL_DEVIATION = 0.20
@@ -74,6 +78,23 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 height <= HEIGHT_RMS,
                 "set thrust.hover_thrust to the thrust at which the vehicle hovers",
             )
+        yield from _swing(maneuver)
+
+
+def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
+    rms = maneuver.get("swing_rms_deg")
+    if rms is None:
+        return
+    regular = (maneuver["swing_regularity"] or 0.0) >= SWING_REGULARITY
+    yield Check(
+        maneuver["name"],
+        f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s (limit {SWING_RMS:g}°)"
+        if regular
+        else f"no swing with a period (roll and pitch {rms:.1f}° RMS)",
+        rms <= SWING_RMS or not regular,
+        "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
+        "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",
+    )
 
 
 def _steps(figures: Figures) -> Iterator[Check]:

@@ -1,0 +1,124 @@
+"""Where and why a flight ended early, and the limit that it crossed, for the plots."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.config import Config
+from companion.recording.flight_record import FlightRecord
+
+Floats = NDArray[np.float64]
+
+_CORNERS_OF_CIRCLE = 72
+
+
+@dataclass(frozen=True)
+class CrossedLimit:
+    """The limit whose monitor ended the flight.
+
+    Attributes:
+        curve: which curve it bounds: "speed", "tilt", "error", "rate", "thrust", "latency",
+            "height" or "track".
+        key: of the configuration.
+        levels: values that the curve must not cross, in the curve's unit.
+        outline: (N, 2) north and east, m: the fence around the track; empty for other curves.
+    """
+
+    curve: str
+    key: str
+    levels: tuple[float, ...] = ()
+    outline: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class EarlyEnd:
+    """The early end of a flight.
+
+    Attributes:
+        time: s since the flight began.
+        reason: as the user saw it.
+        limit: that was crossed; None where no plot shows one.
+    """
+
+    time: float
+    reason: str
+    limit: CrossedLimit | None = None
+
+    def sentence(self) -> str:
+        """When and why, for the user."""
+        return f"The flight ended early at {self.time:.1f} s: {self.reason.rstrip('.')}."
+
+
+def early_end(
+    figures: Mapping[str, Any], record: FlightRecord, config: Config | None
+) -> EarlyEnd | None:
+    """How a flight ended early; None if it was flown to its end.
+
+    Args:
+        figures: as `Summary.as_dict` makes them.
+        record: of the flight.
+        config: as flown; None: not known.
+    """
+    end = figures["early_end"]
+    if end is None:
+        return None
+    monitor, reason = end["monitor"], figures["result"]
+    if config is None or monitor is None:
+        return EarlyEnd(end["time_s"], reason)
+    if monitor in ("fence", "braking"):
+        return EarlyEnd(end["time_s"], reason, _fence(config, reason, record))
+    return EarlyEnd(end["time_s"], reason, _levels(config).get(monitor))
+
+
+def _levels(config: Config) -> dict[str, CrossedLimit]:
+    """The limits that are levels, by their monitor."""
+    limits, safety = config.limits, config.safety
+    tilt, rate = limits.max_tilt_deg + safety.tilt_margin_deg, safety.max_body_rate_deg_s
+    return {
+        "tilt": CrossedLimit("tilt", "limits.max_tilt_deg + safety.tilt_margin_deg", (tilt,)),
+        "body rate": CrossedLimit("rate", "safety.max_body_rate_deg_s", (-rate, rate)),
+        "speed": CrossedLimit("speed", "safety.max_speed_m_s", (safety.max_speed_m_s,)),
+        "tracking": CrossedLimit(
+            "error", "safety.max_tracking_error_m", (safety.max_tracking_error_m,)
+        ),
+        "thrust": CrossedLimit(
+            "thrust", "limits.min_thrust, max_thrust", (limits.min_thrust, limits.max_thrust)
+        ),
+        "deadlines": CrossedLimit("latency", "deadman.deadline_ms", (config.deadman.deadline_ms,)),
+    }
+
+
+def _fence(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
+    """The side of the fence that `reason` names, about the place where control began."""
+    guidance, limits = record.rows("guidance"), config.limits
+    flown = guidance[guidance["offboard_active"] == 1]
+    if len(flown) == 0:
+        return None
+    north, east = float(flown["estimated_north_m"][0]), float(flown["estimated_east_m"][0])
+    if "fence_ceiling_m" in reason or "fence_floor_m" in reason:
+        motion = record.rows("motion")
+        began = record.since_start(flown["time_s"][:1])
+        at_start = float(np.interp(began, motion["time_s"], motion["height_m"])[0])
+        ceiling = "fence_ceiling_m" in reason
+        return CrossedLimit(
+            "height",
+            f"limits.fence_{'ceiling' if ceiling else 'floor'}_m",
+            (at_start + limits.fence_ceiling_m if ceiling else limits.fence_floor_m,),
+        )
+    if "fence_radius_m" in reason:
+        key, corners = "limits.fence_radius_m", _circle(limits.fence_radius_m)
+    elif config.safety.fence_polygon_m:
+        key, corners = "safety.fence_polygon_m", list(config.safety.fence_polygon_m)
+    else:
+        return None
+    around = [(north + corner[0], east + corner[1]) for corner in (*corners, corners[0])]
+    return CrossedLimit("track", key, outline=tuple(around))
+
+
+def _circle(radius: float) -> list[tuple[float, float]]:
+    turns = (2.0 * pi * number / _CORNERS_OF_CIRCLE for number in range(_CORNERS_OF_CIRCLE))
+    return [(radius * cos(turn), radius * sin(turn)) for turn in turns]
