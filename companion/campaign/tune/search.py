@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
@@ -16,7 +18,7 @@ from companion.campaign.tune.candidates import (
     suggested,
     within,
 )
-from companion.campaign.tune.scores import Row, Score, scored
+from companion.campaign.tune.scores import Row, Score, pooled, scored
 from companion.campaign.tune.section import Tune
 from companion.files.yaml_file import ConfigError
 
@@ -38,7 +40,7 @@ _FEWEST = 2
 _HOPELESS = 1.3
 """A candidate is not flown further when its error is so many times that of the best one."""
 _UNFLOWN = 10.0
-"""Error of a candidate with a flight that ended early, m: worse than any that was flown."""
+"""Error that stands for a flight that ended early, m: worse than any that was flown."""
 _VALUES, _SCORE, _MISSED, _WHOLE = "values", "score", "missed", "whole"
 
 
@@ -164,13 +166,13 @@ class Search:
         score = scored(self._fly(flown[:count]), self._tune.envelope_m)
         missed = self._missed_share(score, len(flown))
         if count < len(flown) and (missed > 0.0 or self._hopeless(score)):
-            self._stop(trial, min(score.rms, _UNFLOWN), max(missed, 0.0))
+            self._stop(trial, _finite(score), max(missed, 0.0))
             return
         score = score.and_then(scored(self._fly(flown[count:]), self._tune.envelope_m))
         trial.set_user_attr(_SCORE, score.as_attributes())
         self._note_missed(trial, self._missed_share(score, len(flown)))
         trial.set_user_attr(_WHOLE, True)
-        self._study.tell(trial, min(score.rms, _UNFLOWN))
+        self._study.tell(trial, _finite(score))
 
     def _stop(self, trial: "Trial", error: float, missed: float) -> None:
         """End a candidate before all its cases were flown."""
@@ -198,3 +200,8 @@ class Search:
     def _candidate(self, trial: "FrozenTrial") -> Candidate:
         told = trial.user_attrs
         return Candidate(trial.number, told[_VALUES], Score.from_attributes(told[_SCORE]))
+
+
+def _finite(score: Score) -> float:
+    """The RMS error for Optuna, m: a flight that ended early counts as `_UNFLOWN`."""
+    return pooled(np.minimum(score.true, _UNFLOWN))
