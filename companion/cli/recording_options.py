@@ -18,7 +18,7 @@ def _add_export(commands: Commands) -> None:
     kind = export.add_mutually_exclusive_group(required=True)
     kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
     kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
-    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: the flight's folder")
+    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: FOLDER/export")
     export.set_defaults(run="recordings.export")
 
 

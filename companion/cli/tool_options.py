@@ -50,15 +50,17 @@ def add_tune(commands: Commands) -> None:
     tune = commands.add_parser(
         "tune",
         help="propose gain, weights and bandwidth for an identified vehicle",
-        description="Compute stability margins, settling, rate use and tracking error of the whole "
-        "control loop by linear analysis, search the values with the smallest error within the "
-        "margins, fly them on the mock vehicle, and write them as YAML with their reasons.",
+        description="Search gain, weights and bandwidth with the smallest expected position error "
+        "that keep stability margins (7 dB, 31°), by linear analysis of the identified vehicle. "
+        "Fly the values before and after on the mock vehicle, and write the new ones, with the "
+        "reasons as comments, as YAML for the configuration to include. docs/identify.md says "
+        "what it computes.",
     )
     tune.add_argument(
         "vehicle",
         type=Path,
         metavar="PATH",
-        help="file or flight folder that `companion identify` wrote",
+        help="vehicle.yaml of `companion identify`, or the folder of its flight",
     )
     tune.add_argument(
         "--config",
