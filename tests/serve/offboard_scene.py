@@ -148,11 +148,11 @@ class Program:
         await self.start()
         while not await self.active():  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        print("IN CONTROL", flush=True)
         place = self.place
-        while await self.active():
-            report["strayed_m"] = math.dist(place, self.place)
-            await asyncio.sleep(0.1)
+        await asyncio.sleep(2.0)
+        report["strayed_m"] = math.dist(place, self.place)
+        print("IN CONTROL", flush=True)
+        await self.lost()
         report["lost"] = True
         return report
 
