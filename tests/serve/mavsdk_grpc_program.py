@@ -13,7 +13,6 @@ from mavsdk_grpc.offboard import (
     VelocityBodyYawspeed,
     VelocityNedYaw,
 )
-from mavsdk_grpc.telemetry import FlightMode
 from offboard_scene import Program, first, main
 
 
@@ -52,21 +51,12 @@ class Grpc(Program):
 
     async def stop(self):
         await self._offboard.stop()
-        await self._end_following()
-
-    async def _end_following(self):
         self._following.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._following
 
     async def active(self):
         return await self._offboard.is_active()
-
-    async def lost(self):
-        """Wait until the vehicle is in another mode."""
-        modes = self._system.telemetry.flight_mode()
-        await first(modes, lambda mode: mode != FlightMode.OFFBOARD)
-        await self._end_following()
 
     async def land(self):
         await self._system.action.land()
