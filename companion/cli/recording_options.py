@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from companion.cli.shared_options import add_set
 from companion.cli.tool_options import Commands
 
 
@@ -32,13 +33,7 @@ def _add_replay(commands: Commands) -> None:
     )
     replay.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     replay.add_argument("--config", type=Path, metavar="FILE", help="instead of the flight's own")
-    replay.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="instead of the configuration's, such as planner.gain_per_s=4; as often as needed",
-    )
+    add_set(replay, "planner.gain_per_s=4")
     replay.add_argument(
         "--csv", type=Path, metavar="FILE", help="write both answers to each sample"
     )
