@@ -81,7 +81,7 @@ def complaint(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str |
     """What the parser says against these arguments; without options they only name a command."""
     only_named = all(re.fullmatch(r"[a-z][a-z0-9-]*", word) for word in arguments)
     try:
-        command_line._parser().parse_args([*arguments, "--help"] if only_named else arguments)
+        command_line.parse([*arguments, "--help"] if only_named else arguments)
     except SystemExit as ended:
         said = capsys.readouterr().err
         if "arguments are required: --config" in said:  # an option named in the text

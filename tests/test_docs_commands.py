@@ -20,6 +20,7 @@ import yaml
 
 from companion import demo
 from companion.attitude import BodyRates
+from companion.campaign.loading import load as load_campaign
 from companion.cli import command_line, flying
 from companion.cli.main import main
 from companion.config import Config, trajectory_file
@@ -34,7 +35,14 @@ from tests.test_docs import BLOCK, PAGES, ROOT, command_lines, named
 
 RECORDED = "flights/2026-11-22T10-54-16Z"
 FLYING = {"demo", "fly", "identify"}
-FOR_LONG = {"bench", "study", "doctor", "serve", "tune"}  # or a vehicle; test_docs.py reads them
+FOR_LONG = {
+    "bench",
+    "campaign",
+    "study",
+    "doctor",
+    "serve",
+    "tune",
+}  # or a vehicle; test_docs.py reads them
 SOFTWARE = ("make px4_sitl", "sim_vehicle.py")  # of the autopilots, not in this repository
 
 
@@ -139,6 +147,8 @@ def test_other_commands_name_what_exists(page: Path, line: str) -> None:
     if program == "make":
         targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
         assert words[0] in targets
+    elif program == "dask":
+        assert importlib.util.find_spec(f"distributed.cli.dask_{words[0]}") is not None
     elif program == ".venv/bin/pip":
         project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
         (extras,) = re.findall(r"\.\[([\w,]+)\]", words[-1])
@@ -165,7 +175,14 @@ def yaml_blocks() -> list[tuple[Path, str]]:
 @pytest.mark.parametrize(("page", "block"), yaml_blocks(), ids=lambda value: str(value)[-30:])
 def test_configurations_on_pages_are_valid(page: Path, block: str, tmp_path: Path) -> None:
     data = yaml.safe_load(block)
-    if "make real REAL=" in block:  # describes a build of an autopilot
+    if data.keys() & {"apiVersion", "jobqueue"}:  # of Kubernetes and dask-jobqueue
+        return
+    if "sweep" in data:
+        path = tmp_path / "campaign.yaml"
+        (tmp_path / "configs").symlink_to(ROOT / "configs")
+        path.write_text(block, "utf-8")
+        assert len(list(load_campaign(path).cases())) > 1
+    elif "make real REAL=" in block:  # describes a build of an autopilot
         assert {"autopilot", "start", "folder"} <= set(data)
     elif "--trajectory" in block:
         path = tmp_path / "my-path.yaml"

@@ -20,6 +20,7 @@ from companion.flight.status import FlightStatus
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.transport.endpoint import parse_endpoint
+from companion.serve.report_pages import ReportPages
 from companion.serve.session import ServeSession
 
 
@@ -37,7 +38,10 @@ def serve(options: argparse.Namespace) -> int:
     with helper(options, config, options.config, read, None, console, follows=False) as beside:
         told = observer if beside is None else Several(observer, beside)
         session = ServeSession(config, note, told, directory=config.recording.directory)
-        serving = _until_stopped(session)
+        pages = ReportPages(note)
+        if config.recording.report:
+            session.records.on_recorded = pages.write
+        serving = _until_stopped(session, pages)
         if beside is not None:
             beside.changes, beside.note = session.changes, note
             serving = beside.serve_beside(serving)
@@ -57,7 +61,7 @@ class _Events(TerminalObserver):
         """Ignore it."""
 
 
-async def _until_stopped(session: ServeSession) -> dict[str, Any]:
+async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str, Any]:
     """Run a session until SIGINT (Ctrl-C), SIGTERM or SIGHUP; a second Ctrl-C leaves at once."""
     loop = asyncio.get_running_loop()
     stopped_at: float | None = None
@@ -69,6 +73,7 @@ async def _until_stopped(session: ServeSession) -> dict[str, Any]:
             session.stop()
         elif loop.time() - stopped_at >= LEAVE_AFTER:
             session.leave()
+            pages.leave()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
     for number in (signal.SIGTERM, signal.SIGHUP):

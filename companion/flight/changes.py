@@ -12,15 +12,13 @@ from companion.config.in_flight import (
     changed_in_flight,
     differences,
 )
-from companion.control.retuning import Retuning, between, fixed_because, tuning
+from companion.control.retuning import Retuning, fixed_because, tuning
+from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
+from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import internal
 
-SLEW = 0.7
-"""Time over which a change takes effect, s."""
-_PERIOD = 0.035
-"""Shortest time between two steps of a change, s; each computes the gains again."""
 _MOST = 200
 """Number of changes that can be undone; older ones are kept."""
 
@@ -74,13 +72,13 @@ class Changes:
         self.flown = start
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
-        self._start = self._now = self._from = start
+        self._start = start
+        self._slew = Slew(start)
         self._earlier: list[Config] = []
         self._made_before = 0
         self._retuning: Retuning | None = None
         self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
-        self._began: float | None = None
-        self._stepped = 0.0
+        self._record: FlightRecorder | None = None
 
     @property
     def start(self) -> Config:
@@ -150,39 +148,42 @@ class Changes:
             self._refuses = _refuse_nothing
 
     @contextmanager
-    def applied_by(self, retuning: Retuning, note: Callable[[str], None]) -> Iterator[None]:
+    def applied_by(
+        self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
+    ) -> Iterator[None]:
         """Let changes take effect in these loops while the block runs, those before it at once.
 
         Args:
             retuning: of the loops.
-            note: records and shows a change.
+            note: shows a change, and records it in words.
+            record: records the values for a replay, or None.
         """
+        self._retuning, self._record = retuning, record
         if self.wanted is not self._start:
-            self._now = self.wanted
-            retuning.apply(tuning(self._now))
-        self._retuning = retuning
+            self._slew.jump(self.wanted)
+            retuning.apply(tuning(self.wanted))
+        if self.wanted is not self.flown:
+            self._record_change(self.flown, at_once=True)
         outside, self.note = self.note, note
         try:
             with retuning.stepped_by(self.step):
                 yield
         finally:
-            self._retuning = self._began = None
-            self._now, self.note = self.wanted, outside
+            self._retuning = self._record = None
+            self._slew.jump(self.wanted)
+            self.note = outside
 
     def step(self, now: float) -> None:
         """Go on with a change that is under way; the guidance loop calls this at each step."""
-        if self._began is None or now - self._stepped < _PERIOD or self._retuning is None:
+        if self._retuning is None:
             return
-        self._stepped = now
-        share = (now - self._began) / SLEW
         try:
-            self._now = between(self._from, self.wanted, share)
-            self._retuning.apply(tuning(self._now))
+            values = self._slew.step(now)
+            if values is not None:
+                self._retuning.apply(values)
         except Exception as error:  # the flight goes on with the values it has
-            self._began = None
+            self._slew.stop()
             self.note(internal(error))
-        if share >= 1.0:
-            self._began = None
 
     def _begin(self, wanted: Config, by: str) -> str:
         """Begin the way from the present values to `wanted`.
@@ -203,14 +204,25 @@ class Changes:
             tuning(wanted)
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
-        now = asyncio.get_running_loop().time()
-        self._from, self.wanted, self._began = self._now, wanted, now
+        now, before = asyncio.get_running_loop().time(), self.wanted
+        self.wanted = wanted
         if self._retuning is None:
-            self._now, self._began = wanted, None
+            self._slew.jump(wanted)
+        else:
+            self._slew.begin(wanted, now)
+            self._record_change(before, at_once=False)
         change = Change(now, by, keys)
         self.made.append(change)
         self.note(str(change))
         return str(change)
+
+    def _record_change(self, before: Config, *, at_once: bool) -> None:
+        """Record for a replay what changes now."""
+        if self._record is not None:
+            values: dict[str, dict[str, Any]] = {}
+            for each in differences(before, self.wanted):
+                values.setdefault(each.section, {})[each.key] = each.after
+            self._record.change(values, at_once=at_once)
 
 
 def _refuse_nothing(_before: Config, _after: Config) -> str | None:

@@ -43,7 +43,8 @@ def connected(link: Link, assembled: Assembled) -> Iterator[None]:
         link.subscribe("CURRENT_MODE", on_current_mode),
     )
     try:
-        with assembled.changes.applied_by(Retuning(loop, guidance_loop), flight.note):
+        retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder
+        with assembled.changes.applied_by(retuning, flight.note, record):
             yield
     finally:
         link.on_attitude = link.on_error = None

@@ -1,6 +1,6 @@
 """Types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import cos, hypot, sin
 from typing import NamedTuple
 
@@ -11,6 +11,9 @@ Vector = tuple[float, float, float]
 
 GRAVITY = 9.80665
 """Standard gravity, m/s²."""
+
+LARGEST_JERK = 50.0
+"""A larger jerk between two commanded accelerations is a step, m/s³."""
 
 
 class Pose(NamedTuple):
@@ -85,3 +88,18 @@ def rotated(north: float, east: float, angle: float) -> Horizontal:
     """The vector turned clockwise, seen from above, by `angle` in rad."""
     c, s = cos(angle), sin(angle)
     return c * north - s * east, s * north + c * east
+
+
+def change_rate(
+    old: Sequence[float], new: Sequence[float], since: float, most: float
+) -> tuple[float, ...] | None:
+    """How fast a commanded vector changes; None where it has jumped.
+
+    Args:
+        old: its components in the command before.
+        new: the same now.
+        since: time between the two, s.
+        most: the largest rate of change that is no jump.
+    """
+    rate = tuple((b - a) / since for a, b in zip(old, new, strict=True))
+    return rate if hypot(*rate) <= most else None

@@ -1,16 +1,21 @@
 """Sources of references for guidance: maneuvers, or references given one by one."""
 
-from math import hypot
 from typing import Protocol
 
 from companion.guidance.maneuvers import ManeuverSequence
-from companion.guidance.reference import Pose, Reference, ReferenceAt, Vector, VehicleMotion
+from companion.guidance.reference import (
+    LARGEST_JERK,
+    Pose,
+    Reference,
+    ReferenceAt,
+    Vector,
+    VehicleMotion,
+    change_rate,
+)
 
 _NO_JERK = (0.0, 0.0, 0.0)
 _SHORTEST = 0.01
 """Shortest time over which references tell their jerk, s: half a period of guidance."""
-_LARGEST_JERK = 50.0
-"""A larger jerk between two references is a step, m/s³."""
 
 
 class Source(Protocol):
@@ -149,8 +154,8 @@ class CommandedSource:
         if before is None or _kind(before) != _kind(reference):
             return _NO_JERK
         old, new = before.acceleration_ned, reference.acceleration_ned
-        jerk = (new[0] - old[0]) / since, (new[1] - old[1]) / since, (new[2] - old[2]) / since
-        return jerk if hypot(*jerk) <= _LARGEST_JERK else _NO_JERK
+        north, east, down = change_rate(old, new, since, LARGEST_JERK) or _NO_JERK
+        return north, east, down
 
     def end(self) -> None:
         """Note that no more references will come."""

@@ -13,12 +13,13 @@ channel `motion` are in. `since_start` converts from our clock. A flight in lock
 has its clock in vehicle time; then `epoch` is 0.
 """
 
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.fields import Row
+from companion.recording.mcap_file.happenings import AlarmChange, Event, Phase, ValuesChange
 from companion.recording.mcap_file.reader import McapContent, changed_topic, read_mcap
 from companion.recording.trace import ManeuverMark
 
@@ -51,54 +53,6 @@ def as_recorded(folder: Path) -> Iterator[None]:
         yield
     except (ValueError, IndexError, OverflowError, TypeError) as error:
         raise RecordError(f"{folder / FILE}: not as a flight records it: {error}") from error
-
-
-class Phase(NamedTuple):
-    """A phase of the flight.
-
-    Attributes:
-        time: when it began, s since the flight began.
-        name: shown to the user.
-        waits_for: the condition that ends it.
-    """
-
-    time: float
-    name: str
-    waits_for: str
-
-
-class Event(NamedTuple):
-    """Something that happened, in words.
-
-    Attributes:
-        time: s since the flight began.
-        text: as the user saw it.
-        level: 2 information, 3 warning, 4 error (foxglove_msgs/msg/Log).
-        source: "flight", "safety", "autopilot" or "phase".
-    """
-
-    time: float
-    text: str
-    level: int
-    source: str
-
-
-class AlarmChange(NamedTuple):
-    """A safety monitor raised its alarm, or its alarm is over.
-
-    Attributes:
-        time: s since the flight began.
-        raised: false: it is over.
-        monitor: its name, as in `companion.safety.table`.
-        reason: what was wrong; empty when it is over.
-        action: what the flight does about it, in words.
-    """
-
-    time: float
-    raised: bool
-    monitor: str
-    reason: str
-    action: str
 
 
 @dataclass(frozen=True)
@@ -185,6 +139,20 @@ class FlightRecord:
         return tuple(
             AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
         )
+
+    @cached_property
+    def changes(self) -> tuple[ValuesChange, ...]:
+        """The changes of values in flight, in order.
+
+        Raises:
+            RecordError: one is not as a flight records it.
+        """
+        found = self._words("/change", 2, 1)
+        with as_recorded(self.folder):
+            return tuple(
+                ValuesChange(time, at_once != 0.0, json.loads(values))
+                for (time, at_once), (values,) in found
+            )
 
     @cached_property
     def configuration(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ The control loop hands over an encoder and plain values. Making and writing the 
 of the thread.
 """
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from pathlib import Path
@@ -106,6 +107,16 @@ class FlightRecorder(BackgroundFile[Entry]):
         """Record what a phase tells guidance to do; the arguments are the columns of ACTION."""
         offset = nan if clock_offset is None else clock_offset
         self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
+
+    def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
+        """Record that values of the configuration change now, by section and key.
+
+        Args:
+            values: the new ones.
+            at_once: whether they are not slewed.
+        """
+        now = self._clock()
+        self.add(now, _words, ("/change", (now, float(at_once)), (json.dumps(values),)))
 
     def event(self, text: str) -> None:
         """Record an event of now, in words."""

@@ -23,6 +23,7 @@ from companion.recording.mcap_file.channels import (
     TARGET,
 )
 from companion.recording.mcap_file.fields import Channel
+from companion.recording.mcap_file.happenings import ValuesChange
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
     AttitudeSample,
@@ -90,7 +91,7 @@ class RecordedAction(NamedTuple):
     drag: Drag | None
 
 
-Entry = RecordedSample | RecordedStep | RecordedAction | AttitudeTarget
+Entry = RecordedSample | RecordedStep | RecordedAction | ValuesChange | AttitudeTarget
 
 
 def entries(record: FlightRecord) -> Iterator[Entry]:
@@ -100,15 +101,14 @@ def entries(record: FlightRecord) -> Iterator[Entry]:
         RecordError: one is not as a flight records it.
     """
     with as_recorded(record.folder):
-        yield from _entries(record)
+        yield from _in_order(_Messages(record))
 
 
-def _entries(record: FlightRecord) -> Iterator[Entry]:
-    messages = _Messages(record)
+def _in_order(messages: "_Messages") -> Iterator[Entry]:
     while (channel := messages.next()) is not None:
         if channel is SAMPLE:
-            sample = messages.take(SAMPLE)
-            yield _sample(sample, messages.take(SETPOINT) if sample["unanswered"] == 0 else None)
+            row = messages.take(SAMPLE)
+            yield _sample(row, messages.take(SETPOINT) if row["unanswered"] == 0 else None)
         elif channel is INPUT:
             read = messages.take(INPUT)
             target = messages.take(TARGET) if messages.next() is TARGET else None
@@ -116,33 +116,42 @@ def _entries(record: FlightRecord) -> Iterator[Entry]:
             yield _step(read, target, made)
         elif channel is ACTION:
             yield _action(messages.take(ACTION))
+        elif isinstance(channel, str):
+            yield messages.take_change()
         else:
-            told = messages.take(channel)
+            row = messages.take(channel)
             if channel is ATTITUDE_TARGET:
-                yield AttitudeTarget(int(told["time_boot_ms"]), _quaternion(told))
+                yield AttitudeTarget(int(row["time_boot_ms"]), _quaternion(row))
 
 
 _Row = dict[str, Any]
 
 
 class _Messages:
-    """The messages of the replayed channels, in the order of the file."""
+    """The messages of the replayed channels and the changes, in the order of the file."""
 
     def __init__(self, record: FlightRecord) -> None:
         used = (SAMPLE, SETPOINT, INPUT, TARGET, GUIDANCE, ACTION, ATTITUDE_TARGET)
-        by_topic = {channel.topic: channel for channel in used}
-        self._order = [by_topic[topic] for topic in record.content.order if topic in by_topic]
+        known: dict[str, Channel | str] = {"/change": "/change"}
+        known |= {channel.topic: channel for channel in used}
+        self._order = [known[topic] for topic in record.content.order if topic in known]
+        self._changes = iter(record.changes)
         self._rows = {channel.topic: iter(record.rows(channel.name).tolist()) for channel in used}
         self._at = 0
 
-    def next(self) -> Channel | None:
+    def next(self) -> Channel | str | None:
         return self._order[self._at] if self._at < len(self._order) else None
 
-    def take(self, channel: Channel) -> _Row:
-        if self.next() is not channel:
-            return dict.fromkeys(channel.dtype.names or (), float("nan"))
+    def take_change(self) -> ValuesChange:
         self._at += 1
-        return dict(zip(channel.dtype.names or (), next(self._rows[channel.topic]), strict=True))
+        return next(self._changes)
+
+    def take(self, channel: Channel) -> _Row:
+        names = channel.dtype.names or ()
+        if self.next() is not channel:
+            return dict.fromkeys(names, float("nan"))
+        self._at += 1
+        return dict(zip(names, next(self._rows[channel.topic]), strict=True))
 
 
 def _sample(row: _Row, sent: _Row | None) -> RecordedSample:
@@ -174,8 +183,7 @@ def _step(row: _Row, target: _Row | None, made: _Row | None) -> RecordedStep:
     battery = thrust = None
     if not isnan(row["battery_received_s"]):
         battery = Battery(row["battery_received_s"], _known(row["battery_v"]), None)
-    if not isnan(row["autopilot_thrust_received_s"]):
-        received = row["autopilot_thrust_received_s"]
+    if not isnan(received := row["autopilot_thrust_received_s"]):
         thrust = AttitudeTargetThrust(received, row["autopilot_thrust"])
     read = StepInput(
         row["time_s"],

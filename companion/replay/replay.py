@@ -2,7 +2,7 @@
 
 Guidance flies the maneuvers of the configuration again. Where another program commanded the flight,
 or predictive control flew, the recorded commands of guidance are used, and only the control loop is
-replayed: what came from another process is not in the record.
+replayed: what came from another process is not in the record. Changes in flight are made again.
 """
 
 from math import isnan
@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates
 from companion.config import Config
+from companion.config.files import changed
 from companion.config.known_drag import prior_of
 from companion.control.loops import make_loops
+from companion.control.retuning import Retuning, fixed_because, tuning
+from companion.control.slew import Slew
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.drag_estimate import ANY_VEHICLE
@@ -20,6 +23,7 @@ from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.codec import SetpointEncoder
 from companion.recording.flight_record import FlightRecord
 from companion.recording.mcap_file.channels import REASONS
+from companion.recording.mcap_file.happenings import ValuesChange
 from companion.recording.trace import FlightTrace
 from companion.replay.entries import (
     RecordedAction,
@@ -88,6 +92,9 @@ class Replay:
         )
         self._loop.is_same_vehicle = lambda: self._same_vehicle
         self._loop.planner.attitude_target = lambda: vehicle.attitude_target
+        self._wanted, self._slew = config, Slew(config)
+        self._retuning = Retuning(self._loop, self._guidance)
+        self._guidance.before_step = self._step_change
         self._same_vehicle = self._accepts = True
         self._sent: Setpoint | None = None
         self._encoder = SetpointEncoder(1, 1, 1, 1, signed=False)
@@ -106,6 +113,8 @@ class Replay:
                 self._step(entry)
             elif isinstance(entry, RecordedAction):
                 self._act(entry)
+            elif isinstance(entry, ValuesChange):
+                self._change(entry)
             else:
                 self._vehicle.attitude_target = entry
         return samples
@@ -161,6 +170,22 @@ class Replay:
                 guidance.hold_reference()
             case _:
                 guidance.give_up()
+
+    def _change(self, entry: ValuesChange) -> None:
+        """Begin a change of values, where the loops can change."""
+        if fixed_because(self._wanted) is not None:
+            return
+        self._wanted = changed(self._wanted, entry.values, "the record")
+        if entry.at_once:
+            self._slew.jump(self._wanted)
+            self._retuning.apply(tuning(self._wanted))
+        else:
+            self._slew.begin(self._wanted, entry.time)
+
+    def _step_change(self, now: float) -> None:
+        values = self._slew.step(now)
+        if values is not None:
+            self._retuning.apply(values)
 
     def _send(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         self._encoder.frame(0, time_boot_ms, rates, thrust)  # refuses what the link refuses

@@ -13,8 +13,9 @@ from companion.config import Config
 from companion.config.files import load
 from companion.config.reference import Key, differences
 from companion.files.yaml_file import ConfigError
-from companion.recording.flight_record import Event, FlightRecord, read_flight
+from companion.recording.flight_record import FlightRecord, read_flight
 from companion.recording.mcap_file.fields import Row
+from companion.recording.mcap_file.happenings import Event
 from companion.recording.measurements.recorded_summary import summary_of, trace_of
 from companion.recording.measurements.second_order import StepRun, step_runs
 from companion.report.early_end import EarlyEnd, early_end

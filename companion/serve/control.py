@@ -2,7 +2,6 @@
 
 import asyncio
 import gc
-from typing import NamedTuple
 
 from companion.config import Config
 from companion.flight.changes import Changes
@@ -11,10 +10,16 @@ from companion.flight.observer import Observer
 from companion.mavlink.framing import Frame
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
-from companion.serve.mode_requests import asks_for_control, leaves_control, starves_control
-from companion.serve.network.addresses import Address, source_of
+from companion.serve.mode_requests import (
+    asks_for_control,
+    leaves_control,
+    starves_control,
+    steers_in_our_mode,
+)
+from companion.serve.network.addresses import Address, source_of, target_of
 from companion.serve.network.client import Client
 from companion.serve.ownership import Ownership
+from companion.serve.programs import Program, Programs
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, Asked, ServedFlight
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.request import RefusedSetpoint, Request, climbs
@@ -25,18 +30,6 @@ from companion.vehicle.link import Link
 
 _TRY_AGAIN = 2.0
 """After a takeover has failed, setpoints alone do not begin another one for this long, s."""
-_MOST_OWNERS = 32
-"""Programs whose newest request is kept."""
-
-
-class _Owner(NamedTuple):
-    """One program of a client, told apart by its address behind the connection."""
-
-    client: Client
-    address: Address
-
-    def __str__(self) -> str:
-        return f"{self.client.name} ({self.address.system}/{self.address.component})"
 
 
 class ServedControl:
@@ -69,7 +62,7 @@ class ServedControl:
         self._clock, self._not_before = asyncio.get_running_loop().time, 0.0
         self._records, self._changes = records, changes
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
-        self._newest: dict[_Owner, Request] = {}
+        self._programs = Programs()
         self._flight: ServedFlight | None = None
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
@@ -95,14 +88,21 @@ class ServedControl:
         autopilot = self._link.state.autopilot
         if autopilot is None:
             return False
-        if asks_for_control(frame, autopilot):
+        for_autopilot = target_of(frame).component in (0, self._autopilot.component)
+        if for_autopilot and asks_for_control(frame, autopilot):
             self._take_wish(client, frame)
+            return True
+        if self._flight is not None and steers_in_our_mode(frame, autopilot):
+            self._component.answer(
+                client, f"refused: {self.ownership.owner} is in control; change the mode first"
+            )
+            self._answer(client, frame, REJECTED)
             return True
         if self.in_control and starves_control(frame, self.needed_rates()):
             self._answer(client, frame, ACCEPTED)
             return True
         owner = self.ownership.owner
-        if self._flight is not None and isinstance(owner, _Owner) and owner.client is client:
+        if self._flight is not None and isinstance(owner, Program) and owner.client is client:
             self._flight.let_go = self._flight.let_go or leaves_control(frame)
         return False
 
@@ -138,7 +138,8 @@ class ServedControl:
         if situation is None:
             self._component.answer(client, "setpoint refused: the vehicle's position is unknown")
             return
-        now, owner = self._clock(), _Owner(client, source_of(frame))
+        now, owner = self._clock(), Program(client, source_of(frame))
+        before = self.ownership.owner
         try:
             setpoints = Setpoints(
                 self._autopilot, self._own, body_yaw_is_relative=autopilot.body_yaw_is_relative
@@ -146,29 +147,28 @@ class ServedControl:
             request = setpoints.understand(frame, situation)
             refusal = self.ownership.setpoint(owner, now)
             if refusal is None:
-                self._keep(owner, request)
                 self._fly_request(owner, request, now)
-        except (RefusedSetpoint, UnplannableError) as error:
+        except RefusedSetpoint as error:
+            refusal = str(error)
+        except UnplannableError as error:
+            self.ownership.withdraw(owner, before)
             refusal = str(error)
         if refusal is not None:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
-    def _keep(self, owner: _Owner, request: Request) -> None:
-        """Keep a program's newest request; those of the longest silent ones are forgotten."""
-        self._newest.pop(owner, None)
-        self._newest[owner] = request
-        while len(self._newest) > _MOST_OWNERS:
-            del self._newest[next(iter(self._newest))]
+    def _fly_request(self, owner: Program, request: Request, now: float) -> None:
+        """Give a request to the flight, or begin one where setpoints alone ask for control.
 
-    def _fly_request(self, owner: _Owner, request: Request, now: float) -> None:
-        """Give a request to the flight, or begin one where setpoints alone ask for control."""
-        if self._flight is not None:
-            if self.ownership.owner == owner:
-                self._flight.give(request)
-        elif self._may_begin(owner, now):
+        Raises:
+            UnplannableError: there is no motion to it; the request before still counts.
+        """
+        if self._flight is not None and self.ownership.owner == owner:
+            self._flight.give(request)
+        self._programs.keep(owner, request)
+        if self._flight is None and self._may_begin(owner, now):
             self._begin(owner, None)
 
-    def _may_begin(self, owner: _Owner, now: float) -> bool:
+    def _may_begin(self, owner: Program, now: float) -> bool:
         """Whether setpoints alone give control: in ArduPilot's GUIDED, in the air."""
         autopilot, state = self._link.autopilot, self._link.state
         if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT or now < self._not_before:
@@ -184,15 +184,10 @@ class ServedControl:
 
     def _take_wish(self, client: Client, frame: Frame) -> None:
         """Answer a command that asks for control: by a takeover, or by a refusal."""
-        now, address = self._clock(), source_of(frame)
-        owner = next(
-            (who for who in self._newest if who == _Owner(client, address)),
-            # A program may send commands and setpoints under two component ids.
-            next((who for who in self._newest if who.client is client), _Owner(client, address)),
-        )
+        now, owner = self._clock(), self._programs.asking(client, frame)
         refusal, standing = self.ownership.ask(owner, now), not self._link.state.flying
         if refusal is None and self._flight is None and standing:
-            refusal = self._no_takeoff(self._newest[owner])
+            refusal = self._no_takeoff(self._programs.newest(owner))
         if refusal is not None:
             if self._flight is None:
                 self.ownership.release()
@@ -212,7 +207,7 @@ class ServedControl:
             return None
         return "command a height of 1 m or more above the ground, or take off first"
 
-    def _begin(self, owner: _Owner, asked: Asked | None, *, from_ground: bool = False) -> None:
+    def _begin(self, owner: Program, asked: Asked | None, *, from_ground: bool = False) -> None:
         """Begin a flight under a client's control."""
         self._flight = flight = ServedFlight(
             str(owner),
@@ -226,7 +221,7 @@ class ServedControl:
             self._changes,
             from_ground=from_ground,
         )
-        flight.give(self._newest[owner])
+        flight.give(self._programs.newest(owner))
         self._task = task = asyncio.create_task(self._fly(flight, asked))
         self._unfinished.add(task)
         task.add_done_callback(self._unfinished.discard)

@@ -27,6 +27,8 @@ class FlightRecords:
 
     Attributes:
         grants: real-time settings that were requested.
+        on_recorded: called with the folder of each flight once its record is whole; in a thread
+            beside the event loop, except on a virtual clock.
     """
 
     def __init__(
@@ -36,6 +38,7 @@ class FlightRecords:
         note: Callable[[str], None],
     ) -> None:
         self.grants: tuple[realtime.Grant, ...] = ()
+        self.on_recorded: Callable[[Path], None] = lambda _: None
         self._directory = directory
         self._environment, self._note = environment, note
         self._tap: Tap | None = None
@@ -78,6 +81,7 @@ class FlightRecords:
         record.save(summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
+            self.on_recorded(record.folder)
 
     def discard(self, record: FlightFiles) -> None:
         """Remove the record of a takeover that failed: nothing was flown."""

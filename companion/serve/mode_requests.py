@@ -1,4 +1,4 @@
-"""Which messages of clients ask for our mode, and which would starve our control. Pure."""
+"""Which messages of clients ask for our mode, steer in it, or would starve our control. Pure."""
 
 from math import isfinite
 
@@ -15,9 +15,14 @@ _COMMAND_LONG = dialect.MAVLINK_MSG_ID_COMMAND_LONG
 _COMMAND_INT = dialect.MAVLINK_MSG_ID_COMMAND_INT
 _SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
 _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
+_MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
+_GUIDED_ITEMS = 2, 3
+"""Values of `current` with which ArduPilot flies to a mission item, or to its height, at once."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
 _LEAVING = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE = 1
+_MAIN_MODE = 0xFF << 16
+"""PX4's main mode within a custom mode. OFFBOARD has no sub mode, and PX4 ignores one."""
 _MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE, _REQUEST_DATA_STREAM})
 """All messages that are looked at here."""
 
@@ -25,23 +30,43 @@ _MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE, _REQUEST_DATA_STR
 def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame commands the mode in which the autopilot obeys setpoints.
 
-    Only where that mode is entered by a command (PX4's OFFBOARD).
+    Only where that mode is entered by a command (PX4's OFFBOARD). Whatever PX4 takes for that
+    command counts: it reads modes as bytes, and knows NAV_GUIDED_ENABLE for it.
     """
     if frame.message_id not in _MESSAGES or autopilot.control_entry is not ControlEntry.BY_COMMAND:
         return False
+    offboard = autopilot.modes[autopilot.offboard_mode] & _MAIN_MODE
     if frame.message_id == _SET_MODE:
         custom_mode = decode(frame.message_id, frame.payload).custom_mode
-        return bool(custom_mode == autopilot.modes[autopilot.offboard_mode])
+        return bool(custom_mode & _MAIN_MODE == offboard)
     if frame.message_id == _REQUEST_DATA_STREAM:
         return False
     message = decode(frame.message_id, frame.payload)
-    wanted = autopilot.set_mode(autopilot.offboard_mode)
+    if message.command == dialect.MAV_CMD_NAV_GUIDED_ENABLE:
+        return bool(message.param1 > 0.0)
     return bool(
         message.command == MAV_CMD_DO_SET_MODE
         and isfinite(message.param1)
         and int(message.param1) & _CUSTOM_MODE
-        and (message.param2, message.param3) == (wanted.p2, wanted.p3)
+        and isfinite(message.param2)
+        and int(message.param2) << 16 & _MAIN_MODE == offboard
     )
+
+
+def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
+    """Whether a frame lets the autopilot fly elsewhere without leaving the mode of our setpoints.
+
+    ArduPilot in GUIDED flies to DO_REPOSITION and to single mission items as it does to setpoints,
+    so such a frame would fight the client in control. PX4 leaves OFFBOARD for them.
+    """
+    if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
+        return False
+    if frame.message_id in _MISSION_ITEMS:
+        return decode(frame.message_id, frame.payload).current in _GUIDED_ITEMS
+    if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
+        return False
+    command = decode(frame.message_id, frame.payload).command
+    return bool(command == dialect.MAV_CMD_DO_REPOSITION)
 
 
 def leaves_control(frame: Frame) -> bool:

@@ -63,6 +63,17 @@ class Ownership:
             self._forget_silent(now)
         return None
 
+    def withdraw(self, client: Hashable, owner: Hashable | None) -> None:
+        """Take back the setpoint that was noted last: it cannot be flown.
+
+        Args:
+            client: who sent it.
+            owner: the client in control before it.
+        """
+        self.owner = owner
+        stream = self._streams[client]
+        stream.newest = stream.before
+
     def ask(self, client: Hashable, now: float) -> str | None:
         """Give control to a client that asks for it; returns why not, or None."""
         owner = self.owner

@@ -49,6 +49,7 @@ class ServeSession:
         changes: of the values that may change in flight; they last from one flight to the next.
         network: of the clients, once it is open.
         control: by clients' setpoints, if `serve.control` says so, once it is open.
+        records: of the flights under a client's control.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class ServeSession:
         directory: Path | None = None,
     ) -> None:
         self._config, self._note = config, note
-        self._records = FlightRecords(directory, environment, note)
+        self.records = FlightRecords(directory, environment, note)
         self._observer, self._environment = observer or Silent(), environment
         self.changes = Changes(config)
         self.changes.note = note
@@ -88,14 +89,14 @@ class ServeSession:
         """
         wishes = realtime_wishes(self._config) if self._environment.realtime else Wishes()
         with realtime.asked_for(wishes) as grants:
-            self._records.grants = grants
+            self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))
             return await self._run_open()
 
     async def _run_open(self) -> dict[str, Any]:
         config, opener = self._config, self._environment.open_transport
-        async with open_link(config, self._records, self._note, opener) as link:
+        async with open_link(config, self.records, self._note, opener) as link:
             state_logger = StateLogger(link.state, self._note)
             link.subscribe("HEARTBEAT", lambda _: state_logger.log_changes())
             async with Network(link, config.serve.clients, self._note) as network:
@@ -116,14 +117,14 @@ class ServeSession:
                 keeper,
                 self._observer,
                 self._environment,
-                self._records,
+                self.records,
                 self.changes,
             )
             beside.append(keeper.keep_telemetry(self.control.needed_rates))
         gate = _Gate(
             permission, component, self.control, network.routing, link.settings.target_system
         )
-        network.routing.on_own = component.on_own
+        network.routing.on_own = gate.on_own
         network.routing.intercept = gate.intercept
         for endpoint in self._config.serve.clients:
             self._note(f"clients at {endpoint}")
@@ -169,6 +170,11 @@ class _Gate:
         if for_another_system and (known or frame.message_id not in SETPOINTS):
             return False
         return self._control.intercept(client, frame)
+
+    def on_own(self, client: Channel, frame: Frame) -> None:
+        """Take what is addressed to our component alone: setpoints are flown, too."""
+        if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
+            self._component.on_own(client, frame)
 
 
 def _counters(link: Link, network: Network) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import atan2
 
+from companion.attitude import is_unit
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
@@ -17,7 +18,7 @@ _CHECK_PERIOD = 1.0
 _COUNTED = 0.1
 """What arrives is counted for this long after a request, s; nothing waits for it."""
 _STALE = 0.5
-"""An older position is no position, s."""
+"""An older position or attitude is none, s."""
 _MOST_APART = 0.3
 """Local and global positions further apart than this are not paired, s."""
 
@@ -37,14 +38,17 @@ class SituationKeeper:
 
     def situation(self) -> Situation | None:
         """The situation now, or None while position or attitude are not known."""
-        position, clock = self._link.state.position, self._link.clock
+        position, now = self._link.state.position, self._network.now()
         decoded = decode_attitude(self._network.attitude) if self._network.attitude else None
         if position is None or decoded is None:
             return None
-        age = clock.age(position.vehicle_time, self._network.now())
-        if age is not None and age > _STALE:
+        age = self._link.clock.age(position.vehicle_time, now) or 0.0
+        if max(age, now - position.received, now - self._network.attitude_at) > _STALE:
             return None
-        _, (w, x, y, z), _ = decoded
+        _, q, _ = decoded
+        if not is_unit(q):
+            return None
+        w, x, y, z = q
         yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         return Situation(position.position_ned, yaw, self._origin.origin)
 

@@ -1,11 +1,13 @@
 """A client's setpoints as a source of guidance."""
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from companion.attitude import coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
 from companion.guidance.reference import Pose, Reference, ReferenceAt, VehicleMotion
 from companion.serve.ownership import Control, Ownership
+from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion
 from companion.serve.setpoints.request import (
     AttitudeRequest,
@@ -54,13 +56,15 @@ class ServedSource:
         self._stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start from the pose that was held so far, with the newest request."""
+        """Start from the pose that was held so far, with the newest request if it is fresh."""
         self.pose = pose
+        live = self._ownership.control(now) is Control.LIVE
         self._ownership.begin(now)
         self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
-        if self._waiting is not None:
-            self.give(self._waiting, now)
+        if self._waiting is not None and live:
+            with suppress(UnplannableError):  # held; the next one is refused in words
+                self.give(self._waiting, now)
 
     def give(self, request: Request, now: float) -> None:
         """Fly a request from now on; before `begin`, keep it.
@@ -71,19 +75,24 @@ class ServedSource:
         if self.pose is None:
             self._waiting = request
             return
-        self._stopped = False
         if isinstance(request, MotionRequest):
+            direct = self._direct
             self._leave_direct(now)
-            self._motion.command(self._without_jumps(request), now, self._vehicle.position_ned)
+            try:
+                self._motion.command(self._without_jumps(request), now, self._vehicle)
+            except UnplannableError:
+                self._direct = direct
+                raise
         else:
             self._direct = self._direct_reference(request)
+        self._stopped = False
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference over time."""
         self._vehicle = motion
         if self._ownership.control(now) is not Control.LIVE and not self._stopped:
             self._leave_direct(now)
-            self._motion.stop(now)
+            self._motion.stop(now, motion)
             self._stopped = True
         direct = self._direct
         return self._motion.reference if direct is None else lambda _: direct

@@ -21,6 +21,8 @@ Flights
     connect             the same `Vehicle` as `companion.connect`, inside `run`
     run                 runs a coroutine on the vehicle's clock
     session             a flight that can be interrupted, to be flown inside `run`
+    serving             `companion serve` in memory, inside `run`
+    Program             a program that speaks MAVLink to it
     ReceivedSetpoint    a setpoint that reached the autopilot: `MockVehicle.setpoints`
     Truth               the true state: `MockVehicle.state()`
 
@@ -46,6 +48,8 @@ from companion.testing.flying import environment as environment
 from companion.testing.flying import fly as fly
 from companion.testing.flying import run as run
 from companion.testing.flying import session as session
+from companion.testing.serving import Program as Program
+from companion.testing.serving import serving as serving
 from companion.testing.vehicle import MockVehicle as MockVehicle
 from companion.testing.vehicle import ReceivedSetpoint as ReceivedSetpoint
 from companion.testing.virtual_loop import VirtualEventLoop as VirtualEventLoop

@@ -89,11 +89,11 @@ def session(
     Raises:
         ConfigError: the configuration is wrong.
     """
-    known = _in_memory(_known(config), vehicle)
+    whole = in_memory(known(config), vehicle)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
     return Session(
-        known, folder, observer or Silent(), ask_landing or decline_landing, environment=environment
+        whole, folder, observer or Silent(), ask_landing or decline_landing, environment=environment
     )
 
 
@@ -142,12 +142,17 @@ async def connect(
         ConfigError: the configuration is wrong.
         FlightEnded: as `companion.connect`.
     """
-    known = _in_memory(_known(config), vehicle)
-    async with flying(known, folder, observer, environment) as connected:
+    whole = in_memory(known(config), vehicle)
+    async with flying(whole, folder, observer, environment) as connected:
         yield connected
 
 
-def _in_memory(config: Config, vehicle: MockVehicle) -> Config:
+def in_memory(config: Config, vehicle: MockVehicle) -> Config:
+    """The configuration for a vehicle in memory: in lockstep as the vehicle is.
+
+    Raises:
+        ConfigError: its link cannot reach a vehicle in memory.
+    """
     if config.link.backend != "direct":
         raise ConfigError(f"link.backend {config.link.backend} cannot reach a vehicle in memory")
     if config.link.lockstep != vehicle.in_lockstep:
@@ -155,7 +160,12 @@ def _in_memory(config: Config, vehicle: MockVehicle) -> Config:
     return config
 
 
-def _known(config: Configuration) -> Config:
+def known(config: Configuration) -> Config:
+    """The configuration that a test names.
+
+    Raises:
+        ConfigError: it is wrong.
+    """
     if isinstance(config, Config):
         return config
     if isinstance(config, Mapping):

@@ -9,10 +9,13 @@ import pytest
 
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
-from companion.config.files import changed
+from companion.config.files import changed, load
 from companion.config.in_flight import changeable, differences
 from companion.control.retuning import between
-from companion.flight.changes import SLEW, ChangeRefusedError, Changes
+from companion.control.slew import SLEW
+from companion.flight.changes import ChangeRefusedError, Changes
+from companion.recording.flight_record import read_flight
+from companion.replay.replay import Replay
 from tests.flight.fly import mock_vehicle, run, session_for
 
 _HOVER = {"duration_s": 4.0}
@@ -187,3 +190,6 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
     assert told["changes"][1]["keys"]["guidance.position_weight_per_s4"] == [150.0, None]
     assert set(texts) <= {event["text"] for event in told["events"]}
     assert told["tracking"]["position_max_m"] < 0.1
+    replay = Replay(read_flight(tmp_path), load(tmp_path / "config.yaml"))
+    assert not replay.follows_record
+    assert [each for each in replay.run() if not each.same] == []

@@ -41,11 +41,11 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=()):
+def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=(), options=()):
     """`companion serve` between the vehicle that sends to `port` and these endpoints."""
     command = [
         sys.executable, "-c", "import sys; from companion.cli.main import main; sys.exit(main())",
-        "serve", "--json", "--config", config, "--endpoint", f"udpin://127.0.0.1:{port}",
+        "serve", "--json", "--config", config, "--endpoint", f"udpin://127.0.0.1:{port}", *options,
     ]  # fmt: skip
     for endpoint in endpoints:
         command += ["--client", endpoint]
@@ -59,7 +59,7 @@ def serving(port, *endpoints, config="configs/mock-px4.yaml", settings=()):
     try:
         yield result
         process.send_signal(signal.SIGINT)
-        out, result.said = process.communicate(timeout=15)
+        out, result.said = process.communicate(timeout=60)
         assert process.returncode == 0, result.said
         result.counters = json.loads(out.splitlines()[-1])
     finally:

@@ -331,7 +331,7 @@ async def damaged(scene):
     message = dialect.MAVLink_set_position_target_local_ned_message(
         0, 1, 1, 1, ALL, 20.0, 0.0, -5.0, 0, 0, 0, 0, 0, 0, 0, 0
     )
-    raw = bytearray(message.pack(scene.script.mav))
+    raw = bytearray(message.pack(scene.script.packer))
     raw[20] ^= 0x55
 
     def send(_):

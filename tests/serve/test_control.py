@@ -121,7 +121,9 @@ def test_positions_velocities_and_attitudes_are_flown(autopilot):
         north, east, down = velocity(session)
         assert (north, east) == pytest.approx((1.5 * math.cos(1.0), 1.5 * math.sin(1.0)), abs=0.25)
         assert abs(down) < 0.15
-        await stream(3.0, lambda _: script.local(VELOCITY, velocity=(0, 0, 0)), 0.05)
+        to_us = 1, 191
+        stop = lambda _: script.local(VELOCITY, velocity=(0, 0, 0), target=to_us)  # noqa: E731
+        await stream(3.0, stop, 0.05)
         assert math.hypot(*velocity(session)) < 0.15
         tilt = math.radians(6.0)
         q = (math.cos(0.5 * tilt), math.sin(0.5 * tilt), 0.0, 0.0)  # a roll to the right, heading 0
@@ -147,6 +149,12 @@ def test_a_station_wins_over_a_client_and_its_stream_is_not_obeyed_any_more(auto
         for values, told in ((slower, "while a client is in control"), (flat, "serve.max_accel")):
             with pytest.raises(ChangeRefusedError, match=told):
                 session.changes.change(values, "a test")
+        ground.command(192, -1, 1)  # DO_REPOSITION
+        await stream(0.5, lambda _: script.local(ALL, begin))
+        if autopilot == "ardupilot":  # it would fly there in the mode of our setpoints
+            assert ground.of("COMMAND_ACK")[-1].result == REJECTED
+            assert "is in control; change the mode first" in " ".join(ground.texts())
+            assert session.control.in_control
         ground.command(*land)
         await stream(1.5, lambda _: script.local(ALL, begin))
         session.changes.change(slower, "a test")  # nobody is in control

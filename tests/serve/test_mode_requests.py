@@ -16,8 +16,15 @@ from companion.mavlink.messages import CRC_EXTRA
 from companion.recording import recorder
 from companion.serve.control import ServedControl
 from companion.serve.flight_records import FlightRecords
-from companion.serve.mode_requests import asks_for_control, starves_control
+from companion.serve.mode_requests import (
+    asks_for_control,
+    starves_control,
+    steers_in_our_mode,
+)
+from companion.serve.network.addresses import Address
 from companion.serve.network.network import Network
+from companion.serve.programs import Program, Programs
+from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.px4.autopilot import Px4
 
 
@@ -32,6 +39,59 @@ def test_a_number_that_is_none_asks_for_nothing(number):
     assert not asks_for_control(command(176, number, 6.0, 0.0), Px4())
     assert starves_control(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
     assert not starves_control(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
+
+
+def framed(message):
+    return FrameScanner(CRC_EXTRA).feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
+
+
+@pytest.mark.parametrize(
+    ("frame", "asks"),
+    [
+        (command(176, 1.0, 6.0, 3.0), True),
+        (command(176, 1.0, 6.7, math.nan), True),
+        (command(176, 129.0, 262.0, 0.0), True),
+        (command(176, 1.0, 4.0, 3.0), False),
+        (command(92, 1.0, 0.0, 0.0), True),
+        (command(92, 0.0, 0.0, 0.0), False),
+        (framed(dialect.MAVLink_set_mode_message(1, 1, 6 << 16)), True),
+        (framed(dialect.MAVLink_set_mode_message(1, 1, 2 << 24 | 6 << 16 | 5)), True),
+        (framed(dialect.MAVLink_set_mode_message(1, 1, 3 << 24 | 4 << 16)), False),
+    ],
+)
+def test_all_that_px4_takes_for_offboard_asks_for_control(frame, asks):
+    assert asks_for_control(frame, Px4()) is asks
+
+
+@pytest.mark.parametrize(
+    ("frame", "steers"),
+    [
+        (command(192, -1.0, 1.0, 0.0), True),
+        (command(176, 1.0, 6.0, 0.0), False),
+        (framed(dialect.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 2, 1, *[0] * 7)), True),
+        (framed(dialect.MAVLink_mission_item_message(1, 1, 0, 6, 16, 3, 1, *[0] * 7)), True),
+        (framed(dialect.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 1, 1, *[0] * 7)), False),
+        (framed(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)), False),
+    ],
+)
+def test_what_ardupilot_would_fly_to_in_guided(frame, steers):
+    assert steers_in_our_mode(frame, ArduPilot()) is steers
+    assert not steers_in_our_mode(frame, Px4())
+
+
+def test_a_command_under_another_component_id_is_of_the_program_that_was_heard_last():
+    client, other = object(), object()
+    programs, asked = Programs(), command(176, 1.0, 6.0, 0.0)
+    assert programs.asking(client, asked) == Program(client, Address(255, 190))
+    for component, request in ((5, "old"), (6, "newest")):
+        programs.keep(Program(client, Address(255, component)), request)
+    programs.keep(Program(other, Address(255, 190)), "of another")
+    found = programs.asking(client, asked)
+    assert programs.newest(found) == "newest"
+    for number in range(40):
+        programs.keep(Program(other, Address(1, number)), "many")
+    with pytest.raises(KeyError):
+        programs.newest(found)
 
 
 def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():

@@ -6,12 +6,15 @@ import random
 import numpy as np
 import pytest
 
+from companion.guidance.reference import VehicleMotion
+from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 SPEED, ACCELERATION, JERK, CLIMB, DESCENT, YAW_RATE, TIMEOUT = 5.0, 4.0, 12.0, 2.0, 1.0, 1.0, 0.5
 LIMITS = MotionLimits(SPEED, ACCELERATION, JERK, CLIMB, DESCENT, YAW_RATE, TIMEOUT)
 ORIGIN = (0.0, 0.0, 0.0)
+STILL = VehicleMotion(ORIGIN, ORIGIN)
 
 
 def begun(position=ORIGIN, velocity=ORIGIN, heading=0.0):
@@ -57,7 +60,7 @@ def assert_within_limits(positions, velocities, accelerations, step=0.01, slack=
 def test_a_jump_of_the_position_becomes_a_straight_motion_within_limits(angle):
     motion = begun()
     goal = (30.0 * math.cos(angle), 30.0 * math.sin(angle), -6.0)
-    motion.command(request(goal), 0.0, ORIGIN)
+    motion.command(request(goal), 0.0, STILL)
     _, positions, velocities, accelerations = states(motion, 0.0, 20.0)
     assert_within_limits(positions, velocities, accelerations)
     assert positions[-1] == pytest.approx(goal, abs=1e-6)
@@ -69,9 +72,9 @@ def test_a_jump_of_the_position_becomes_a_straight_motion_within_limits(angle):
 
 def test_the_same_setpoint_again_changes_nothing():
     once, often = begun(), begun()
-    once.command(request((10.0, -5.0, -3.0)), 0.0, ORIGIN)
+    once.command(request((10.0, -5.0, -3.0)), 0.0, STILL)
     for number in range(100):
-        often.command(request((10.0, -5.0, -3.0)), 0.05 * number, ORIGIN)
+        often.command(request((10.0, -5.0, -3.0)), 0.05 * number, STILL)
     assert states(often, 5.0, 6.0)[1] == pytest.approx(states(once, 5.0, 6.0)[1], abs=1e-12)
 
 
@@ -81,7 +84,7 @@ def test_a_new_goal_on_the_way_turns_without_a_jump():
     rows, now = [], 0.0
     for _ in range(60):
         goal = tuple(rng.uniform(-20.0, 20.0) for _ in range(3))
-        motion.command(request(goal), now, ORIGIN)
+        motion.command(request(goal), now, STILL)
         rows.append(states(motion, now, now + 0.6))
         now += 0.6
     positions, velocities, accelerations = (
@@ -94,7 +97,7 @@ def test_a_new_goal_on_the_way_turns_without_a_jump():
 
 def test_a_commanded_velocity_is_reached_within_limits_and_kept():
     motion = begun()
-    motion.command(request(velocity=(3.0, -2.0, -1.0)), 0.0, ORIGIN)
+    motion.command(request(velocity=(3.0, -2.0, -1.0)), 0.0, STILL)
     _, positions, velocities, accelerations = states(motion, 0.0, 5.0)
     assert_within_limits(positions, velocities, accelerations)
     assert velocities[-1] == pytest.approx((3.0, -2.0, -1.0), abs=1e-9)
@@ -104,7 +107,7 @@ def test_a_commanded_velocity_is_reached_within_limits_and_kept():
 def test_a_height_is_held_while_a_velocity_is_commanded():
     motion = begun((0.0, 0.0, -5.0))
     mixed = MotionRequest(AxisDemand(None, (2.0, 0.0), None), AxisDemand((-8.0,), None, None), 0, 0)
-    motion.command(mixed, 0.0, (0.0, 0.0, -5.0))
+    motion.command(mixed, 0.0, VehicleMotion((0.0, 0.0, -5.0), ORIGIN))
     end = motion.reference(10.0)
     assert end.velocity_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-9)
     assert end.position_ned[2] == pytest.approx(-8.0)
@@ -112,7 +115,7 @@ def test_a_height_is_held_while_a_velocity_is_commanded():
 
 def test_a_commanded_acceleration_is_flown_as_it_is():
     motion = begun(velocity=(1.0, 0.0, 0.0))
-    motion.command(request(acceleration=(0.5, -0.25, 0.125)), 0.0, ORIGIN)
+    motion.command(request(acceleration=(0.5, -0.25, 0.125)), 0.0, STILL)
     reference = motion.reference(0.4)
     assert reference.acceleration_ned == (0.5, -0.25, 0.125)
 
@@ -135,7 +138,7 @@ def test_a_stream_of_a_circle_is_flown_as_it_is(period):
     worst = [0.0, 0.0, 0.0]
     for number in range(round(4.0 / period)):
         now = number * period
-        motion.command(request(*circle(now), yaw=0.3 * now), now, circle(now)[0])
+        motion.command(request(*circle(now), yaw=0.3 * now), now, VehicleMotion(*circle(now)[:2]))
         for ahead in (0.0, 0.5 * period, 0.1) if now > 0.5 else ():
             reference = motion.reference(now + ahead)
             truth = circle(now + ahead)
@@ -154,7 +157,7 @@ def test_a_stream_of_positions_and_velocities_has_its_acceleration_estimated():
     motion = begun(position, velocity)
     for number in range(100):
         now = 0.02 * number
-        motion.command(request(*circle(now)[:2]), now, circle(now)[0])
+        motion.command(request(*circle(now)[:2]), now, VehicleMotion(*circle(now)[:2]))
     found, truth = motion.reference(now + 0.05), circle(now + 0.05)
     assert math.dist(found.position_ned, truth[0]) < 0.02
     assert math.dist(found.acceleration_ned, truth[2]) < 0.6
@@ -166,7 +169,7 @@ def test_a_stream_that_begins_elsewhere_is_joined_within_limits():
     for number in range(400):
         now = 0.02 * number
         position, velocity, acceleration = circle(now, radius=10.0, speed=2.0)
-        motion.command(request(position, velocity, acceleration), now, ORIGIN)
+        motion.command(request(position, velocity, acceleration), now, STILL)
         rows.append(motion.reference(now))
     velocities = np.array([row.velocity_ned for row in rows])
     positions = np.array([row.position_ned for row in rows])
@@ -182,7 +185,7 @@ def test_a_frozen_stream_that_is_repeated_for_ever_stops_at_its_last_position():
     furthest = 0.0
     for number in range(200):
         now = 0.05 * number
-        motion.command(frozen, now, ORIGIN)
+        motion.command(frozen, now, STILL)
         furthest = max(furthest, motion.reference(now).position_ned[0])
     end = motion.reference(now)
     assert end.position_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
@@ -197,7 +200,7 @@ def test_the_first_point_of_a_circle_that_is_repeated_for_ever_does_not_run_away
     furthest = 0.0
     for number in range(200):
         now = 0.05 * number
-        motion.command(frozen, now, ORIGIN)
+        motion.command(frozen, now, STILL)
         furthest = max(furthest, abs(motion.reference(now).position_ned[1]))
     end = motion.reference(now)
     assert end.position_ned == pytest.approx((2.0, 0.0, 0.0), abs=1e-3)
@@ -207,8 +210,8 @@ def test_the_first_point_of_a_circle_that_is_repeated_for_ever_does_not_run_away
 
 def test_stopping_comes_to_rest_within_limits():
     motion = begun(velocity=(4.0, 0.0, -1.0))
-    motion.command(request(velocity=(4.0, 0.0, -1.0)), 0.0, ORIGIN)
-    motion.stop(1.0)
+    motion.command(request(velocity=(4.0, 0.0, -1.0)), 0.0, STILL)
+    motion.stop(1.0, VehicleMotion((4.0, 0.0, -1.0), (4.0, 0.0, -1.0)))
     _, positions, velocities, accelerations = states(motion, 1.0, 6.0)
     assert_within_limits(positions, velocities, accelerations)
     assert velocities[-1] == pytest.approx(ORIGIN, abs=1e-9)
@@ -217,7 +220,7 @@ def test_stopping_comes_to_rest_within_limits():
 @pytest.mark.parametrize(("start", "yaw"), [(0.0, 3.0), (3.0, -3.0), (-3.0, 3.0), (9.0, 0.0)])
 def test_a_yaw_is_turned_to_the_short_way_at_a_limited_rate(start, yaw):
     motion = begun(heading=start)
-    motion.command(request(ORIGIN, yaw=yaw), 0.0, ORIGIN)
+    motion.command(request(ORIGIN, yaw=yaw), 0.0, STILL)
     headings = [motion.reference(0.01 * number).heading for number in range(800)]
     rates = np.diff(headings) / 0.01
     assert np.abs(rates).max() <= YAW_RATE + 1e-6
@@ -227,9 +230,9 @@ def test_a_yaw_is_turned_to_the_short_way_at_a_limited_rate(start, yaw):
 
 def test_a_yaw_rate_turns_and_no_yaw_holds_the_heading():
     motion = begun(heading=1.0)
-    motion.command(request(ORIGIN, yaw_rate=0.5), 0.0, ORIGIN)
+    motion.command(request(ORIGIN, yaw_rate=0.5), 0.0, STILL)
     assert motion.reference(4.0).heading_rate == pytest.approx(0.5)
-    motion.command(request(ORIGIN), 4.0, ORIGIN)
+    motion.command(request(ORIGIN), 4.0, STILL)
     assert motion.reference(8.0).heading_rate == pytest.approx(0.0)
     assert motion.reference(8.0).heading == pytest.approx(motion.reference(7.0).heading)
 
@@ -239,8 +242,42 @@ def test_without_a_position_the_reference_does_not_run_away_from_the_vehicle():
     motion = begun()
     for number in range(400):
         now = 0.05 * number
-        motion.command(request(velocity=(3.0 + 1e-6 * number, 0.0, 0.0)), now, ORIGIN)
+        motion.command(request(velocity=(3.0 + 1e-6 * number, 0.0, 0.0)), now, STILL)
     assert motion.reference(now).position_ned[0] < 2.0
+
+
+def test_an_acceleration_beside_a_repeated_velocity_ends_with_the_timeout():
+    motion, moving = begun(), VehicleMotion(ORIGIN, (3.0, 0.0, 0.0))
+    frozen = request(velocity=(3.0, 0.0, 0.0), acceleration=(2.0, 0.0, 0.0))
+    for number in range(200):
+        motion.command(frozen, 0.05 * number, moving)
+    assert motion.reference(10.0).velocity_ned == pytest.approx((3.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_reference_that_ran_away_from_the_vehicle_is_not_chased_when_the_client_is_silent():
+    motion = begun()
+    rising = request(acceleration=(90.0, 0.0, 0.0))
+    for number in range(100):
+        motion.command(rising, 0.02 * number, STILL)
+        assert motion.reference(0.02 * number).velocity_ned[0] < 5.0
+    for number in range(100):
+        fast = 30.0 * 0.02 * number
+        motion.command(request((fast, 0.0, 0.0), (30.0, 0.0, 0.0)), 2.0 + 0.02 * number, STILL)
+    motion.stop(4.0, STILL)
+    _, positions, *_ = states(motion, 4.0, 8.0)
+    assert np.abs(positions).max() < 1e-6
+
+
+def test_a_request_without_a_motion_changes_nothing():
+    motion = begun()
+    motion.command(request((1.0, 2.0, -3.0)), 0.0, STILL)
+    before = [motion.reference(0.5 * number) for number in range(20)]
+    wild = MotionRequest(
+        AxisDemand((9.0, 9.0), None, None), AxisDemand((math.nan,), None, None), None, None
+    )
+    with pytest.raises(UnplannableError):
+        motion.command(wild, 0.0, STILL)
+    assert [motion.reference(0.5 * number) for number in range(20)] == before
 
 
 def test_any_sequence_of_requests_gives_finite_references():
@@ -258,7 +295,7 @@ def test_any_sequence_of_requests_gives_finite_references():
             velocity = [0.0, 0.0, 0.0]
         yaw = rng.choice((None, rng.uniform(-6.0, 6.0)))
         rate = rng.choice((None, rng.uniform(-3.0, 3.0)))
-        motion.command(request(position, velocity, acceleration, yaw, rate), now, ORIGIN)
+        motion.command(request(position, velocity, acceleration, yaw, rate), now, STILL)
         reference = motion.reference(now + rng.random())
         values = (*reference.position_ned, *reference.velocity_ned, *reference.acceleration_ned)
         assert all(map(math.isfinite, (*values, reference.heading, reference.heading_rate)))

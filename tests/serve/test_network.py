@@ -169,6 +169,28 @@ def test_samples_are_answered_before_anything_is_forwarded(run):
     run(scene())
 
 
+def test_the_attitude_of_another_vehicle_or_component_is_not_ours(run):
+    """Setpoints in body frames turn by the yaw of the autopilot, whoever else is on its link."""
+
+    async def scene():
+        async with network() as (net, link, _):
+            (ours,) = frames_of(attitude(4))
+            link._inbox.receive(ours, 0)
+            kept = net.attitude
+            assert kept
+            for ids in ((1, 154), (2, 1)):
+                other = dialect.MAVLink(None, *ids)
+                link._inbox.receive(
+                    dialect.MAVLink_attitude_quaternion_message(
+                        8, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+                    ).pack(other),
+                    0,
+                )
+                assert net.attitude is kept
+
+    run(scene())
+
+
 def test_telemetry_waits_for_the_next_sample_or_4_ms(run):
     async def scene():
         async with network() as (net, _, vehicle):

@@ -41,6 +41,20 @@ def test_one_setpoint_alone_is_no_stream(ownership):
     assert not ownership.streams("a", 2.1)
 
 
+def test_a_setpoint_that_cannot_be_flown_keeps_nobody_live(ownership):
+    ownership.setpoint("a", 0.0)
+    ownership.ask("a", 0.1)
+    for number in range(10):
+        now = 0.2 + 0.1 * number
+        assert ownership.setpoint("a", now) is None
+        ownership.withdraw("a", "a")
+    assert ownership.control(now) is Control.HOLDING
+    before = ownership.owner
+    assert ownership.setpoint("b", now) is None
+    ownership.withdraw("b", before)
+    assert ownership.owner == "a"
+
+
 def test_setpoints_without_asking_give_no_control(ownership):
     stream(ownership, "a", 0.0, 1.0)
     assert ownership.control(1.0) is Control.FREE

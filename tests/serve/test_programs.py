@@ -76,6 +76,8 @@ def test_mavsdk_flies_by_setpoints_and_mavproxy_uploads_a_mission_and_wins(tmp_p
     assert report["lost_to"] == "RETURN_TO_LAUNCH"
     assert "took over: mode AUTO.RTL" in served.said
     assert received >= PARAMETERS
+    (page,) = tmp_path.glob("flights/*/report.html")
+    assert f"Report: {page}" in "".join(served.said.split("\n"))
     counters = served.counters
     assert counters["routing"]["looped"] == counters["uplink"]["dropped"] == 0
     assert {each["dropped"] for each in counters["clients"].values()} == {0}

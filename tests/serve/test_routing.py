@@ -1,6 +1,7 @@
 """The routing rules of the MAVLink guide, on channels in memory."""
 
 import random
+from itertools import pairwise
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -223,6 +224,17 @@ def test_a_sender_without_running_numbers_is_heard_each_time(net):
         net.now += 1.0
         net.routing.from_client(net.ground, heartbeat(GROUND, 0))
     assert len(net.vehicle.heard) == 5
+
+
+def test_a_stream_without_running_numbers_is_never_silent_for_long(net):
+    """At 10 Hz, its setpoints are older than serve.setpoint_timeout_ms at no time."""
+    passed = []
+    for number in range(100):
+        net.now += 0.1
+        before = len(net.vehicle.heard)
+        net.routing.from_client(net.ground, heartbeat(GROUND, 0))
+        passed += [number] * (len(net.vehicle.heard) - before)
+    assert max(b - a for a, b in pairwise(passed)) <= 3
 
 
 def test_the_same_frame_later_from_another_client_is_no_repetition(net):

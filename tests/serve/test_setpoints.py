@@ -101,7 +101,6 @@ def test_every_mask_in_every_local_frame(frame):
                 assert vertical == pytest.approx((values[2],), abs=1e-5)
         assert request.yaw == (None if mask & 1024 else pytest.approx(YAW))
         assert request.yaw_rate == (None if mask & 2048 else pytest.approx(YAW_RATE))
-        assert request.time_boot_ms == 1234
     assert flown == (40 if frame == BODY else 180)
 
 

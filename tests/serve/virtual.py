@@ -10,9 +10,6 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion import testing
 from companion.config.files import changed, load
-from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
-from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
 from tests.flight.fly import QuickVehicle, attitude_rate_hz
 
@@ -21,8 +18,8 @@ MAVLINK_2 = 0xFD
 POSITION, VELOCITY, ALL = 0x0DF8, 0x0DC7, 0x0C00
 
 
-def mock(autopilot, **settings):
-    return QuickVehicle(lockstep=False, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
+def mock(autopilot, *, lockstep=False, **settings):
+    return QuickVehicle(lockstep=lockstep, config=CONFIGS / f"mock-{autopilot}.yaml", **settings)
 
 
 UNREAD = {
@@ -46,37 +43,13 @@ def read(data):
     return kept
 
 
-class MemoryClient(Client):
-    """A client without a socket."""
-
-    def __init__(self, name="script", ids=(245, 190), host="127.0.0.1"):
-        super().__init__(name, host=host, streaming=False)
-        self.ids, self.heard = ids, []
-        self.mav = dialect.MAVLink(None, *ids)
-        self._parser = dialect.MAVLink(None)
-        self._parser.robust_parsing = True
+class MemoryClient(testing.Program):
+    """A program that says what the tests need, and reads what they look at."""
 
     def _flush(self):
         while self._waiting:
             data, _ = self._take(100_000)
             self.heard += self._parser.parse_buffer(read(data)) or ()
-
-    def connect(self, session):
-        self.session = session
-        session.network.attach(self)
-        return self
-
-    def send(self, message):
-        raw = message.pack(self.mav)
-        self.mav.seq = (self.mav.seq + 1) & 0xFF
-        self.session.network.received(self, FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw))
-
-    def of(self, name):
-        return [each for each in self.heard if each.get_type() == name]
-
-    async def hears(self, name):
-        while not self.of(name):  # noqa: ASYNC110  telemetry sets no events
-            await asyncio.sleep(0.05)
 
     def texts(self):
         """What our component said; the pieces of long texts joined."""
@@ -160,28 +133,19 @@ async def begin_control(session, script, autopilot, hold):
 async def serving(
     vehicle, autopilot, notes=None, directory=None, **serve
 ) -> AsyncIterator[ServeSession]:
-    """A session over the vehicle in memory; nobody listens at sockets."""
+    """A session over the vehicle in memory."""
     config = changed(
         load(CONFIGS / f"mock-{autopilot}.yaml"),
         {
-            "link": {"lockstep": False, "attitude_rate_hz": attitude_rate_hz(vehicle)},
+            "link": {"attitude_rate_hz": attitude_rate_hz(vehicle)},
             "limits": {"max_tilt_deg": 45.0},
-            "serve": {"clients": (), **serve},
+            "serve": serve,
         },
         "the test",
     )
-    notes = [] if notes is None else notes
-    session = ServeSession(config, notes.append, None, testing.environment, directory)
-    running = asyncio.ensure_future(session.run())
-    while session.network is None:
-        await asyncio.sleep(0.01)
-        if running.done():
-            running.result()
-    try:
+    note = (lambda _: None) if notes is None else notes.append
+    async with testing.serving(config, vehicle, directory, note) as session:
         yield session
-    finally:
-        session.stop()
-        await running
 
 
 async def airborne(session, vehicle, autopilot, height=5.0):

@@ -7,7 +7,7 @@ import logging
 import socket
 import struct
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
@@ -35,17 +35,40 @@ async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTranspor
         EndpointError: The port is in use, the host is unknown, the address is not that of an
             interface of this computer, or there is no permission.
     """
-    loop = asyncio.get_running_loop()
+    return UdpTransport(endpoint, await udp_address(endpoint), receiver)
+
+
+class UdpAddress(NamedTuple):
+    """Where an endpoint is.
+
+    Attributes:
+        family: of the socket.
+        address: to bind or to send to, as sockets take it.
+        named: the senders that the endpoint names.
+    """
+
+    family: socket.AddressFamily
+    address: Any
+    named: NamedPeers
+
+
+async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
+    """Look up the host of an endpoint, and the peers that it names.
+
+    Raises:
+        EndpointError: A host name is unknown.
+    """
+    loop, kind = asyncio.get_running_loop(), socket.SOCK_DGRAM
     try:
-        found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=socket.SOCK_DGRAM)
+        found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=kind)
     except OSError as error:
         raise EndpointError(
             f"host {endpoint.host!r} is unknown ({error.strerror}); check the name or use its "
             "IP address"
         ) from error
     family, _, _, _, address = found[0]
-    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), socket.SOCK_DGRAM)
-    return UdpTransport(endpoint, family, address, receiver, named)
+    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
+    return UdpAddress(family, address, named)
 
 
 class UdpTransport:
@@ -70,13 +93,11 @@ class UdpTransport:
     def __init__(
         self,
         endpoint: UdpIn | UdpOut,
-        family: socket.AddressFamily,
-        address: tuple[str, int] | tuple[str, int, int, int] | tuple[int, bytes],
+        at: UdpAddress,
         receiver: Receiver,
-        named: NamedPeers,
     ) -> None:
-        self._endpoint, self._family, self._address = endpoint, family, address
-        self._receiver, self._named = receiver, named
+        self._endpoint, self._receiver = endpoint, receiver
+        self._family, self._address, self._named = at
         self._loop = asyncio.get_running_loop()
         self._heard = False
         self._connected = False

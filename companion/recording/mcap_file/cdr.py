@@ -86,12 +86,18 @@ ALARM = _type(
     "float64 time_s\n# 1: raised, 0: over.\nfloat64 raised\nstring monitor\nstring reason\n"
     "# What the flight does about it.\nstring action\n",
 )
+CHANGE = _type(
+    f"{PACKAGE}/Change",
+    "# Values of the configuration begin to change in flight.\n# When, on our clock, s.\n"
+    "float64 time_s\n# 1: at once, 0: slewed.\nfloat64 at_once\n"
+    "# The new values as JSON, by section and key.\nstring values\n",
+)
 Pose = tuple[float, float, float, float, float, float, float]
 """Position x, y, z (m) and orientation x, y, z, w."""
 
 
 def words_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
-    """A message of float64 fields and then strings, as PHASE, MANEUVER and ALARM are."""
+    """A message of float64 fields and then strings, as PHASE, MANEUVER, ALARM and CHANGE are."""
     message = bytearray(struct.pack(f"<4s{len(numbers)}d", CDR, *numbers))
     for text in texts:
         _add_string(message, text)

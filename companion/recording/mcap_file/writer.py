@@ -13,6 +13,7 @@ WORDS = {
     "/phase": cdr.PHASE,
     "/maneuver": cdr.MANEUVER,
     "/alarm": cdr.ALARM,
+    "/change": cdr.CHANGE,
     "/log": cdr.LOG,
     "/tf": cdr.FRAME_TRANSFORM,
     "/pose": cdr.POSE_IN_FRAME,

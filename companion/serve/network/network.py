@@ -7,6 +7,7 @@ within `_LONGEST_WAIT`.
 
 import asyncio
 from collections.abc import Callable, Iterable
+from math import inf
 
 from companion.mavlink.codec import ATTITUDE_QUATERNION
 from companion.mavlink.errors import EndpointError
@@ -20,7 +21,7 @@ from companion.mavlink.transport.endpoint import (
     parse_endpoint,
 )
 from companion.safety.actions import internal
-from companion.serve.network.addresses import Address
+from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.network.routing import Routing
 from companion.serve.network.serial_line import SerialLine
@@ -51,7 +52,8 @@ class Network:
         routing: the rules and their counters; takes hooks for setpoints and for our component.
         uplink: the clients' frames on their way to the vehicle.
         ports: the open endpoints, in their order.
-        attitude: payload of the newest ATTITUDE_QUATERNION; empty before the first.
+        attitude: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
+        attitude_at: when it came, s on our clock.
         overflowed: frames of the vehicle that were dropped after a stall.
     """
 
@@ -60,16 +62,18 @@ class Network:
     ) -> None:
         settings, self._loop = link.settings, asyncio.get_running_loop()
         clock = self._loop.time
+        self._autopilot = Address(settings.target_system, settings.target_component)
         rate, burst = uplink_rate(parse_endpoint(settings.endpoint))
         self.uplink = Uplink(link.forward, rate, burst, clock)
         self.routing = Routing(
             self.uplink,
-            Address(settings.target_system, settings.target_component),
+            self._autopilot,
             Address(settings.source_system, settings.source_component),
             clock,
         )
         self.ports: list[Port] = []
         self.attitude = b""
+        self.attitude_at = -inf
         self.overflowed = 0
         self._link, self._note_event = link, note
         self._faults: set[str] = set()
@@ -161,8 +165,8 @@ class Network:
             self.overflowed += 1
             return
         self._noted.append(frame)
-        if frame.message_id == ATTITUDE_QUATERNION:
-            self.attitude = frame.payload
+        if frame.message_id == ATTITUDE_QUATERNION and source_of(frame) == self._autopilot:
+            self.attitude, self.attitude_at = frame.payload, self._loop.time()
             if self._soon is None:
                 self._soon = self._loop.call_soon(self.flush)
         elif self._timer is None:

@@ -15,7 +15,6 @@ from companion.serve.network.client import Client
 _READING = frozenset(
     {
         dialect.MAVLINK_MSG_ID_HEARTBEAT,
-        dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
         dialect.MAVLINK_MSG_ID_PING,
         dialect.MAVLINK_MSG_ID_TIMESYNC,
         dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
@@ -23,6 +22,7 @@ _READING = frozenset(
         dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST,
         dialect.MAVLINK_MSG_ID_MISSION_REQUEST,
         dialect.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+        dialect.MAVLINK_MSG_ID_MISSION_ACK,
         dialect.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
         dialect.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
         dialect.MAVLINK_MSG_ID_LOG_REQUEST_END,

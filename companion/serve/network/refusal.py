@@ -2,6 +2,8 @@
 
 import errno
 
+from companion.mavlink.errors import EndpointError
+
 _HINTS = {
     errno.EADDRINUSE: "the port is in use by another program; end it or choose another port",
     errno.EACCES: "not permitted; use a port of 1024 or above",
@@ -10,7 +12,10 @@ _HINTS = {
 }
 
 
-def refusal(where: str, error: OSError) -> str:
+def refusal(where: str, error: OSError | EndpointError) -> str:
     """The message for an endpoint of `serve.clients` that cannot be opened."""
-    hint = _HINTS.get(error.errno or 0, error.strerror or str(error))
+    if isinstance(error, EndpointError):
+        hint = str(error)
+    else:
+        hint = _HINTS.get(error.errno or 0, error.strerror or str(error))
     return f"serve.clients: {where}: {hint}"

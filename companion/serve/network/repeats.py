@@ -1,9 +1,10 @@
 """Frames that come back: a client may return what it hears, directly or by way of another one."""
 
+from collections import OrderedDict
 from collections.abc import Callable
 
 _WITHIN = 0.2
-"""A frame that is identical to one of the last so many s is a repetition, s."""
+"""A frame that is identical to one that was passed on less than this ago is a repetition, s."""
 _MOST = 4096
 """Largest number of frames remembered; of a flood, only the newest are."""
 
@@ -11,8 +12,8 @@ _MOST = 4096
 class Repeats:
     """Finds frames that came before, on whatever channel.
 
-    A frame's running number and checksum make it differ from its sender's next 255. A sender
-    without running numbers is heard at most every 0.2 s with the same content.
+    A frame's running number and checksum make it differ from its sender's next 255. Of a sender
+    without running numbers, the same content is passed on once in 0.2 s.
 
     Args:
         clock: our clock, s.
@@ -20,17 +21,16 @@ class Repeats:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self._newer: set[bytes] = set()
-        self._older: set[bytes] = set()
-        self._since = clock()
+        self._passed: OrderedDict[bytes, float] = OrderedDict()
 
     def is_repeat(self, raw: bytes) -> bool:
-        """Whether these bytes came just before; remembers them."""
-        age = self._clock() - self._since
-        if age > _WITHIN or len(self._newer) >= _MOST // 2:
-            self._older = set() if age > 2.0 * _WITHIN else self._newer
-            self._newer, self._since = set(), self._since + age
-        if raw in self._newer or raw in self._older:
+        """Whether these bytes were passed on just before; if not, remembers them."""
+        now, passed = self._clock(), self._passed
+        at = passed.pop(raw, None)
+        if at is not None and now - at <= _WITHIN:
+            passed[raw] = at
             return True
-        self._newer.add(raw)
+        passed[raw] = now
+        while len(passed) > _MOST:
+            passed.popitem(last=False)
         return False

@@ -5,8 +5,9 @@ import socket
 from typing import Any
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import NamedPeers, host_and_port, plain_host, resolve
+from companion.mavlink.peer import NamedPeers, host_and_port, plain_host
 from companion.mavlink.transport.endpoint import UdpIn, UdpOut
+from companion.mavlink.transport.udp import udp_address
 from companion.serve.network.client import Client, Clients, Flood
 from companion.serve.network.refusal import refusal
 
@@ -26,17 +27,11 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: Clients) -> "UdpPort":
     Raises:
         EndpointError: port in use, host unknown, no permission.
     """
-    loop = asyncio.get_running_loop()
     where = f"UDP {endpoint.host}:{endpoint.port}"
     try:
-        found = await loop.getaddrinfo(endpoint.host, endpoint.port, type=socket.SOCK_DGRAM)
-    except OSError as error:
-        raise EndpointError(
-            f"serve.clients: {where}: host unknown ({error.strerror}); check the name or use its "
-            "IP address"
-        ) from error
-    family, _, _, _, address = found[0]
-    named = await resolve(endpoint.peers if isinstance(endpoint, UdpIn) else (), socket.SOCK_DGRAM)
+        family, address, named = await udp_address(endpoint)
+    except EndpointError as error:
+        raise EndpointError(refusal(where, error)) from error
     opened = socket.socket(family, socket.SOCK_DGRAM)
     opened.setblocking(False)
     try:

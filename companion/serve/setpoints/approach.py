@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ruckig import ControlInterface, InputParameter, Ruckig, Trajectory
+from ruckig import ControlInterface, InputParameter, Ruckig, RuckigError, Trajectory
 
 Values = tuple[float, ...]
 
@@ -68,7 +68,8 @@ class Approach:
         self._trajectory = Trajectory(axes)
         try:
             result = Ruckig(axes).calculate(given, self._trajectory)
-        except (RuntimeError, ValueError) as refusal:  # of a Result that its enumeration lacks
+        # A ValueError comes of a Result that Ruckig's enumeration lacks.
+        except (RuckigError, RuntimeError, ValueError) as refusal:
             raise _unplannable(refusal) from refusal
         if int(result) < 0:
             raise _unplannable(result)
@@ -82,5 +83,5 @@ class Approach:
 
 def _unplannable(solver: object) -> UnplannableError:
     return UnplannableError(
-        f"no motion within the limits leads to this setpoint (solver: {solver})"
+        f"no motion within the limits leads to this setpoint ({' '.join(str(solver).split())})"
     )

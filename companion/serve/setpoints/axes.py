@@ -1,30 +1,32 @@
 """Some axes that follow what is commanded: a stream as it is, a jump by a motion within limits.
 
-The commanded state moves on between setpoints (`_Carrier`). Where it jumps, the difference between
+The commanded state moves on between setpoints (`Carrier`). Where it jumps, the difference between
 the state so far and the commanded one becomes an error, which a jerk-limited motion brings to zero
 (`Approach`). The state is the sum of both.
 """
 
 from collections.abc import Sequence
-from math import hypot
+from math import hypot, inf
 from typing import NamedTuple
 
 from companion.attitude.rotation import clamp
+from companion.guidance.reference import LARGEST_JERK, change_rate
 from companion.serve.setpoints.approach import Approach, AxisLimits, State, Values
+from companion.serve.setpoints.carrier import Carrier, Moving, far, plus
 from companion.serve.setpoints.request import AxisDemand
 
 _STREAM = 0.25
 """Setpoints that come at this period or faster are a stream, whose derivatives are estimated, s."""
 _SMOOTHING = 0.5
 """Share of a new derivative in its estimate; the rest is the one before."""
-_LARGEST_JERK = 50.0
-"""Largest estimated jerk, m/s³; faster changes of the acceleration are steps."""
 _LARGEST_ACCELERATION = 15.0
-"""The same for the acceleration, m/s²; faster changes of the velocity are jumps."""
+"""Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MOST_BRAKED = 2.0
 """A motion begins with at most this multiple of its largest acceleration."""
 _STRAYED = 1.5
 """Where only velocities or accelerations are commanded, the position may run ahead by this, m."""
+_OUTRUN = 2.0
+"""Where only accelerations are commanded, the velocity may run ahead by this, m/s."""
 
 _LEAST_SHARE = 0.25
 """Share of the limits that is left for an axis across the direction of a motion."""
@@ -40,32 +42,6 @@ class Continuity(NamedTuple):
 
     position: float
     velocity: float
-
-
-class _Carrier(NamedTuple):
-    """The commanded state, continued at a constant jerk from `begins`, s."""
-
-    position: Values
-    velocity: Values
-    acceleration: Values
-    jerk: Values
-    begins: float
-
-    def at(self, time: float) -> State:
-        t = max(0.0, time - self.begins)
-        rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
-        position, velocity, acceleration = zip(
-            *(
-                (
-                    p + t * (v + t * (0.5 * a + t * j / 6.0)),
-                    v + t * (a + 0.5 * t * j),
-                    a + t * j,
-                )
-                for p, v, a, j in rows
-            ),
-            strict=True,
-        )
-        return State(position, velocity, acceleration)
 
 
 class Axes:
@@ -85,12 +61,12 @@ class Axes:
         self._demand: AxisDemand | None = None
         self._given_at = 0.0
         self._approach: Approach | None = None
-        self._carrier = _Carrier(self._zero, self._zero, self._zero, self._zero, 0.0)
+        self._carrier = Carrier(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: State, now: float) -> None:
         """Start from a state, and stop from there until something is commanded."""
         self._demand, self._approach = None, None
-        self._carrier = _Carrier(*state, self._zero, now)
+        self._carrier = Carrier(*state, self._zero, now)
         self.stop(now)
 
     def at(self, time: float) -> State:
@@ -99,50 +75,68 @@ class Axes:
         if self._approach is None:
             return carried
         error = self._approach.at(time)
-        return State(*(_sum(a, b) for a, b in zip(carried, error, strict=True)))
+        return State(*(plus(a, b) for a, b in zip(carried, error, strict=True)))
 
-    def stop(self, now: float) -> None:
-        """Come to rest within limits, and stay there."""
+    def stop(self, now: float, actual: Moving | None = None) -> None:
+        """Come to rest within limits, and stay there.
+
+        Args:
+            now: s.
+            actual: motion of the vehicle; if the state has run away from it, it stops from there.
+        """
+        if actual is not None:
+            current = self.at(now)
+            if far(current.position, actual.position, _STRAYED) or far(
+                current.velocity, actual.velocity, _OUTRUN
+            ):
+                self._demand, self._approach = None, None
+                self._carrier = Carrier(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
 
-    def command(self, demand: AxisDemand, now: float, actual: Values | None = None) -> None:
+    def command(self, demand: AxisDemand, now: float, actual: Moving | None = None) -> None:
         """Follow a new demand.
 
         Args:
             demand: what is commanded now.
             now: s.
-            actual: position of the vehicle; without a commanded position, the state does not run
+            actual: motion of the vehicle; without a commanded position, the state does not run
                 further ahead of it.
 
         Raises:
             UnplannableError: there is no motion to it; the demand before still counts.
         """
         if demand == self._demand:
-            self._end_repetition(demand, now)
+            self._repeat(demand, now, actual)
             return
         current = self.at(now)
         if demand.position is not None:
             self._carry_position(demand, current, now)
         else:
-            self._carry_motion(demand, _near(current, actual), now)
+            self._carry_motion(demand, _near(current, actual, demand), now)
         self._demand, self._given_at = demand, now
 
-    def _end_repetition(self, demand: AxisDemand, now: float) -> None:
-        """Stop at a commanded position that is repeated although it should move."""
-        moving = demand.position is not None and any(
-            (*(demand.velocity or ()), *(demand.acceleration or ()))
-        )
-        if moving and now - self._given_at > self._timeout:
-            resting = AxisDemand(demand.position, None, None)
-            self._carry_position(resting, self.at(now), now)
-            self._given_at = float("inf")
+    def _repeat(self, demand: AxisDemand, now: float, actual: Moving | None) -> None:
+        """Follow a demand that is repeated: its sender may hang, so nothing grows for ever."""
+        if demand.position is demand.velocity is None:
+            self._carry_motion(demand, _near(self.at(now), actual, demand), now)
+            return
+        moving = any(demand.acceleration or ())
+        if demand.position is not None:
+            moving = moving or any(demand.velocity or ())
+        if not moving or now - self._given_at <= self._timeout:
+            return
+        if demand.position is not None:
+            self._carry_position(AxisDemand(demand.position, None, None), self.at(now), now)
+        else:
+            self._carry_motion(AxisDemand(None, demand.velocity, None), self.at(now), now)
+        self._given_at = inf
 
     def _carry_position(self, demand: AxisDemand, current: State, now: float) -> None:
         assert demand.position is not None
         velocity = demand.velocity or self._zero
         acceleration, jerk = self._derivatives(demand, now)
-        carrier = _Carrier(demand.position, velocity, acceleration, jerk, now)
-        error = _difference(current, carrier)
+        carrier = Carrier(demand.position, velocity, acceleration, jerk, now)
+        error = carrier.error_of(current)
         if demand.velocity is not None and self._is_continued(error):
             approach = None
         else:
@@ -152,10 +146,10 @@ class Axes:
     def _carry_motion(self, demand: AxisDemand, current: State, now: float) -> None:
         velocity = current.velocity if demand.velocity is None else demand.velocity
         acceleration = demand.acceleration or self._zero
-        carrier = _Carrier(current.position, velocity, acceleration, self._zero, now)
+        carrier = Carrier(current.position, velocity, acceleration, self._zero, now)
         approach = None
         if demand.velocity is not None:
-            error = _difference(current, carrier)
+            error = carrier.error_of(current)
             approach = self._plan(error, error.velocity, now, by_velocity=True)
         self._carrier, self._approach = carrier, approach
 
@@ -181,16 +175,14 @@ class Axes:
         if not fresh or before is None or demand.velocity is None or before.velocity is None:
             return given or self._zero, self._zero
         if given is None:
-            rate = _rate(before.velocity, demand.velocity, since)
-            if max(map(abs, rate)) > _LARGEST_ACCELERATION:
+            rate = change_rate(before.velocity, demand.velocity, since, _LARGEST_ACCELERATION)
+            if rate is None:
                 return self._zero, self._zero
             return _blend(self._carrier.acceleration, rate), self._zero
         if before.acceleration is None:
             return given, self._zero
-        jerk = _rate(before.acceleration, given, since)
-        if max(map(abs, jerk)) > _LARGEST_JERK:
-            return given, self._zero
-        return given, _blend(self._carrier.jerk, jerk)
+        jerk = change_rate(before.acceleration, given, since, LARGEST_JERK)
+        return given, self._zero if jerk is None else _blend(self._carrier.jerk, jerk)
 
     def _is_continued(self, error: State) -> bool:
         return (
@@ -203,32 +195,17 @@ def _scaled(limits: AxisLimits, share: float) -> AxisLimits:
     return AxisLimits(*(share * each for each in limits))
 
 
-def _near(current: State, actual: Values | None) -> State:
-    """The state, at the vehicle where it has run too far ahead of it."""
-    if actual is None or hypot(*_less(current.position, actual)) <= _STRAYED:
-        return current
-    return current._replace(position=actual)
-
-
-def _difference(current: State, carrier: _Carrier) -> State:
-    return State(
-        _less(current.position, carrier.position),
-        _less(current.velocity, carrier.velocity),
-        _less(current.acceleration, carrier.acceleration),
-    )
-
-
-def _sum(left: Values, right: Values) -> Values:
-    return tuple(a + b for a, b in zip(left, right, strict=True))
-
-
-def _less(left: Values, right: Values) -> Values:
-    return tuple(a - b for a, b in zip(left, right, strict=True))
-
-
-def _rate(old: Values, new: Values, since: float) -> Values:
-    return tuple((b - a) / since for a, b in zip(old, new, strict=True))
-
-
 def _blend(old: Values, new: Values) -> Values:
     return tuple(a + _SMOOTHING * (b - a) for a, b in zip(old, new, strict=True))
+
+
+def _near(current: State, actual: Moving | None, demand: AxisDemand) -> State:
+    """The state, at the vehicle in what is not commanded and has run too far ahead of it."""
+    if actual is None:
+        return current
+    position, velocity, acceleration = current
+    if far(position, actual.position, _STRAYED):
+        position = actual.position
+    if demand.velocity is None and far(velocity, actual.velocity, _OUTRUN):
+        velocity = actual.velocity
+    return State(position, velocity, acceleration)

@@ -1,11 +1,13 @@
 """The reference that follows from a client's requests."""
 
+from copy import copy
 from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
-from companion.guidance.reference import Reference, Vector
-from companion.serve.setpoints.approach import AxisLimits, State
+from companion.guidance.reference import Reference, Vector, VehicleMotion
+from companion.serve.setpoints.approach import AxisLimits, State, UnplannableError
 from companion.serve.setpoints.axes import Axes, Continuity
+from companion.serve.setpoints.carrier import Moving
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
@@ -70,21 +72,28 @@ class CommandedMotion:
         self._heading.begin(State((heading,), (0.0,), (0.0,)), now)
         self._yaw = None
 
-    def command(self, request: MotionRequest, now: float, actual_ned: Vector) -> None:
-        """Follow a request; `actual_ned` is where the vehicle is.
+    def command(self, request: MotionRequest, now: float, actual: VehicleMotion) -> None:
+        """Follow a request; `actual` is the motion of the vehicle.
 
         Raises:
             UnplannableError: there is no motion to it; the request before still counts.
         """
-        north, east, down = actual_ned
-        self._horizontal.command(request.horizontal, now, (north, east))
-        self._vertical.command(request.vertical, now, (down,))
-        self._heading.command(self._turn(request, now), now)
+        before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._yaw
+        horizontal, vertical = _by_axes(actual)
+        try:
+            self._horizontal.command(request.horizontal, now, horizontal)
+            self._vertical.command(request.vertical, now, vertical)
+            self._heading.command(self._turn(request, now), now)
+        except UnplannableError:
+            self._horizontal, self._vertical, self._heading, self._yaw = before
+            raise
 
-    def stop(self, now: float) -> None:
-        """Come to rest within limits, and stay there."""
-        for axes in (self._horizontal, self._vertical, self._heading):
-            axes.stop(now)
+    def stop(self, now: float, actual: VehicleMotion) -> None:
+        """Come to rest within limits, and stay there; `actual` is the motion of the vehicle."""
+        horizontal, vertical = _by_axes(actual)
+        self._horizontal.stop(now, horizontal)
+        self._vertical.stop(now, vertical)
+        self._heading.stop(now)
 
     def reference(self, time: float) -> Reference:
         """The reference at a time, s."""
@@ -114,3 +123,9 @@ class CommandedMotion:
             heading += wrap_angle(request.yaw - heading)
         self._yaw = request.yaw, heading, now
         return AxisDemand((heading,), None if rate is None else (rate,), None)
+
+
+def _by_axes(motion: VehicleMotion) -> tuple[Moving, Moving]:
+    """Horizontal and vertical motion."""
+    (x, y, z), (u, v, w) = motion
+    return Moving((x, y), (u, v)), Moving((z,), (w,))

@@ -82,9 +82,7 @@ def local_target(
     yaw, yaw_rate = _heading(message)
     if frame.body and body_yaw_is_relative and yaw is not None:
         yaw += situation.yaw
-    return _request(
-        message, (position, _turned(velocity, turn), _turned(acceleration, turn)), yaw, yaw_rate
-    )
+    return _request((position, _turned(velocity, turn), _turned(acceleration, turn)), yaw, yaw_rate)
 
 
 def global_target(message: Message, situation: Situation) -> MotionRequest:
@@ -108,7 +106,7 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
             None if value is None else here for value, here in zip(position, place, strict=True)
         )
     yaw, yaw_rate = _heading(message)
-    return _request(message, (position, velocity, acceleration), yaw, yaw_rate)
+    return _request((position, velocity, acceleration), yaw, yaw_rate)
 
 
 _Values = tuple[float | None, ...]
@@ -168,7 +166,6 @@ def _shifted(values: _Values, start: Vector) -> _Values:
 
 
 def _request(
-    message: Message,
     groups: tuple[_Values, _Values, _Values],
     yaw: float | None,
     yaw_rate: float | None,
@@ -178,7 +175,6 @@ def _request(
         _demand(groups, _VERTICAL, "vertical"),
         yaw,
         yaw_rate,
-        message.time_boot_ms,
     )
 
 

@@ -35,14 +35,12 @@ class MotionRequest(NamedTuple):
         vertical: (down,).
         yaw: rad from north; None: as it is, or as `yaw_rate` turns it.
         yaw_rate: rad/s; None: none is commanded.
-        time_boot_ms: the sender's own time stamp, ms.
     """
 
     horizontal: AxisDemand
     vertical: AxisDemand
     yaw: float | None
     yaw_rate: float | None
-    time_boot_ms: int = 0
 
 
 class AttitudeRequest(NamedTuple):

@@ -1,0 +1,51 @@
+"""Leads the values of the loops from one configuration to another in small steps."""
+
+from companion.config import Config
+from companion.control.retuning import Tuning, between, tuning
+
+SLEW = 0.7
+"""Time over which a change takes effect, s."""
+_PERIOD = 0.035
+"""Shortest time between two steps of a change, s; each computes the gains again."""
+
+
+class Slew:
+    """The way from the present values to the wanted ones. Times are s on one clock.
+
+    Args:
+        config: with the present values, which are wanted, too.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._now = self._from = self._wanted = config
+        self._began: float | None = None
+        self._stepped = 0.0
+
+    def jump(self, wanted: Config) -> None:
+        """Be at the wanted values at once: no loop flies, or one that begins takes them."""
+        self._now = self._wanted = wanted
+        self._began = None
+
+    def begin(self, wanted: Config, now: float) -> None:
+        """Begin the way from the present values."""
+        self._from, self._wanted, self._began = self._now, wanted, now
+
+    def stop(self) -> None:
+        """Stay at the present values."""
+        self._began = None
+
+    def step(self, now: float) -> Tuning | None:
+        """The values from now on; None: they stay as they are.
+
+        Raises:
+            ValueError: gains cannot be computed from them.
+        """
+        if self._began is None or now - self._stepped < _PERIOD:
+            return None
+        self._stepped = now
+        share = (now - self._began) / SLEW
+        self._now = between(self._from, self._wanted, share)
+        values = tuning(self._now)
+        if share >= 1.0:
+            self._began = None
+        return values

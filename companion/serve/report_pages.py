@@ -1,0 +1,82 @@
+"""The report pages of served flights, each written by a process of its own."""
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from companion.realtime import schedule_as_usual
+
+_LONGEST = 120.0
+"""Time allowed for one page, s; a small computer needs some ten seconds."""
+_NICE = 19
+"""The process gives way to everything else: the next flight may have begun."""
+_INTERRUPTED = "interrupted"
+
+
+class ReportPages:
+    """Writes pages, one after the other. `write` is called in threads beside the event loop.
+
+    Args:
+        note: takes a sentence that says where a page is, or why there is none.
+    """
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self._note = note
+        self._turn = threading.Lock()
+        self._process: subprocess.Popen[str] | None = None
+        self._left = False
+
+    def write(self, folder: Path) -> None:
+        """Write `report.html` about the flight in `folder`, and wait until it is written."""
+        with self._turn:
+            try:
+                told = f"Report: {self._written(folder)}"
+            except (OSError, RuntimeError) as error:
+                told = f"No report: {error}; `companion report {folder}` tries again"
+            self._note(told)
+
+    def leave(self) -> None:
+        """Write no page any more: the user wants to leave at once."""
+        self._left = True
+        if self._process is not None:
+            self._process.kill()
+
+    def _written(self, folder: Path) -> str:
+        """The path of the page, once the process has written it.
+
+        Raises:
+            OSError: the process cannot be started.
+            RuntimeError: it wrote no page; the message says why.
+        """
+        if self._left:
+            raise RuntimeError(_INTERRUPTED)
+        with subprocess.Popen(
+            [sys.executable, "-m", "companion", "report", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # a Ctrl-C is for the program, which says what becomes of it
+        ) as self._process:
+            _give_way(self._process.pid)
+            try:
+                out, errors = self._process.communicate(timeout=_LONGEST)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                raise RuntimeError(f"it was not written within {_LONGEST:g} s") from None
+        if self._left:
+            raise RuntimeError(_INTERRUPTED)
+        if self._process.returncode != 0:
+            raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
+        return out.strip()
+
+
+def _give_way(pid: int) -> None:
+    """Take the flight's real-time priority from a process, and all but the lowest of its own."""
+    schedule_as_usual(pid)
+    with suppress(ProcessLookupError):  # it has ended already
+        os.setpriority(os.PRIO_PROCESS, pid, _NICE)

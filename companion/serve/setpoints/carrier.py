@@ -1,0 +1,67 @@
+"""A commanded state along some axes, which moves on between two setpoints."""
+
+from math import hypot
+from typing import NamedTuple
+
+from companion.serve.setpoints.approach import State, Values
+
+
+class Moving(NamedTuple):
+    """How the vehicle moves along some axes; SI units.
+
+    Attributes:
+        position: m.
+        velocity: m/s.
+    """
+
+    position: Values
+    velocity: Values
+
+
+class Carrier(NamedTuple):
+    """The commanded state, continued at a constant jerk from `begins`, s."""
+
+    position: Values
+    velocity: Values
+    acceleration: Values
+    jerk: Values
+    begins: float
+
+    def at(self, time: float) -> State:
+        """The state at a time, s."""
+        t = max(0.0, time - self.begins)
+        rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
+        position, velocity, acceleration = zip(
+            *(
+                (
+                    p + t * (v + t * (0.5 * a + t * j / 6.0)),
+                    v + t * (a + 0.5 * t * j),
+                    a + t * j,
+                )
+                for p, v, a, j in rows
+            ),
+            strict=True,
+        )
+        return State(position, velocity, acceleration)
+
+    def error_of(self, state: State) -> State:
+        """How far a state is from the commanded one at `begins`."""
+        return State(
+            _minus(state.position, self.position),
+            _minus(state.velocity, self.velocity),
+            _minus(state.acceleration, self.acceleration),
+        )
+
+
+def plus(left: Values, right: Values) -> Values:
+    """The sum of two vectors."""
+    return tuple(a + b for a, b in zip(left, right, strict=True))
+
+
+def _minus(left: Values, right: Values) -> Values:
+    return tuple(a - b for a, b in zip(left, right, strict=True))
+
+
+def far(left: Values, right: Values, distance: float) -> bool:
+    """Whether two vectors are further apart than `distance`."""
+    return hypot(*_minus(left, right)) > distance

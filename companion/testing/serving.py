@@ -1,0 +1,117 @@
+"""`companion serve` in memory, on the vehicle's clock, and programs that are its clients."""
+
+import asyncio
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from companion.config.files import changed
+from companion.mavlink.framing import FrameScanner
+from companion.mavlink.messages import CRC_EXTRA, Message, dialect
+from companion.serve.network.client import Client
+from companion.serve.session import ServeSession
+from companion.testing.flying import Configuration, environment, in_memory, known
+from companion.testing.vehicle import MockVehicle
+
+_LOOK_PERIOD = 0.02
+
+
+@asynccontextmanager
+async def serving(
+    config: Configuration,
+    vehicle: MockVehicle,
+    folder: Path | None = None,
+    note: Callable[[str], None] = lambda _: None,
+) -> AsyncGenerator[ServeSession, None]:
+    """`companion serve` between a mock vehicle and programs of the test, inside `run`.
+
+    `serve.clients`, `link.endpoint` and `realtime` have no effect, and `link.lockstep` is as the
+    vehicle has it. Clients connect by `Program(...).connect(session)`.
+
+    Args:
+        config: of the vehicle and of `serve`.
+        vehicle: the one that `run` was given.
+        folder: in which each flight under a client's control is recorded in a folder of its own;
+            None: nothing is recorded.
+        note: takes events as sentences.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+    """
+    here = changed(in_memory(known(config), vehicle), {"serve": {"clients": ()}}, "the test")
+    session = ServeSession(here, note, None, environment, folder)
+    running = asyncio.ensure_future(session.run())
+    while session.network is None:
+        await asyncio.sleep(_LOOK_PERIOD)
+        if running.done():
+            running.result()
+    try:
+        yield session
+    finally:
+        session.stop()
+        await running
+
+
+class Program(Client):
+    """A program that speaks MAVLink to `companion serve`, without a socket.
+
+    Args:
+        name: under which the user reads of it.
+        ids: its system and component.
+        host: IP address from which it seems to come; one beyond loopback may only read.
+
+    Attributes:
+        heard: the messages that it has received, as pymavlink decodes them, oldest first.
+        packer: pymavlink's, with the program's ids and its running number.
+    """
+
+    def __init__(
+        self, name: str = "program", ids: tuple[int, int] = (245, 190), host: str = "127.0.0.1"
+    ) -> None:
+        super().__init__(name, host=host, streaming=False)
+        self.heard: list[Message] = []
+        self._session: ServeSession | None = None
+        self.packer, self._parser = dialect.MAVLink(None, *ids), dialect.MAVLink(None)
+        self._parser.robust_parsing = True
+
+    def connect(self, session: ServeSession) -> "Program":
+        """Connect to a session; returns the program."""
+        assert session.network is not None
+        self._session = session
+        session.network.attach(self)
+        return self
+
+    def disconnect(self) -> None:
+        """Break the connection, as if the program were killed."""
+        if self._session is not None and self._session.network is not None:
+            self._session.network.detach(self)
+
+    def send(self, message: Message) -> None:
+        """Send a message under the program's ids."""
+        if self._session is None or self._session.network is None:
+            raise RuntimeError("the program is not connected")
+        raw = message.pack(self.packer)
+        self.packer.seq = (self.packer.seq + 1) & 0xFF
+        frames = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)
+        self._session.network.received(self, frames)
+
+    def of(self, name: str) -> list[Message]:
+        """The messages of one type that were heard, such as `COMMAND_ACK`."""
+        return [each for each in self.heard if each.get_type() == name]
+
+    async def hears(self, name: str, seconds: float = 30.0) -> Message:
+        """Wait for the next message of a type.
+
+        Raises:
+            TimeoutError: none came within `seconds` of vehicle time.
+        """
+        before = len(self.of(name))
+        async with asyncio.timeout(seconds):
+            while len(self.of(name)) == before:  # noqa: ASYNC110  telemetry sets no events
+                await asyncio.sleep(_LOOK_PERIOD)
+        return self.of(name)[before]
+
+    def _flush(self) -> None:
+        while self._waiting:
+            data, _ = self._take(100_000)
+            self.heard += self._parser.parse_buffer(data) or ()
