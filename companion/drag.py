@@ -1,5 +1,6 @@
-"""Linear and quadratic drag per mass, the same along all axes."""
+"""Drag per mass: the same in all directions, and what an angular body adds to it."""
 
+from math import cos, hypot, pi, sin
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -52,6 +53,41 @@ class Drag(NamedTuple):
 
 
 NO_DRAG = Drag()
+
+_MEAN_SHARE = 8.0 / (3.0 * pi)
+"""Mean over all directions of |cos|³ + |sin|³: quadratic drag along two axes, seen along the
+velocity."""
+
+
+class AxisDrag(NamedTuple):
+    """Difference between quadratic drag along the body's axes and the same drag in all directions.
+
+    Along each horizontal body axis the drag is coefficient·|v_i|·v_i, as in PX4's model of bluff
+    body drag. Its mean over all directions belongs to `Drag.quadratic`; the difference has the
+    deceleration coefficient·(|v_i| − 0.85·|v|)·v_i.
+
+    Attributes:
+        coefficient: quadratic drag along an axis per mass, 1/m; 0 for a round body.
+        heading: heading of the body's forward axis, rad.
+    """
+
+    coefficient: float = 0.0
+    heading: float = 0.0
+
+    def deceleration(self, north: float, east: float) -> tuple[float, float]:
+        """Deceleration north and east, m/s², at a horizontal velocity in m/s."""
+        if self.coefficient == 0.0:
+            return 0.0, 0.0
+        cosine, sine = cos(self.heading), sin(self.heading)
+        forward, right = cosine * north + sine * east, cosine * east - sine * north
+        usual = _MEAN_SHARE * hypot(north, east)
+        forward *= self.coefficient * (abs(forward) - usual)
+        right *= self.coefficient * (abs(right) - usual)
+        return cosine * forward - sine * right, sine * forward + cosine * right
+
+
+ROUND = AxisDrag()
+"""A body whose drag is the same in all directions."""
 
 
 def _speed(velocity: tuple[Number, Number, Number]) -> Number:

@@ -4,6 +4,7 @@ import logging
 import os
 import signal
 from collections.abc import Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,10 +15,11 @@ from companion.extras import require
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future
 
 DEATHS = 3
 """A unit that was on a worker when it died for the third time is given up."""
+_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_S = 10.0
 _CLOSE_S = 5.0
 _PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
@@ -78,7 +80,7 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     import dask  # noqa: PLC0415  an extra
     from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # we say it in a sentence
+    _silence()
     with dask.config.set(_LOCAL):
         if scheduler is not None:
             try:
@@ -103,6 +105,13 @@ def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
                 client.close(timeout=_CLOSE_S)
                 if cluster is not None:
                     cluster.close(timeout=_CLOSE_S)
+
+
+def _silence() -> None:
+    """Silence the log messages of Dask: what goes wrong is said in a sentence."""
+    for name in ("tornado", *logging.root.manager.loggerDict):
+        if name.startswith(("distributed", "tornado")):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 @contextmanager
@@ -176,16 +185,27 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
     try:
         for future in as_completed(futures):
             number = futures.pop(future)
-            if future.status == "finished":
-                yield Ended(number, future.result())
-            elif future.status == "error":
-                yield Ended(number, None, _reason(future.exception()))
-            else:
-                raise ClusterError("the connection to the Dask scheduler is lost")
+            yield _ended(number, future)
             future.release()
     finally:
         with suppress(Exception):
             client.cancel(list(futures), force=True)
+
+
+def _ended(number: int, future: "Future") -> Ended:
+    """The unit of a future that is done.
+
+    Raises:
+        ClusterError: the connection to the scheduler is lost.
+    """
+    try:
+        if future.status == "finished":
+            return Ended(number, future.result())
+        if future.status == "error":
+            return Ended(number, None, _reason(future.exception()))
+    except (OSError, CancelledError) as error:  # it was lost while the rows were on their way
+        raise ClusterError(_LOST) from error
+    raise ClusterError(_LOST)
 
 
 def _reason(error: BaseException) -> str:

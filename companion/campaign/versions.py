@@ -89,5 +89,5 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
 
 
 def as_found(told: Any) -> Versions:
-    """The versions that JSON or another process told, as texts."""
+    """Versions from JSON or from another process, each turned into a text."""
     return {str(name): str(value) for name, value in told.items()} if isinstance(told, dict) else {}

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from companion.cli import tool_options
+from companion.cli import shared_options, tool_options
 from companion.cli.campaign_options import add_campaign, with_campaign_command
 from companion.cli.recording_options import add_recordings
 from companion.cli.tool_options import Commands, number
@@ -57,9 +57,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_flights(commands: Commands) -> None:
     fly = commands.add_parser("fly", help="fly the vehicle that the configuration names")
-    fly.add_argument(
-        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
-    )
+    shared_options.add_required_config(fly)
     _add_link_options(fly)
     fly.set_defaults(run="flights.fly")
     show = commands.add_parser("demo", help="start the bundled vehicle and fly it")
@@ -88,7 +86,7 @@ def _add_flights(commands: Commands) -> None:
             action="store_true",
             help="slow a trajectory down that the limits do not allow, instead of refusing it",
         )
-        tool_options.add_live(command)
+        shared_options.add_live(command)
         _add_flight_options(command)
 
 
@@ -102,10 +100,8 @@ def _add_doctor(commands: Commands) -> None:
         "checks and refuses what is unsafe unless flight.accept names it. Exit code 1: something "
         "unsafe was found.",
     )
-    command.add_argument(
-        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
-    )
-    command.add_argument("--endpoint", help="instead of link.endpoint")
+    shared_options.add_required_config(command)
+    shared_options.add_endpoint(command)
     command.add_argument(
         "--wait",
         type=number(0.01, 3600.0),
@@ -164,17 +160,11 @@ def _add_identify(commands: Commands) -> None:
 
 
 def _add_link_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--endpoint", help="instead of link.endpoint")
+    shared_options.add_endpoint(command)
     command.add_argument("--arm", action="store_true", help="arm by ourselves, as flight.arm: true")
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="instead of the configuration's, such as limits.max_tilt_deg=20; as often as needed",
-    )
+    shared_options.add_set(command, "limits.max_tilt_deg=20")
     command.add_argument("--lockstep", action="store_true", help="on the mock vehicle's clock")
     command.add_argument("--json", action="store_true", help="end with one line of JSON")

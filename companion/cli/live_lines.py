@@ -45,9 +45,7 @@ def allowed_time(elapsed: float, timeout: float) -> str:
 
 
 def _times(status: FlightStatus) -> str:
-    if status.airborne is None:
-        return f"{status.time:.0f} s"
-    return f"{status.time:.0f} s, {status.airborne:.0f} s since take-off"
+    return f"{status.time:.0f} s"
 
 
 def _loop(status: FlightStatus) -> str:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from companion.cli.shared_options import add_set
 from companion.cli.tool_options import Commands
 
 
@@ -18,7 +19,7 @@ def _add_export(commands: Commands) -> None:
     kind = export.add_mutually_exclusive_group(required=True)
     kind.add_argument("--csv", action="store_true", help="one CSV file for each channel")
     kind.add_argument("--parquet", action="store_true", help="the same as Parquet (extra `export`)")
-    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: the flight's folder")
+    export.add_argument("--into", type=Path, metavar="FOLDER", help="default: FOLDER/export")
     export.set_defaults(run="recordings.export")
 
 
@@ -32,13 +33,7 @@ def _add_replay(commands: Commands) -> None:
     )
     replay.add_argument("folder", type=Path, metavar="FOLDER", help="the flight's folder")
     replay.add_argument("--config", type=Path, metavar="FILE", help="instead of the flight's own")
-    replay.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="instead of the configuration's, such as planner.gain_per_s=4; as often as needed",
-    )
+    add_set(replay, "planner.gain_per_s=4")
     replay.add_argument(
         "--csv", type=Path, metavar="FILE", help="write both answers to each sample"
     )

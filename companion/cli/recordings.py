@@ -51,12 +51,12 @@ def export(options: argparse.Namespace) -> int:
     from companion.recording.export import export_csv, export_parquet  # noqa: PLC0415
 
     record = read_flight(options.folder)
-    into: Path = options.into or options.folder
+    into: Path = options.into or options.folder / "export"
     write = export_parquet if options.parquet else export_csv
     try:
         into.mkdir(parents=True, exist_ok=True)
-        for path in write(record, into):
-            print(path)
+        for path, rows in write(record, into).items():
+            print(f"{path}  {rows:,} rows")
     except OSError as error:
         raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
     return EXIT_OK

@@ -6,6 +6,7 @@ from math import nan
 from pathlib import Path
 from typing import TypeAlias
 
+from companion.cli.shared_options import add_endpoint, add_live, add_required_config, add_set
 from companion.study import registry
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
@@ -22,10 +23,8 @@ def add_serve(commands: Commands) -> None:
         "at serve.clients, until Ctrl-C. The setpoints of one client at a time are flown by our "
         "law: in OFFBOARD, which the client asks for (PX4), or in GUIDED (ArduPilot).",
     )
-    serve.add_argument(
-        "--config", type=Path, required=True, metavar="FILE", help="such as configs/px4.yaml"
-    )
-    serve.add_argument("--endpoint", help="instead of link.endpoint")
+    add_required_config(serve)
+    add_endpoint(serve)
     serve.add_argument(
         "--client",
         action="append",
@@ -33,13 +32,7 @@ def add_serve(commands: Commands) -> None:
         metavar="ENDPOINT",
         help="instead of serve.clients, such as udpin://127.0.0.1:14551; as often as needed",
     )
-    serve.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="instead of the configuration's, such as link.target_system=2; as often as needed",
-    )
+    add_set(serve, "link.target_system=2")
     serve.add_argument("--json", action="store_true", help="end with the counters as one JSON line")
     add_live(serve)
     serve.set_defaults(run="serve.serve")
@@ -50,15 +43,17 @@ def add_tune(commands: Commands) -> None:
     tune = commands.add_parser(
         "tune",
         help="propose gain, weights and bandwidth for an identified vehicle",
-        description="Compute stability margins, settling, rate use and tracking error of the whole "
-        "control loop by linear analysis, search the values with the smallest error within the "
-        "margins, fly them on the mock vehicle, and write them as YAML with their reasons.",
+        description="Search gain, weights and bandwidth with the smallest expected position error "
+        "that keep stability margins (7 dB, 31°), by linear analysis of the identified vehicle. "
+        "Fly the values before and after on the mock vehicle, and write the new ones, with the "
+        "reasons as comments, as YAML for the configuration to include. docs/identify.md says "
+        "what it computes.",
     )
     tune.add_argument(
         "vehicle",
         type=Path,
         metavar="PATH",
-        help="file or flight folder that `companion identify` wrote",
+        help="vehicle.yaml of `companion identify`, or the folder of its flight",
     )
     tune.add_argument(
         "--config",
@@ -73,23 +68,6 @@ def add_tune(commands: Commands) -> None:
     tune.add_argument("--no-flights", action="store_true", help="do not fly it on the mock vehicle")
     tune.add_argument("--json", action="store_true", help="end with one line of JSON")
     tune.set_defaults(run="tune.tune")
-
-
-def add_live(command: argparse.ArgumentParser) -> None:
-    """Add `--watch` and `--live`."""
-    command.add_argument(
-        "--watch",
-        action="store_true",
-        help="apply edits of the configuration file in flight: limits, gains and weights",
-    )
-    command.add_argument(
-        "--live",
-        nargs="?",
-        const="127.0.0.1:8090",
-        metavar="[HOST][:PORT]",
-        help="serve a page to watch the flight, and to change limits with the token shown "
-        "(127.0.0.1:8090)",
-    )
 
 
 def add_benches(commands: Commands) -> None:

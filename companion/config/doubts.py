@@ -1,12 +1,14 @@
 """Values that are allowed and yet most likely not meant, or not measured on this vehicle."""
 
 from collections.abc import Iterator
+from math import hypot
 from typing import NamedTuple
 
 from companion.config.reference import keys
 from companion.config.root import Config
 from companion.files.yaml_faults import other_unit
 
+BODY_RATE = "safety.max_body_rate_deg_s"
 _TYPICAL = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the end of the key's name."""
 _FAR, _NEAR = 20.0, 5.0
@@ -37,6 +39,7 @@ class Doubt(NamedTuple):
 def doubts(config: Config) -> Iterator[Doubt]:
     """All doubts about a configuration."""
     yield from _units(config)
+    yield from _body_rate(config)
     if config.vehicle.known and config.vehicle.identified is None and config.mock is None:
         yield Doubt(
             "vehicle.identified",
@@ -44,6 +47,19 @@ def doubts(config: Config) -> Iterator[Doubt]:
             "the response is less exact than after `companion identify`, but steps are still "
             "straighter than with first-order in the cases of docs/identify.md",
             "run `companion identify` before raising planner.gain_per_s, and include its file",
+        )
+
+
+def _body_rate(config: Config) -> Iterator[Doubt]:
+    """Whether the planner may command rates at which the safety monitor ends the flight."""
+    limits, allowed = config.limits, config.safety.max_body_rate_deg_s
+    commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
+    if allowed <= commanded:
+        yield Doubt(
+            BODY_RATE,
+            f"{BODY_RATE} is {allowed:g} °/s, and the planner may command {commanded:.0f} °/s",
+            "a flight that turns as commanded ends as if control were lost",
+            "raise it, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
         )
 
 

@@ -1,9 +1,11 @@
 """Estimates the motion: measured positions, propagated by the measured attitude."""
 
 from collections.abc import Callable
+from math import atan2
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
+from companion.drag import AxisDrag
 from companion.guidance import (
     GRAVITY,
     DragEstimate,
@@ -58,11 +60,17 @@ class MotionEstimate:
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
         self._turn = 0.0
+        self._heading = 0.0
 
     @property
     def disturbance(self) -> Horizontal:
         """Acceleration by wind and bias, m/s², NED."""
         return self._observer.disturbance
+
+    @property
+    def _axis_drag(self) -> AxisDrag:
+        """The drag along the body's axes, as learned so far, at the present heading."""
+        return AxisDrag(self.drag.axis_coefficient, self._heading)
 
     def retune(self, settings: ObserverSettings) -> None:
         """Use other settings of the observer from the next position on."""
@@ -71,6 +79,7 @@ class MotionEstimate:
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Take an attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
+        self._heading = 2.0 * atan2(sample.q[3], sample.q[0])
         square, ax, ay = tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COSINE)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
@@ -125,17 +134,24 @@ class MotionEstimate:
         north, east = self._slopes.newest
         thrust = self.vertical * north, self.vertical * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
-        return GuidanceInput(motion, later, thrust, disturbance, drag, thrust_limits)
+        return GuidanceInput(
+            motion, later, thrust, disturbance, drag, thrust_limits, self._axis_drag
+        )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
-        """`inputs` with attitude and rates at `now`, s of event-loop time."""
+        """`inputs` with attitude and rates at `now`, s of event-loop time.
+
+        Predictive control knows only `Drag`, so the drag along the body's axes counts as wind.
+        """
+        wind, (north, east, _) = inputs.disturbance, inputs.now.velocity_ned
+        more_north, more_east = inputs.axis_drag.deceleration(north, east)
         return Vehicle(
             now,
             inputs.now.position_ned,
             inputs.now.velocity_ned,
             self._q,
             self._body_rates,
-            (*inputs.disturbance, 0.0),
+            (wind[0] - more_north, wind[1] - more_east, 0.0),
             inputs.drag,
         )
 
@@ -168,9 +184,15 @@ class MotionEstimate:
             dt,
             (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
             (north - vertical * slope[0], east - vertical * slope[1]),
+            self._heading,
         )
 
     def _known(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration due to thrust and drag, m/s²."""
+        north, east, _ = motion.velocity_ned
         slowed = self.drag.drag.deceleration(motion.velocity_ned)
-        return self.vertical * slope[0] - slowed[0], self.vertical * slope[1] - slowed[1]
+        more_north, more_east = self._axis_drag.deceleration(north, east)
+        return (
+            self.vertical * slope[0] - slowed[0] - more_north,
+            self.vertical * slope[1] - slowed[1] - more_east,
+        )

@@ -12,18 +12,21 @@ _PERIOD = 0.035
 class Slew:
     """The way from the present values to the wanted ones. Times are s on one clock.
 
+    Attributes:
+        settled: the newest configuration that was fully in effect.
+
     Args:
         config: with the present values, which are wanted, too.
     """
 
     def __init__(self, config: Config) -> None:
-        self._now = self._from = self._wanted = config
+        self._now = self._from = self._wanted = self.settled = config
         self._began: float | None = None
         self._stepped = 0.0
 
     def jump(self, wanted: Config) -> None:
         """Be at the wanted values at once: no loop flies, or one that begins takes them."""
-        self._now = self._wanted = wanted
+        self._now = self._wanted = self.settled = wanted
         self._began = None
 
     def begin(self, wanted: Config, now: float) -> None:
@@ -47,5 +50,5 @@ class Slew:
         self._now = between(self._from, self._wanted, share)
         values = tuning(self._now)
         if share >= 1.0:
-            self._began = None
+            self._began, self.settled = None, self._wanted
         return values

@@ -1,8 +1,34 @@
 """Atomic writing of a file: at any time a reader finds either the old or the new content."""
 
 import os
+import threading
 from contextlib import suppress
 from pathlib import Path
+
+LONGEST = 5.0
+"""Time allowed for the disk, s."""
+
+
+def write_in_time(path: Path, text: str) -> str | None:
+    """Write a file as `write_whole` does, but do not wait for a disk that hangs.
+
+    Returns:
+        None once it is on the disk; else why it is not, in words.
+    """
+    outcome: list[str | None] = [f"the disk did not answer for {LONGEST:g} s"]
+
+    def write() -> None:
+        try:
+            write_whole(path, text)
+        except OSError as error:
+            outcome[0] = error.strerror or str(error)
+        else:
+            outcome[0] = None
+
+    thread = threading.Thread(target=write, name=path.name, daemon=True)
+    thread.start()
+    thread.join(LONGEST)
+    return outcome[0]
 
 
 def write_whole(path: Path, text: str, mode: int = 0o666) -> None:

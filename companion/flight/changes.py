@@ -103,12 +103,15 @@ class Changes:
     def change(self, values: Values, by: str) -> str:
         """Begin to change to these values; returns what changes, in words.
 
+        While another change still takes effect, both together must not be too large.
+
         Raises:
             ChangeRefusedError: a key must not change in flight, a value is not valid, or the
                 change is too large. Nothing has changed.
         """
         try:
             wanted = changed_in_flight(self._start, self.wanted, values, by)
+            require_moderate(self._slew.settled, wanted, by)
             require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error

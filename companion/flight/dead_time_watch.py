@@ -21,7 +21,7 @@ _PERIODS = 4
 _UNSURE = 1.5
 """The rows of the newest time, s, are not used: the autopilot may have left offboard already."""
 _LONGEST = 75_000
-"""Largest number of rows, the newest, in the measurement at the end: 5 min at 250 Hz."""
+"""The measurement at the end takes this many of the newest rows at most: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _COMMANDED, _MEASURED, _AGE = 2, 6, 9
 """Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""

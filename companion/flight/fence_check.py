@@ -1,4 +1,4 @@
-"""Checks before the flight that a maneuver stays inside the fence, as the braking monitor will.
+"""Checks before the flight that a maneuver stays so far inside the fence that no monitor stops it.
 
 `Fence.stop_breach` judges each moment of the reference with the monitor's formula. `MARGIN` allows
 for the tracking error. So the monitor does not stop an accepted reference that is followed within

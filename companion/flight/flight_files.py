@@ -10,7 +10,7 @@ from types import TracebackType
 
 from companion import realtime
 from companion.config import Config
-from companion.files.write_whole import write_whole
+from companion.files.write_whole import write_in_time
 from companion.flight import flown_config
 from companion.flight.assembly import Assembled
 from companion.flight.course import advice, course_of
@@ -174,17 +174,16 @@ class FlightFiles:
     def save(self, summary: Summary) -> Summary:
         """Write `summary.json`, once the log is closed; return the summary.
 
-        If it cannot be written, that is noted.
+        If it cannot be written, or the disk does not answer in time, that is noted.
         """
         dropped = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
         whole = replace(summary, link={**summary.link, "not_recorded": dropped})
         folder = self.folder
         if folder is None:
             return whole
-        try:
-            write_whole(folder / "summary.json", whole.as_json() + "\n")
-        except OSError as error:
-            self._note(f"{folder}: summary.json was not written: {error.strerror}")
+        failure = write_in_time(folder / "summary.json", whole.as_json() + "\n")
+        if failure is not None:
+            self._note(f"{folder}: summary.json was not written: {failure}")
         return whole
 
 

@@ -5,7 +5,7 @@ from math import hypot, isfinite, sqrt
 
 import numpy as np
 
-from companion.drag import Drag
+from companion.drag import AxisDrag, Drag
 from companion.guidance.reference import Horizontal, Vector
 
 _WINDOW = 0.2
@@ -22,6 +22,9 @@ _LARGEST_INCREASE = 2.0
 """The linear drag is estimated at most this much above that of the prior, 1/s."""
 _LARGEST_QUADRATIC = 0.3
 """Largest estimate of the quadratic drag, 1/m."""
+_AXIS_DEVIATION, _LARGEST_AXIS = 0.03, 0.1
+"""Initial standard deviation of `AxisDrag.coefficient`, which begins at 0, and its largest
+estimate, 1/m."""
 _CERTAIN = 0.1
 """The drag counts as known if its standard deviation at the top speed is below this, 1/s."""
 
@@ -46,11 +49,11 @@ ANY_VEHICLE = DragPrior(Drag(0.3), 0.4, 0.03)
 
 
 class DragEstimate:
-    """Kalman filter for drag and wind: v̇ − thrust = wind − (linear + quadratic·|v|)·v.
+    """Kalman filter for drag and wind: v̇ − thrust = wind − (linear + quadratic·|v|)·v − d.
 
-    The state is the linear and the quadratic drag, which are constant, and the acceleration by wind
-    (north, east), which is a random walk. Wind changes slowly, so what changes with the velocity is
-    drag.
+    d is the deceleration of `AxisDrag`. The state is the linear and the quadratic drag and the
+    coefficient of `AxisDrag`, which are constant, and the acceleration by wind (north, east), which
+    is a random walk. Wind changes slowly, so what changes with the velocity is drag.
 
     Attributes:
         first: drag of the prior.
@@ -63,10 +66,9 @@ class DragEstimate:
         """Start again from `prior`."""
         self.first = prior.drag
         self._top_speed = 0.0
-        self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0])
-        self._covariance = np.diag(
-            [prior.linear_deviation**2, prior.quadratic_deviation**2, _WIND**2, _WIND**2]
-        )
+        self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0, 0.0])
+        deviations = prior.linear_deviation, prior.quadratic_deviation, _WIND, _WIND
+        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DEVIATION**2])
         self._drag = prior.drag
         self._forget_window()
 
@@ -74,6 +76,11 @@ class DragEstimate:
     def drag(self) -> Drag:
         """The drag estimated so far."""
         return self._drag
+
+    @property
+    def axis_coefficient(self) -> float:
+        """The coefficient of `AxisDrag` estimated so far, 1/m."""
+        return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS)
 
     @property
     def certain(self) -> bool:
@@ -87,18 +94,21 @@ class DragEstimate:
         """The fastest mean speed of a window so far, m/s."""
         return self._top_speed
 
-    def observe(self, dt: float, velocity: Vector, left: Horizontal) -> None:
+    def observe(self, dt: float, velocity: Vector, left: Horizontal, heading: float = 0.0) -> None:
         """Take a measured acceleration; one that is not finite is ignored.
 
         Args:
             dt: duration of the measurement, s.
             velocity: during the measurement, m/s, NED.
             left: measured acceleration less the acceleration by thrust, m/s², NED.
+            heading: of the vehicle, rad.
         """
         speed = hypot(*velocity)
         if not (isfinite(dt) and isfinite(speed) and isfinite(hypot(*left))) or dt <= 0.0:
             return
+        along_axes = AxisDrag(1.0, heading).deceleration(velocity[0], velocity[1])
         for axis in (0, 1):
+            self._along_axes[axis] += dt * along_axes[axis]
             self._passed[axis] += dt * velocity[axis]
             self._squared[axis] += dt * speed * velocity[axis]
             self._left[axis] += dt * left[axis]
@@ -114,9 +124,9 @@ class DragEstimate:
         for wind in (2, 3):
             self._covariance[wind, wind] += span * _WIND_CHANGE**2
         for axis in (0, 1):
-            row = np.zeros(4)
+            row = np.zeros(5)
             row[0], row[1] = -self._passed[axis] / span, -self._squared[axis] / span
-            row[2 + axis] = 1.0
+            row[2 + axis], row[4] = 1.0, -self._along_axes[axis] / span
             spread = self._covariance @ row
             variance = float(row @ spread) + _NOISE**2
             innovation, most = (
@@ -141,3 +151,4 @@ class DragEstimate:
     def _forget_window(self) -> None:
         self._span = 0.0
         self._passed, self._squared, self._left = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        self._along_axes = [0.0, 0.0]

@@ -5,7 +5,7 @@ from math import sqrt
 from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
-from companion.drag import Drag
+from companion.drag import ROUND, AxisDrag, Drag
 from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
 from companion.guidance.reference import (
@@ -13,6 +13,7 @@ from companion.guidance.reference import (
     Horizontal,
     Reference,
     ReferenceAt,
+    Vector,
     VehicleMotion,
     limited,
 )
@@ -52,6 +53,7 @@ class GuidanceInput(NamedTuple):
         disturbance: horizontal acceleration by wind and bias, m/s².
         drag: drag of the vehicle.
         thrust_limits: smallest and largest specific thrust available, m/s².
+        axis_drag: difference of the drag along the body's axes.
     """
 
     now: VehicleMotion
@@ -60,6 +62,13 @@ class GuidanceInput(NamedTuple):
     disturbance: Horizontal
     drag: Drag
     thrust_limits: tuple[float, float]
+    axis_drag: AxisDrag = ROUND
+
+    def deceleration(self, velocity: Vector) -> Horizontal:
+        """Horizontal deceleration by drag, m/s², at a velocity in m/s, NED."""
+        north, east, _ = self.drag.deceleration(velocity)
+        more_north, more_east = self.axis_drag.deceleration(velocity[0], velocity[1])
+        return north + more_north, east + more_east
 
 
 class LinearCommand(NamedTuple):
@@ -150,7 +159,7 @@ class LinearGuidance:
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.drifting:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
-        wanted, slowed = [], inputs.drag.deceleration(inputs.now.velocity_ned)
+        wanted, slowed = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
             place = inputs.acts.position_ned[axis] - acts.position_ned[axis]
             speed = inputs.acts.velocity_ned[axis] - acts.velocity_ned[axis]
@@ -169,7 +178,7 @@ class LinearGuidance:
         self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
         """Coefficients for the reference's acceleration, its drag, and `more` (m/s²)."""
-        slowed = inputs.drag.deceleration(reference.velocity_ned)
+        slowed = inputs.deceleration(reference.velocity_ned)
         north, east = limited(
             reference.acceleration_ned[0] + slowed[0] + more[0],
             reference.acceleration_ned[1] + slowed[1] + more[1],

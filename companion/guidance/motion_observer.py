@@ -14,7 +14,7 @@ class ObserverGains(NamedTuple):
     """How one measurement corrects the observer.
 
     The position is corrected per position error. Velocity and disturbance are corrected per error
-    of the velocity, to which `ObserverSettings.position_pull` adds the position error.
+    of the velocity, to which `ObserverSettings.pull` adds the position error.
 
     Attributes:
         position: m per m.
@@ -37,6 +37,7 @@ class ObserverSettings:
         position_pull: correction of the velocity per position error, 1/s.
         largest: largest disturbance, m/s².
         sharpening: relative increase of the bandwidth with smooth positions.
+        smooth_pull: increase of `position_pull` with smooth positions, 1/s.
     """
 
     bandwidth: float
@@ -44,6 +45,11 @@ class ObserverSettings:
     position_pull: float
     largest: float
     sharpening: float = 0.0
+    smooth_pull: float = 0.0
+
+    def pull(self, smoothness: float) -> float:
+        """Correction of the velocity per position error, 1/s; `smoothness` as in `gains`."""
+        return self.position_pull + smoothness * self.smooth_pull
 
     def gains(self, dt: float, smoothness: float = 0.0) -> ObserverGains:
         """The gains for measurements `dt` seconds apart.
@@ -104,7 +110,7 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        gains = settings.gains(dt, smoothness)
+        gains, pull = settings.gains(dt, smoothness), settings.pull(smoothness)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
         found = [0.0, 0.0]
         for axis in (0, 1):
@@ -114,7 +120,7 @@ class MotionObserver:
             )
             v = motion.velocity_ned[axis] + dt * acceleration
             position_error = position[axis] - p
-            error = velocity[axis] - v + settings.position_pull * position_error
+            error = velocity[axis] - v + pull * position_error
             position[axis] = p + gains.position * position_error
             velocity[axis] = v + gains.velocity * error
             found[axis] = disturbance[axis] + gains.disturbance * error

@@ -2,6 +2,8 @@
 
 import json
 import socket
+from collections.abc import Iterator
+from math import inf
 from typing import Any
 
 _LARGEST = 200_000
@@ -70,6 +72,22 @@ class Channel:
             return None
         message = json.loads(data)
         return message if isinstance(message, dict) else {}
+
+    def waiting(self, most: float = inf) -> Iterator[Message | None]:
+        """The messages that wait now, at most `most` of them; a last None: the other end is gone.
+
+        The socket must not block.
+        """
+        taken = 0
+        while taken < most:
+            taken += 1
+            try:
+                message = self.receive()
+            except BlockingIOError:
+                return
+            yield message
+            if message is None:
+                return
 
     def close(self) -> None:
         """Close our end."""

@@ -135,16 +135,12 @@ class Helper:
 
     def _on_readable(self) -> None:
         """Handle what the process asks for."""
-        for _ in range(_MOST_A_TURN):
-            try:
-                message = self._channel.receive()
-            except BlockingIOError:
-                return
+        for message in self._channel.waiting(_MOST_A_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.note(f"{self._what} has ended by itself; the flight goes on without it")
-                return
-            self._handle(message)
+            else:
+                self._handle(message)
 
     def _handle(self, message: Message) -> None:
         kind, by = message.get("kind"), str(message.get("by", self._what))

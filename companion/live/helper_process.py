@@ -10,6 +10,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import Values
+from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live.channel import Channel, Message, NoAnswerError
 from companion.live.checks import ChangeChecks
@@ -43,6 +44,7 @@ class Relay:
         self._ids = count()
         self._asked: dict[int, asyncio.Future[Message]] = {}
         self._listeners: list[Any] = []
+        self._one_at_a_time = asyncio.Lock()
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
     def listen(self, take: Any) -> None:
@@ -52,15 +54,29 @@ class Relay:
     async def change(self, values: Values, by: str) -> str:
         """Check new values and have the flight change to them; returns what changes, in words.
 
+        One change waits for the other: each is checked together with those before it.
+
         Raises:
             ConfigError: the values cannot be used.
             ChangeRefusedError: the flight refuses them, or has ended.
             NoAnswerError: the flight has not answered in time; it may have changed.
         """
-        await asyncio.to_thread(self.checks.check, values, by)
-        return await self.ask({"kind": "change", "values": values, "by": by})
+        async with self._one_at_a_time:
+            await asyncio.to_thread(self.checks.check, values, by)
+            return await self._ask({"kind": "change", "values": values, "by": by})
 
-    async def ask(self, message: Message) -> str:
+    async def undo(self, by: str) -> str:
+        """Have the flight go back to the values before the newest change; returns them in words.
+
+        Their margins were checked when they were flown first.
+
+        Raises:
+            ChangeRefusedError, NoAnswerError: as `change`.
+        """
+        async with self._one_at_a_time:
+            return await self._ask({"kind": "undo", "by": by})
+
+    async def _ask(self, message: Message) -> str:
         """Send a request and wait for the answer, in words.
 
         Raises:
@@ -90,16 +106,12 @@ class Relay:
         self._channel.send({"kind": "note", "text": text})
 
     def _on_readable(self) -> None:
-        while True:
-            try:
-                message = self._channel.receive()
-            except BlockingIOError:
-                return
+        for message in self._channel.waiting():
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.over.set()
-                return
-            self._take(message)
+            else:
+                self._take(message)
 
     def _take(self, message: Message) -> None:
         if message["kind"] == "config":
@@ -121,11 +133,10 @@ async def watch(relay: Relay, path: Path) -> None:
         if edit is not None and edit.refusal is not None:
             relay.note(edit.refusal)
         elif edit is not None:
-            message = {"kind": "change", "values": edit.values, "by": path.name}
             try:
-                await relay.ask(message)
+                await relay.change(edit.values, path.name)
                 watched.accept()
-            except ChangeRefusedError as refused:
+            except (ConfigError, ChangeRefusedError) as refused:
                 relay.note(f"{path.name} is not applied: {refused}")
             except NoAnswerError as error:
                 relay.note(f"{path.name}: {error}")

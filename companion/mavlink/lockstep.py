@@ -20,7 +20,8 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 PATIENCE_S = 2.0
-"""Wall time without I/O, s, after which the vehicle counts as gone and time advances without it."""
+"""If nothing is received or sent for this wall time, s, the vehicle counts as gone, and the virtual
+time advances without it."""
 
 _SPIN_S = 0.0005
 """Wall time of polling for the next beacon before the process sleeps, s."""

@@ -153,7 +153,7 @@ class StampJudge:
         return SignatureResult.GOOD
 
     def streams(self) -> dict[Stream, tuple[int, ...]]:
-        """The newest stamps of each stream heard in this run, ticks."""
+        """The newest time stamp of each stream that was heard in this run, in ticks of 10 µs."""
         heard = dict(self._heard)  # a copy: another thread calls this
         newest = {}
         for stream in {stream for stream, _ in heard}:

@@ -35,15 +35,20 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
 
 
 def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
-    """Whether the newest flight measured the dead time that `vehicle` states."""
+    """Whether the newest flight with this planner and gain measured the configured dead time.
+
+    With another gain the response to the same vehicle differs, and a hold that swings measures a
+    wrong dead time.
+    """
     if not config.vehicle.known:
         return
-    folder, measured = _newest_dead_times(config.recording.directory)
+    folder, measured = _newest_dead_times(config)
     if folder is None:
         yield Finding(
             Key.DEAD_TIME,
             SAFE,
-            f"no flight in {config.recording.directory} measured the dead time yet",
+            f"no flight in {config.recording.directory} with this planner and gain measured the "
+            "dead time yet",
             fix="it can be measured in the air alone: the flight tells it at its end",
             source="summary.json",
         )
@@ -69,7 +74,7 @@ def dead_time(config: Config, _: Evidence) -> Iterator[Finding]:
 def doubtful(config: Config, _: Evidence) -> Iterator[Finding]:
     """Values that are most likely not meant, or not measured on this vehicle."""
     for doubt in doubts(config):
-        key = Key.IDENTIFIED if doubt.key == Key.IDENTIFIED else Key.UNITS
+        key = doubt.key if doubt.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
         yield Finding(key, INEFFECTIVE, doubt.found, doubt.because, doubt.fix, doubt.key)
 
 
@@ -92,12 +97,15 @@ def accepted(config: Config, _: Evidence) -> Iterator[Finding]:
             )
 
 
-def _newest_dead_times(directory: Path) -> tuple[Path | None, dict[str, float]]:
-    """The newest flight's folder that measured any, by its name, and its dead times in s."""
-    for summary in sorted(directory.glob("*/summary.json"), reverse=True):
+def _newest_dead_times(config: Config) -> tuple[Path | None, dict[str, float]]:
+    """The folder of the newest flight of its kind that measured any, and its dead times in s."""
+    kind = config.planner_name, config.planner.gain_per_s
+    for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:
-            told = json.loads(summary.read_text(encoding="utf-8"))["dead_time_s"]
-            axes = {name: told[name] for name in ("roll", "pitch", "yaw")}
+            told = json.loads(summary.read_text(encoding="utf-8"))
+            if (told["planner"], told["gain_per_s"]) != kind:
+                continue
+            axes = {name: told["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
         except (OSError, ValueError, KeyError, TypeError):
             continue  # of another program, or of a flight that was cut off
         known = {

@@ -52,6 +52,7 @@ class Key(StrEnum):
     IDENTIFIED = "vehicle.identified"
     UNITS = "configuration.units"
     RESPONSE = "planner.gain_per_s"
+    BODY_RATE = "safety.max_body_rate_deg_s"
 
 
 class Change(NamedTuple):

@@ -89,7 +89,7 @@ def _trouble(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str]
 
 
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Lost and damaged messages, and reconnects."""
+    """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
     share = link.loss
     result = UNSAFE if share > _MANY_LOST else INEFFECTIVE if share > SOME_LOST else SAFE

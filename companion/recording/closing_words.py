@@ -118,9 +118,9 @@ def _gain_warning(figures: Figures) -> list[str]:
 
 
 def _when(end: dict[str, Any]) -> str:
-    since = end["since_takeoff_s"]
-    words = "before take-off" if since is None else f"{since:.1f} s after take-off"
-    words += f" ({end['time_s']:.1f} s after the start), in phase `{end['phase']}`"
+    words = f"at {end['time_s']:.1f} s, in phase `{end['phase']}`"
+    if end["since_takeoff_s"] is None:
+        words += ", before take-off"
     if end["maneuver"] is not None:
         words += f", {end['into_maneuver_s']:.1f} s into {end['maneuver']}"
     return words

@@ -40,27 +40,27 @@ def tables(record: FlightRecord) -> Iterator[Table]:
             yield Table(name, dict(zip(series.columns, series.rows().T, strict=True)))
 
 
-def export_csv(record: FlightRecord, folder: Path) -> list[Path]:
-    """Write each table as `NAME.csv` into an existing folder; returns the files.
+def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
+    """Write each table as `NAME.csv` into an existing folder; returns the files and their rows.
 
     Numbers have the digits that give the same number again when they are read.
 
     Raises:
         OSError: a file cannot be written.
     """
-    written = []
+    written = {}
     for name, columns in tables(record):
         path = folder / f"{name}.csv"
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         with path.open("w", encoding="utf-8") as file:
             file.write(",".join(columns) + "\n")
             file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
-        written.append(path)
+        written[path] = _rows(columns)
     return written
 
 
-def export_parquet(record: FlightRecord, folder: Path) -> list[Path]:
-    """Write each table as `NAME.parquet` into an existing folder; returns the files.
+def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
+    """Write each table as `NAME.parquet` into an existing folder; returns the files and their rows.
 
     Raises:
         MissingExtraError: pyarrow is missing.
@@ -70,9 +70,13 @@ def export_parquet(record: FlightRecord, folder: Path) -> list[Path]:
     from pyarrow import Table as ArrowTable  # noqa: PLC0415  an extra
     from pyarrow import parquet  # noqa: PLC0415
 
-    written = []
+    written = {}
     for name, columns in tables(record):
         path = folder / f"{name}.parquet"
         parquet.write_table(ArrowTable.from_pydict(columns), path)
-        written.append(path)
+        written[path] = _rows(columns)
     return written
+
+
+def _rows(columns: dict[str, NDArray[np.generic]]) -> int:
+    return max(map(len, columns.values()), default=0)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 HEIGHTS = (1.0, 1.0, 1.0, 1.4)
-"""Of the panels, relative."""
+"""Relative heights of the panels, from top to bottom."""
 _MARGIN = 0.02
 """After the end, as a share of the flight."""
 _FOR_NAMES = 1.5
@@ -25,7 +25,7 @@ _LINE, _PHASE, _END = "#0072b2", "#666666", "#cc0000"
 _SHADES = ("#f0e6c8", "#d5e8f0")
 """Of the maneuvers, one after the other."""
 _LONGEST_REASON = 110
-"""Characters of the reason that are drawn."""
+"""Largest number of characters of the reason that are drawn; the rest is left out."""
 _APART = 0.022
 """Names of phases that begin closer together are joined, as a share of the flight."""
 _COLUMNS = (

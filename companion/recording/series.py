@@ -56,7 +56,7 @@ class SpooledFile:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def read(self, width: int) -> NDArray[np.float64]:
-        """All whole rows of `width` doubles, one after the other."""
+        """All rows of `width` doubles in one array; a row that is not whole is left out."""
         if self._file is None:
             return np.empty(0)
         self._file.seek(0)

@@ -36,8 +36,8 @@ def words(samples: Sequence[ReplayedSample], began: float, *, follows_record: bo
         )
     if not different:
         lines.append(
-            f"All {recorded} setpoints are those of the flight, to the bit, and all"
-            f" {len(samples) - recorded} unanswered samples have the same reason."
+            f"identical: {recorded} commands to the bit, {len(samples) - recorded} unanswered"
+            " samples with the same reasons"
         )
         return lines
     lines.append(

@@ -41,5 +41,5 @@ class ReplayedVehicle:
         self.offset = read.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Unknown: `take` has judged already whether the position is fresh."""
+        """Always None (unknown): `take` judges whether the position is fresh."""
         return None

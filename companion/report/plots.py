@@ -44,7 +44,7 @@ class Plot:
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
-    """A line through points that are close enough to need no thinning, such as a track."""
+    """A line through all of the points; `over_time` thins them first."""
     dash = more.pop("dash", "solid")
     return {
         "type": "scatter",

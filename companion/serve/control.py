@@ -241,5 +241,5 @@ class ServedControl:
                 gc.collect()
 
     def _answer(self, client: Client, frame: Frame, result: int) -> None:
-        """Answer a client's command in the autopilot's name: it was addressed to the autopilot."""
+        """Answer a command that a client addressed to the autopilot, in the autopilot's name."""
         self._component.acknowledge(client, frame, result, self._autopilot)

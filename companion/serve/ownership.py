@@ -1,4 +1,4 @@
-"""Whose vehicle it is among the clients: one at a time, until it lets go or falls silent. Pure."""
+"""Which client controls the vehicle: one at a time, until it releases it or falls silent. Pure."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass

@@ -18,7 +18,7 @@ _SETTLED = 0.05
 """The response to a gust has settled below this share of its peak."""
 _LONGEST = 10.0
 _STEP = 0.01
-"""Duration and step of the response to a gust, s."""
+"""How long the response to a gust is computed, and the time between its points, s."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,8 +91,7 @@ def _states(
     To the known acceleration, the measured position and the measured velocity, from
     z·x = (I − K·C)·(A·x + B·a) + K·y.
     """
-    gains = observer.gains(period, smoothness=1.0)  # as an autopilot's estimate
-    pull = observer.position_pull
+    gains, pull = observer.gains(period, smoothness=1.0), observer.pull(1.0)  # as PX4's estimate
     a = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     b = np.array([0.5 * period**2, period, 0.0])
     c = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])

@@ -71,8 +71,8 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
 def _compared(before: Expectation, after: Expectation) -> list[str]:
     old, new = before.errors, after.errors
     return [
-        f"whole loop: {before.whole.sentence()} -> {after.whole.sentence()}",
-        f"outer loop: {before.outer.sentence()} -> {after.outer.sentence()}",
+        f"margins at the body rate: {before.whole.sentence()} -> {after.whole.sentence()}",
+        f"margins at the acceleration: {before.outer.sentence()} -> {after.outer.sentence()}",
         f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
         f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",
         f"after a gust that adds 1 m/s: {before.peak:.2f} -> {after.peak:.2f} m off, settled after "
@@ -83,7 +83,8 @@ def _compared(before: Expectation, after: Expectation) -> list[str]:
 def _error(error: ModelError) -> str:
     if error.delay:
         return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
-    return f"with lag and dead time {error.slower - 1.0:+.0%}"
+    percent = round(100.0 * abs(error.slower - 1.0))
+    return f"with lag and dead time {percent} % {'larger' if error.slower > 1.0 else 'smaller'}"
 
 
 def _flight_line(name: str, before: Flown, after: Flown) -> str:

@@ -53,6 +53,10 @@ class EkfConfig(Section):
     """Constant error of the height: true minus estimated."""
     height_sag_s4_per_m: Finite = 0.0024
     """Error of the height per squared horizontal acceleration; it lags by seconds."""
+    height_noise_m: NonNegative = 0.038
+    """Slow noise of the height, as of a barometer; the height follows it within 2 s."""
+    height_noise_time_s: Positive = 4.0
+    """Correlation time of that noise."""
     position_gains: Gains = (0.0774, 0.0494)
     """Gains of the position, m per m and m per m/s."""
     velocity_gains: Gains = (0.0316, 0.0411)
@@ -84,6 +88,7 @@ EKFS: dict[str, EkfConfig | None] = {
         acceleration_scale=0.0019,
         height_offset_m=0.1,
         height_sag_s4_per_m=0.0004,
+        height_noise_m=0.002,
         position_gains=(0.0853, 0.1278),
         velocity_gains=(0.0291, 0.1134),
         acceleration_gains=(0.0057, 0.0433),

@@ -17,7 +17,7 @@ import numpy as np
 from numba.extending import intrinsic, register_jitable
 
 from sitl_mock.physics.multirotor_step import Rings, empty_rings
-from sitl_mock.physics.navigation_filter import TrailRow
+from sitl_mock.physics.navigation_error import TrailRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 from sitl_mock.physics.vehicle import Vehicle

@@ -7,11 +7,18 @@ fixes, so we update it at fixes only. Horizontal vectors are complex numbers, no
 
 from math import exp, radians, sqrt
 from random import Random
-from typing import NamedTuple
 
 from sitl_mock.config.sensors import EkfConfig
-from sitl_mock.physics.quaternion import Vector
-from sitl_mock.physics.rigid_body import Motion
+from sitl_mock.physics.navigation_error import (
+    ErrorLaw,
+    Errors,
+    FilterState,
+    TrackState,
+    TrailRow,
+    extrapolated,
+    propagated,
+    settled_share,
+)
 
 _GRAVITY = 9.80665
 _SAG_S = 2.0
@@ -22,100 +29,6 @@ _COMPASS_S = 20.0
 """Time constant with which the heading follows the compass in a calm, s."""
 _SHOWN = 0.15
 """Rate at which an acceleration of 1 m/s^2 shows the true heading, 1/s; it grows as the square."""
-Errors = tuple[complex, complex, complex]
-"""Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
-TrailRow = tuple[*Motion, *Vector, *Vector]
-"""The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
-Trail = list[TrailRow]
-"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
-
-
-class NavigationError(NamedTuple):
-    """Error of the estimate: m, m/s, and a small rotation of the attitude, rad, NED."""
-
-    position: Vector
-    velocity: Vector
-    rotation: Vector
-
-
-class TrackState(NamedTuple):
-    """Errors after a fix, horizontal or vertical."""
-
-    errors: Errors
-    pending: tuple[complex, complex]
-    """Corrections of position and velocity that the output does not yet contain."""
-    noise: tuple[complex, complex]
-    """Noise of the latest fix: position and velocity."""
-
-
-class FilterState(NamedTuple):
-    """All errors after a fix, and the true motion at its fusion time."""
-
-    level: TrackState
-    upright: TrackState
-    yaw: float  # heading error, rad
-    yaw_pending: float  # its change that the output does not yet contain, rad
-    compass: float  # part of the heading error that comes from the compass, rad
-    sag: float  # of the height, m
-    at: float  # fusion time of the fix, s
-    corrected: float  # time of the fix, s
-    way: complex  # true position, m
-    speed: complex  # true velocity, m/s
-
-
-class ErrorLaw(NamedTuple):
-    """Constants of the errors between two fixes."""
-
-    lead: float  # s, by which errors grow with the acceleration
-    scale: float  # of the acceleration
-    height_offset: float  # m
-    predictor_ms: float
-
-
-def extrapolated(errors: Errors, elapsed: float) -> Errors:
-    """Return the errors ``elapsed`` s later, without new disturbances."""
-    place, speed, tilt = errors
-    return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
-
-
-def settled_share(law: ErrorLaw, state: FilterState, now: float) -> float:
-    """Return the share of the latest corrections that the output does not contain at ``now``."""
-    return exp((state.corrected - now) * 1e3 / law.predictor_ms)
-
-
-def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float) -> Errors:
-    """Return the horizontal errors ``elapsed`` s after the fix.
-
-    The filter integrated an acceleration that was rotated and scaled.
-    """
-    place, speed, tilt = extrapolated(state.level.errors, elapsed)
-    wrong = complex(law.scale, state.yaw)
-    before = state.speed
-    way = complex(truth[10], truth[11]) - state.way
-    return (
-        place + wrong * (way - elapsed * before),
-        speed + wrong * (complex(truth[0], truth[1]) - before),
-        tilt,
-    )
-
-
-def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
-    """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
-    elapsed = now - state.at
-    settled = settled_share(law, state, now)
-    place, speed, tilt = propagated(law, state, truth, elapsed)
-    pending = state.level.pending
-    place += law.lead * complex(truth[0], truth[1]) - settled * pending[0]
-    speed += law.lead * complex(truth[13], truth[14]) - settled * pending[1]
-    down, sink, _ = extrapolated(state.upright.errors, elapsed)
-    pending = state.upright.pending
-    down += law.height_offset + state.sag - settled * pending[0]
-    return NavigationError(
-        (place.real, place.imag, down.real),
-        (speed.real, speed.imag, (sink - settled * pending[1]).real),
-        # A wrong attitude rotates the thrust, which makes the acceleration wrong.
-        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - settled * state.yaw_pending),
-    )
 
 
 class NavigationFilter:
@@ -144,10 +57,12 @@ class NavigationFilter:
             config.predictor_ms,
         )
         self._random = Random(f"{seed}/navigation")
+        self._height_random = Random(f"{seed}/height")
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
         level, upright = self._initial(1.0), self._initial(config.vertical_share)
         way, speed = complex(start[10], start[11]), complex(start[0], start[1])
-        self.state = FilterState(level, upright, yaw, 0.0, 0.0, 0.0, 0.0, 0.0, way, speed)
+        noise = self._height_random.gauss(0.0, config.height_noise_m)
+        self.state = FilterState(level, upright, yaw, 0.0, 0.0, noise, noise, 0.0, 0.0, way, speed)
 
     def _initial(self, share: float) -> TrackState:
         """Return the state after the first fix, whose noise becomes the error."""
@@ -190,10 +105,13 @@ class NavigationFilter:
         compass = self._rested_on_compass(abs(pull), elapsed)
         yaw = self._turned(speed, pull) + compass
         turned = settled * state.yaw_pending + yaw - state.yaw
-        sag = config.height_sag_s4_per_m * abs(pull) ** 2
+        height_noise = self._next_height_noise(elapsed)
+        sag = config.height_sag_s4_per_m * abs(pull) ** 2 + height_noise
         sag = state.sag + (1.0 - exp(-elapsed / _SAG_S)) * (sag - state.sag)
         way = complex(delayed[10], delayed[11])
-        self.state = FilterState(level, upright, yaw, turned, compass, sag, at, now, way, speed)
+        self.state = FilterState(
+            level, upright, yaw, turned, compass, sag, height_noise, at, now, way, speed
+        )
 
     def _turned(self, speed: complex, pull: complex) -> float:
         """Return the next heading error, apart from the compass's: noise that follows turns."""
@@ -214,6 +132,12 @@ class NavigationFilter:
         rate = slow + _SHOWN * pull**2
         rest = radians(self._config.compass_error_deg) * slow / rate
         return rest + (self.state.compass - rest) * exp(-rate * elapsed)
+
+    def _next_height_noise(self, elapsed: float) -> float:
+        """Return the slow noise of the height at the next fix, m."""
+        config, kept = self._config, exp(-elapsed / self._config.height_noise_time_s)
+        spread = config.height_noise_m * sqrt(1.0 - kept * kept)
+        return kept * self.state.height_noise + self._height_random.gauss(0.0, spread)
 
     def _next_noise(self, noise: tuple[complex, complex], share: float) -> tuple[complex, complex]:
         """Return the noise of the next fix."""

@@ -8,7 +8,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.quaternion import Vector, to_body
 
 Motion = tuple[float, float, float, float, float, float, float, float, float, float]
 """(v_n, v_e, v_d [m/s], w, x, y, z, p, q, r [rad/s]): the state on which the derivative depends."""
@@ -24,6 +24,7 @@ class Body(NamedTuple):
     inertia_z: float  # kg m^2, about body z
     drag: float  # linear drag per mass, 1/s
     quadratic_drag: float  # per mass, 1/m
+    axis_drag: float  # quadratic drag along each body axis, per mass, 1/m
     rotational_drag: float  # damping torque, N m per rad/s
     gravity: float  # m/s^2
 
@@ -34,6 +35,7 @@ def body_of(airframe: AirframeConfig) -> Body:
         *airframe.inertia_kg_m2,
         drag=airframe.drag_n_s_per_m / airframe.mass_kg,
         quadratic_drag=airframe.quadratic_drag_n_s2_per_m2 / airframe.mass_kg,
+        axis_drag=airframe.axis_drag_n_s2_per_m2 / airframe.mass_kg,
         rotational_drag=airframe.rotational_drag_n_m_s,
         gravity=airframe.gravity_m_s2,
     )
@@ -55,18 +57,28 @@ def derivative(
 ) -> Motion:
     """Return the time derivative of a `Motion` (Newton, Euler, quaternion kinematics).
 
-    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind);
+    m v' = m g - T z_body - (drag + quadratic |v - wind|) (v - wind) - axis_drag f, where f has the
+    components |u_i| u_i along the body axes and u = v - wind;
     J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
     """
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load
-    jx, jy, jz, drag, quadratic, damping, gravity = body
+    jx, jy, jz, drag, quadratic, along_axes, damping, gravity = body
     air_n, air_e, air_d = wind_n - vn, wind_e - ve, wind_d - vd
     if quadratic:
         drag += quadratic * sqrt(air_n * air_n + air_e * air_e + air_d * air_d)
+    push_n = push_e = push_d = 0.0
+    if along_axes:
+        air = to_body((w, x, y, z), (air_n, air_e, air_d))
+        force = (
+            along_axes * abs(air[0]) * air[0],
+            along_axes * abs(air[1]) * air[1],
+            along_axes * abs(air[2]) * air[2],
+        )
+        push_n, push_e, push_d = to_body((w, -x, -y, -z), force)
     return (
-        drag * air_n - 2.0 * thrust * (x * z + w * y),
-        drag * air_e - 2.0 * thrust * (y * z - w * x),
-        drag * air_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
+        drag * air_n + push_n - 2.0 * thrust * (x * z + w * y),
+        drag * air_e + push_e - 2.0 * thrust * (y * z - w * x),
+        drag * air_d + push_d - thrust * (1.0 - 2.0 * (x * x + y * y)) + gravity,
         -0.5 * (x * p + y * q + z * r),
         0.5 * (w * p + y * r - z * q),
         0.5 * (w * q + z * p - x * r),

@@ -6,21 +6,21 @@ from random import Random
 from typing import NamedTuple
 
 from sitl_mock.config.sensors import SensorConfig
-from sitl_mock.physics.navigation_filter import (
+from sitl_mock.physics.navigation_error import (
     ErrorLaw,
     FilterState,
     NavigationError,
-    NavigationFilter,
     TrackState,
     Trail,
     TrailRow,
     error_at,
 )
+from sitl_mock.physics.navigation_filter import NavigationFilter
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply, normalise, to_body
 
 NO_ERROR = NavigationError((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _NO_TRACK = TrackState((0j, 0j, 0j), (0j, 0j), (0j, 0j))
-_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
+_NO_FILTER = FilterState(_NO_TRACK, _NO_TRACK, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0j, 0j)
 _DRAWN_TOGETHER = 16
 """Estimates for which noise is drawn at a time; even, because normal numbers come in pairs."""
 

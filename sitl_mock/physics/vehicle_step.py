@@ -18,7 +18,7 @@ from sitl_mock.physics.multirotor_step import (
     move,
     sinks,
 )
-from sitl_mock.physics.navigation_filter import Trail, TrailRow
+from sitl_mock.physics.navigation_error import Trail, TrailRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
 

@@ -57,7 +57,6 @@ def test_equal_cases_are_equal_flights_to_the_bit(campaign, tmp_path):
     other = flight.fly_case(windy)
     assert other["digest"] != row["digest"]
     assert other["max_tilt_rad"] > row["max_tilt_rad"] + 0.1
-    assert flight.fly_case(replace(calm, mock={**calm.mock, "seed": 7}))["digest"] != row["digest"]
     table = store.table(campaign.file, [row, other])
     assert table.schema == store.schema(campaign.file)
     factor = store.metadata(table)["factors"]["mock.wind.speed_m_s"]

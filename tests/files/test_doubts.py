@@ -64,3 +64,15 @@ def test_check_config_says_what_to_expect_and_what_to_look_at_again(tmp_path, ca
     assert "the hold has gains of " in out
     assert "look again: the times of `vehicle` were not measured on this vehicle" in out
     assert out.endswith(f"{path}: ok\n")
+
+
+def test_a_limit_of_body_rates_below_the_commanded_ones_is_doubted():
+    def doubted(limit):
+        return list(
+            doubts(Config.model_validate({**MOCK, "safety": {"max_body_rate_deg_s": limit}}))
+        )
+
+    (doubt,) = doubted(108.0)  # √(90² + 60²) = 108.2
+    assert doubt.key == "safety.max_body_rate_deg_s"
+    assert "the planner may command 108 °/s" in doubt.sentence()
+    assert doubted(109.0) == []

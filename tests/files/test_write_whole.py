@@ -2,9 +2,12 @@
 
 import os
 import stat
+import threading
+import time
 
 import pytest
 
+from companion.files import write_whole as module
 from companion.files.write_whole import write_whole
 
 
@@ -56,3 +59,20 @@ def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
         write_whole(path, "new")
     assert path.read_text() == "old"
     assert [each.name for each in tmp_path.iterdir()] == ["learned.json"]
+
+
+def test_a_disk_that_hangs_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "LONGEST", 0.05)
+    answers = threading.Event()
+    monkeypatch.setattr(os, "fsync", lambda _: answers.wait(10.0))
+    began = time.monotonic()
+    why = module.write_in_time(tmp_path / "summary.json", "{}")
+    assert time.monotonic() - began < 1.0
+    assert why == "the disk did not answer for 0.05 s"
+    answers.set()
+
+
+def test_in_time_it_writes_or_says_why_not(tmp_path):
+    assert module.write_in_time(tmp_path / "summary.json", "{}") is None
+    assert (tmp_path / "summary.json").read_text() == "{}"
+    assert module.write_in_time(tmp_path / "no folder" / "summary.json", "{}").startswith("No such")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from companion.drag import Drag
+from companion.drag import AxisDrag, Drag
 from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate, DragPrior
 
 DT = 0.02
-RADIUS = 5.0
+RADIUS, HEADING = 5.0, 0.3
 TRUE = {"px4": Drag(1.0), "ardupilot": Drag(0.25, 0.033), "light": Drag(0.2)}
 
 
@@ -15,7 +15,9 @@ def told(drag):
     return DragPrior(drag, 0.2, 0.02)
 
 
-def circled(estimate, true, seconds, speed=5.0, wind=(0.0, 0.0), gust=0.0, noise=0.02, seed=2):
+def circled(
+    estimate, true, seconds, speed=5.0, wind=(0.0, 0.0), gust=0.0, noise=0.02, seed=2, bluff=0.0
+):
     """The estimate after 2 s of hover and `seconds` from rest on a circle, step by step.
 
     The measured velocity has noise, and gusts have the mock's time constant of 2 s.
@@ -33,10 +35,18 @@ def circled(estimate, true, seconds, speed=5.0, wind=(0.0, 0.0), gust=0.0, noise
         if before is not None:
             change, thrust = (measured - before[0]) / DT, (v - before[1]) / DT
             left = change[:2] - thrust[:2] - true.deceleration(tuple(air))[:2]
-            estimate.observe(DT, tuple(0.5 * (measured + before[0])), tuple(left))
+            left -= bluff_deceleration(bluff, air[:2])
+            estimate.observe(DT, tuple(0.5 * (measured + before[0])), tuple(left), HEADING)
             drags.append(estimate.drag)
         before = measured, v
     return drags
+
+
+def bluff_deceleration(coefficient, air):
+    """Quadratic drag along the axes of a vehicle at `HEADING`."""
+    axes = np.array([[np.cos(HEADING), np.sin(HEADING)], [-np.sin(HEADING), np.cos(HEADING)]])
+    along = axes @ air
+    return axes.T @ (coefficient * np.abs(along) * along)
 
 
 @pytest.mark.parametrize("vehicle", TRUE)
@@ -122,3 +132,24 @@ def test_the_growth_of_the_deceleration_is_its_derivative(drag):
     assert np.linalg.norm(drag.deceleration(tuple(velocity))) == pytest.approx(
         drag.per_velocity(speed) * speed
     )
+
+
+def test_half_a_lap_shows_drag_along_the_axes_of_the_body():
+    """ArduPilot's simulator: 0.034 1/m along each axis. A round body has none."""
+    for bluff in (0.034, 0.0):
+        estimate = DragEstimate(ANY_VEHICLE)
+        circled(estimate, Drag(0.27), 6.0, bluff=bluff)
+        assert estimate.axis_coefficient == pytest.approx(bluff, abs=0.006)
+
+
+def test_axis_drag_and_its_mean_are_quadratic_drag_along_the_axes():
+    """Its mean over all directions is 0; with 8/3π of quadratic drag it acts along the axes."""
+    axis_drag, mean = AxisDrag(0.04, HEADING), Drag(0.0, 0.04 * 8.0 / (3.0 * np.pi))
+    along = []
+    for angle in np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False):
+        velocity = 7.0 * np.array([np.cos(angle), np.sin(angle)])
+        more = np.array(axis_drag.deceleration(*velocity))
+        told = mean.deceleration((*velocity, 0.0))[:2] + more
+        assert told == pytest.approx(bluff_deceleration(0.04, velocity), abs=1e-9)
+        along.append(more @ velocity)
+    assert np.mean(along) == pytest.approx(0.0, abs=0.03)

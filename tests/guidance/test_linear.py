@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.attitude import Coefficients
-from companion.drag import Drag
+from companion.drag import ROUND, AxisDrag, Drag
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
@@ -57,8 +57,11 @@ def circling(time):
     )
 
 
-def flown(settings, reference_at, seconds, wind=REST, start=None):
-    """(S, 2) position errors of a point mass whose coefficients follow the inner response."""
+def flown(settings, reference_at, seconds, wind=REST, start=None, has=ROUND, told=ROUND):
+    """(S, 2) position errors of a point mass whose coefficients follow the inner response.
+
+    It `has` a drag along its axes; guidance is `told` of another.
+    """
     guidance, response = LinearGuidance(settings), TILT
     late = round(response.dead_time / DT)
     begin = start or reference_at(0.0)
@@ -70,11 +73,12 @@ def flown(settings, reference_at, seconds, wind=REST, start=None):
         motion = VehicleMotion(tuple(p), tuple(v))
         ahead = guidance.acts_after
         known = np.array([*thrust, 0.0]) + DRAG.linear * (wind - v)
+        known[:2] -= has.deceleration(v[0], v[1])
         acts = VehicleMotion(
             tuple(p + ahead * v + 0.5 * ahead**2 * known), tuple(v + ahead * known)
         )
         situation = GuidanceInput(
-            motion, acts, tuple(thrust), tuple(DRAG.linear * wind[:2]), DRAG, THRUST
+            motion, acts, tuple(thrust), tuple(DRAG.linear * wind[:2]), DRAG, THRUST, told
         )
         target, _, down = guidance.command(reference_at, t, situation)
         asked.append((target.north, target.east))
@@ -92,6 +96,16 @@ def test_a_circle_is_followed_without_lag():
     assert errors.max() <= 0.01  # Euler's steps of 2 ms
     late = replace(SETTINGS, tilt=IMMEDIATE)
     assert np.hypot(*flown(late, circling, 12.0)[-3000:].T).max() >= 0.2
+
+
+def test_drag_along_the_axes_is_fed_forward():
+    has = AxisDrag(0.06, 0.4)
+    known, unknown = (
+        np.hypot(*flown(SETTINGS, circling, 12.0, has=has, told=told)[-3000:].T).max()
+        for told in (has, ROUND)
+    )
+    assert known <= 0.012
+    assert unknown >= 3.0 * known
 
 
 def test_a_known_wind_moves_it_off_no_more_than_for_a_moment():

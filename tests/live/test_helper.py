@@ -76,7 +76,7 @@ def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
         relay = helper_process.Relay(Channel(theirs), first)
         try:
             with pytest.raises(NoAnswerError, match="it may have been applied"):
-                await relay.ask({"kind": "undo"})
+                await relay.undo("a test")
         finally:
             asyncio.get_running_loop().remove_reader(theirs.fileno())
             theirs.close()

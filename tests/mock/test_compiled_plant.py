@@ -27,6 +27,7 @@ def vehicle(rng, plant):
             mass_kg=rng.uniform(0.8, 1.3),
             inertia_kg_m2=tuple(rng.uniform(0.02, 0.04) for _ in range(3)),
             quadratic_drag_n_s2_per_m2=rng.choice((0.0, 0.05)),
+            axis_drag_n_s2_per_m2=rng.choice((0.0, 0.05)),
             crash_tilt_deg=rng.choice((5.0, 180.0)),
             crash_speed_m_s=rng.choice((1.0, 100.0)),
             physics_rate_hz=rng.choice((1000, 2000)),

@@ -11,10 +11,13 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.physics.rigid_body import Body, advance, body_of, derivative
 from sitl_mock.settings import MockSettings
 
-FREE = Body(0.02, 0.035, 0.05, drag=0.0, quadratic_drag=0.0, rotational_drag=0.0, gravity=9.80665)
+FREE = Body(0.02, 0.035, 0.05, 0.0, 0.0, 0.0, rotational_drag=0.0, gravity=9.80665)
 REAL = body_of(
     AirframeConfig(
-        inertia_kg_m2=(0.02, 0.03, 0.045), drag_n_s_per_m=0.7, quadratic_drag_n_s2_per_m2=0.05
+        inertia_kg_m2=(0.02, 0.03, 0.045),
+        drag_n_s_per_m=0.7,
+        quadratic_drag_n_s2_per_m2=0.05,
+        axis_drag_n_s2_per_m2=0.03,
     )
 )
 NO_LOAD = (0.0,) * 7
@@ -44,7 +47,9 @@ def reference(load, body):
         matrix = Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
         air = velocity - wind
         drag = body.drag + body.quadratic_drag * np.linalg.norm(air)
-        acceleration = [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - drag * air
+        along = matrix.T @ air
+        bluff = matrix @ (body.axis_drag * np.abs(along) * along)
+        acceleration = [0.0, 0.0, body.gravity] - thrust * matrix[:, 2] - drag * air - bluff
         q_rate = 0.5 * np.concatenate(([-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)))
         moment = torque - body.rotational_drag * omega - np.cross(omega, inertia @ omega)
         return np.concatenate((velocity, acceleration, q_rate, np.linalg.solve(inertia, moment)))
@@ -84,11 +89,12 @@ def test_torque_free_precession_keeps_angular_momentum_and_energy():
 def test_error_falls_with_the_fourth_power_of_the_step():
     motion = (1.0, 2.0, 3.0, *LEVEL, 5.0, -7.0, 3.0)
     load = (9.0, 0.02, -0.01, 0.01, 1.0, 2.0, 0.0)
-    exact = fly(motion, load, REAL, 0.4, dt=1e-3)
+    body = REAL._replace(axis_drag=0.0)  # it has a kink where a component changes its sign
+    exact = fly(motion, load, body, 0.4, dt=1e-3)
     errors = [
         [
             np.abs(np.subtract(ours, true)).max()
-            for ours, true in zip(fly(motion, load, REAL, 0.4, dt), exact, strict=True)
+            for ours, true in zip(fly(motion, load, body, 0.4, dt), exact, strict=True)
         ]
         for dt in (0.02, 0.01)
     ]
@@ -103,7 +109,7 @@ def test_free_fall_is_the_parabola():
 
 
 def test_fall_with_linear_drag_nears_the_terminal_speed():
-    body = REAL._replace(quadratic_drag=0.0)
+    body = REAL._replace(quadratic_drag=0.0, axis_drag=0.0)
     motion, _ = fly((0.0, 0.0, 0.0, *LEVEL, 0.0, 0.0, 0.0), NO_LOAD, body, 3.0)
     terminal = body.gravity / body.drag
     assert motion[2] == pytest.approx(terminal * (1.0 - exp(-3.0 * body.drag)), rel=1e-9)

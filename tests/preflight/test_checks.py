@@ -373,8 +373,9 @@ def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
 def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, expected):
     for name, measured in (("2026-01-01", 0.2), ("2026-01-02", roll)):
         (tmp_path / name).mkdir()
-        times = {"roll": measured, "pitch": None, "yaw": None}
-        (tmp_path / name / "summary.json").write_text(json.dumps({"dead_time_s": times}))
+        _write_dead_time(tmp_path / name, measured)
+    (tmp_path / "2026-01-04").mkdir()
+    _write_dead_time(tmp_path / "2026-01-04", 0.3, gain=9.0)  # another gain says nothing
     (tmp_path / "2026-01-03").mkdir()
     (tmp_path / "2026-01-03" / "summary.json").write_text("[")  # cut off
     config = changed(CONFIG, {"recording": {"directory": tmp_path}}, "test")
@@ -383,6 +384,12 @@ def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, exp
         (finding,) = configuration_checks.dead_time(config, GOOD)
         assert "no flight" in finding.found
     assert found(configuration_checks.dead_time, config=config) == expected
+
+
+def _write_dead_time(folder, roll, gain=CONFIG.planner.gain_per_s):
+    times = {"roll": roll, "pitch": None, "yaw": None}
+    told = {"planner": CONFIG.planner_name, "gain_per_s": gain, "dead_time_s": times}
+    (folder / "summary.json").write_text(json.dumps(told))
 
 
 def test_an_exception_lets_one_finding_pass_and_no_other():
@@ -395,10 +402,14 @@ def test_an_exception_lets_one_finding_pass_and_no_other():
 
 
 def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
-    wrong = {"vehicle": {"identified": None}, "limits": {"max_tilt_rate_deg_s": 1.57}}
+    wrong = {
+        "vehicle": {"identified": None},
+        "limits": {"max_tilt_rate_deg_s": 1.57},
+        "safety": {"max_body_rate_deg_s": 20.0},
+    }
     config = changed(CONFIG, wrong, "test")
     found = {one.key: one for one in configuration_checks.doubtful(config, GOOD)}
-    assert set(found) == {Key.IDENTIFIED, Key.UNITS}
+    assert set(found) == {Key.IDENTIFIED, Key.UNITS, Key.BODY_RATE}
     assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
     assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
     assert list(configuration_checks.doubtful(CONFIG, GOOD)) == []

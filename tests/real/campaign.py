@@ -36,7 +36,7 @@ SETS = {
 REPEATED = ("straight", "near")
 """Sets that `--times` repeats; the others are flown once."""
 MOCK_SETS = ("straight", "near", "wind", "compared", "steps")
-"""Sets that the mock vehicle flies, too, once each."""
+"""Sets that the mock vehicle flies, too."""
 _TEN = 10
 
 
@@ -139,7 +139,7 @@ def planned(vehicle: str, sets: list[str], times: int) -> list[str]:
     ]
     repeated = [flight for name in flown if name in REPEATED for flight in SETS[name]]
     once = [flight for name in flown if name not in REPEATED for flight in SETS[name]]
-    return repeated * (times if real else 1) + once
+    return repeated * times + once
 
 
 def missing(flights: list[str], counts: Counter[str]) -> list[str]:

@@ -155,8 +155,10 @@ def test_a_flight_is_exported_as_csv_and_parquet(good, tmp_path, capsys):
     parquet = pytest.importorskip("pyarrow.parquet")
     for kind in ("csv", "parquet"):
         assert main(["export", str(folder), f"--{kind}", "--into", str(tmp_path)]) == 0
-    assert str(tmp_path / "tracking.csv") in capsys.readouterr().out
     rows = read_flight(folder).rows("guidance")
+    told = capsys.readouterr().out
+    assert str(tmp_path / "tracking.csv") in told
+    assert f"{tmp_path / 'guidance.csv'}  {len(rows):,} rows" in told
     for name in ("estimated_north_m", "time_s"):
         csv_column = np.genfromtxt(tmp_path / "guidance.csv", delimiter=",", names=True)[name]
         np.testing.assert_array_equal(csv_column, rows[name])

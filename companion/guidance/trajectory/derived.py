@@ -18,8 +18,8 @@ class Slowed:
     Attributes:
         trajectory: the original trajectory.
         law: the original time as a function of the slowed time.
-        moments: of the trajectory at which to check it, s; none: its own check times, which do
-            where it is slowed down evenly.
+        moments: times of the original trajectory at which to check it, s. If empty, its own check
+            times are used: they suffice where it is slowed down evenly.
     """
 
     trajectory: Trajectory

@@ -143,7 +143,7 @@ class Cruise:
         return self.length / self.rate + 0.5 * (self.gathering + self.losing)
 
     def pieces(self) -> list[Piece]:
-        """Gathering, steady, losing."""
+        """Three parts: speeding up, steady, slowing down."""
         brake = self.duration - self.losing
         return [
             Piece(0.0, self.gathering, False),
@@ -229,7 +229,7 @@ _Piece = tuple[float, Progress, float]
 
 
 def _joined(jerks: Sequence[tuple[float, float]]) -> list[_Piece]:
-    """Pieces (duration, jerk) one after the other, from rest."""
+    """Join pieces (duration s, constant jerk) into one motion that begins at rest."""
     pieces = []
     start, state = 0.0, Progress(0.0)
     for duration, jerk in jerks:

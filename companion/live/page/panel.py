@@ -78,7 +78,7 @@ class Panel:
         await self._ask(self._relay.change(values, _BY))
 
     async def _undo_last(self) -> None:
-        await self._ask(self._relay.ask({"kind": "undo", "by": _BY}))
+        await self._ask(self._relay.undo(_BY))
 
     async def _ask(self, request: Any) -> None:
         if not self._unlocked:

@@ -46,7 +46,7 @@ class CommandedMotion:
     """Turns requests into a reference that never jumps; all in one frame.
 
     Args:
-        limits: see there.
+        limits: of the motion that leads from one request to the next.
     """
 
     def __init__(self, limits: MotionLimits) -> None:

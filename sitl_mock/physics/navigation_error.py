@@ -1,0 +1,107 @@
+"""The error of a navigation filter between two fixes: its parts, and their closed form (pure).
+
+Horizontal vectors are complex numbers, north + j east. The functions can be compiled.
+"""
+
+from math import exp
+from typing import NamedTuple
+
+from sitl_mock.physics.quaternion import Vector
+from sitl_mock.physics.rigid_body import Motion
+
+_GRAVITY = 9.80665
+Errors = tuple[complex, complex, complex]
+"""Errors of position (m), velocity (m/s), acceleration (m/s^2, from errors of roll and pitch)."""
+TrailRow = tuple[*Motion, *Vector, *Vector]
+"""The true motion after a step: motion, position (NED, m), mean acceleration (NED, m/s^2)."""
+Trail = list[TrailRow]
+"""The rows of the latest steps, written in a circle; an array if the steps are compiled."""
+
+
+class NavigationError(NamedTuple):
+    """Error of the estimate: m, m/s, and a small rotation of the attitude, rad, NED."""
+
+    position: Vector
+    velocity: Vector
+    rotation: Vector
+
+
+class TrackState(NamedTuple):
+    """Errors after a fix, horizontal or vertical."""
+
+    errors: Errors
+    pending: tuple[complex, complex]
+    """Corrections of position and velocity that the output does not yet contain."""
+    noise: tuple[complex, complex]
+    """Noise of the latest fix: position and velocity."""
+
+
+class FilterState(NamedTuple):
+    """All errors after a fix, and the true motion at its fusion time."""
+
+    level: TrackState
+    upright: TrackState
+    yaw: float  # heading error, rad
+    yaw_pending: float  # its change that the output does not yet contain, rad
+    compass: float  # part of the heading error that comes from the compass, rad
+    sag: float  # of the height, m
+    height_noise: float  # slow noise that the height follows, m
+    at: float  # fusion time of the fix, s
+    corrected: float  # time of the fix, s
+    way: complex  # true position, m
+    speed: complex  # true velocity, m/s
+
+
+class ErrorLaw(NamedTuple):
+    """Constants of the errors between two fixes."""
+
+    lead: float  # s, by which errors grow with the acceleration
+    scale: float  # of the acceleration
+    height_offset: float  # m
+    predictor_ms: float
+
+
+def extrapolated(errors: Errors, elapsed: float) -> Errors:
+    """Return the errors ``elapsed`` s later, without new disturbances."""
+    place, speed, tilt = errors
+    return place + elapsed * (speed + 0.5 * elapsed * tilt), speed + elapsed * tilt, tilt
+
+
+def settled_share(law: ErrorLaw, state: FilterState, now: float) -> float:
+    """Return the share of the latest corrections that the output does not contain at ``now``."""
+    return exp((state.corrected - now) * 1e3 / law.predictor_ms)
+
+
+def propagated(law: ErrorLaw, state: FilterState, truth: TrailRow, elapsed: float) -> Errors:
+    """Return the horizontal errors ``elapsed`` s after the fix.
+
+    The filter integrated an acceleration that was rotated and scaled.
+    """
+    place, speed, tilt = extrapolated(state.level.errors, elapsed)
+    wrong = complex(law.scale, state.yaw)
+    before = state.speed
+    way = complex(truth[10], truth[11]) - state.way
+    return (
+        place + wrong * (way - elapsed * before),
+        speed + wrong * (complex(truth[0], truth[1]) - before),
+        tilt,
+    )
+
+
+def error_at(law: ErrorLaw, state: FilterState, truth: TrailRow, now: float) -> NavigationError:
+    """Return the error at ``now`` (s), at which the true motion is ``truth`` (pure)."""
+    elapsed = now - state.at
+    settled = settled_share(law, state, now)
+    place, speed, tilt = propagated(law, state, truth, elapsed)
+    pending = state.level.pending
+    place += law.lead * complex(truth[0], truth[1]) - settled * pending[0]
+    speed += law.lead * complex(truth[13], truth[14]) - settled * pending[1]
+    down, sink, _ = extrapolated(state.upright.errors, elapsed)
+    pending = state.upright.pending
+    down += law.height_offset + state.sag - settled * pending[0]
+    return NavigationError(
+        (place.real, place.imag, down.real),
+        (speed.real, speed.imag, (sink - settled * pending[1]).real),
+        # A wrong attitude rotates the thrust, which makes the acceleration wrong.
+        (tilt.imag / _GRAVITY, -tilt.real / _GRAVITY, state.yaw - settled * state.yaw_pending),
+    )
